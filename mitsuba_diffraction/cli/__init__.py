@@ -16,6 +16,7 @@ survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
 options                options that several commands share, declared once, and their types
+scene_options          the scene, its parameters and materials; a mesh on a stage
 workers                options of commands that may run on many processes
 console                lines and bars on stderr, what Mitsuba says among them; Ctrl-C and SIGTERM
 report                 output files, checked before the work; plain data as text and JSON

@@ -113,7 +113,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     if workers:
         print(
             f"  work   {workers['tasks']} tasks of windows, {workers['retries']} given out again, "
-            f"{workers['busy']:.1f} s of workers' work, {workers['bytes'] / 1e6:.3g} MB sent"
+            f"{workers['busy']:.1f} s of workers' work"
         )
     return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
 

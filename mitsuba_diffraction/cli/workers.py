@@ -89,11 +89,12 @@ def film_of(
 def say_report(film: Film) -> dict[str, Any]:
     """Print what the workers did in a line, and return it as plain data."""
     report = film.report.summary()
-    kept = f", {report['kept']} kept from before" if report["kept"] else ""
+    kept = f", {report['kept']} stored before" if report["kept"] else ""
     lost = f", {report['lost']} workers lost" if report["lost"] else ""
     again = f", {report['retries']} given out again" if report["retries"] else ""
     print(
-        f"workers: {report['tasks']} tasks{kept}{again}{lost}, {report['busy']:.1f} s of work by "
+        f"workers: {report['tasks']} tasks in {report['groups']} sums{kept}{again}{lost}, "
+        f"{report['busy']:.1f} s of work by "
         f"{len(report['workers'])} workers in {report['seconds']:.1f} s, "
         f"{report['overhead_per_task_s']:.2g} s a task beside it, {report['bytes'] / 1e6:.3g} MB, "
         f"{report['peak'] / 1e9:.2g} GB of memory at most"

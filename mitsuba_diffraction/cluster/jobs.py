@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import time
 import warnings
 from collections import deque
@@ -16,7 +15,7 @@ from ..progress import Progress
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.table import DiffractionTable
-from .tasks import Failed, MissingFiles, SceneFiles, check_versions, failure, versions
+from .tasks import Failed, MissingFiles, SceneFiles, check_versions, failures, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
@@ -86,7 +85,7 @@ def run_jobs(
     Parameters
     ----------
     client : `distributed.Client`, or None to do all here.
-    work : gives `MissingFiles` for files that it needs by content.
+    work : raises `MissingFiles` for files that it needs by content.
     jobs : any.
 
     Returns
@@ -132,19 +131,17 @@ class OrderedMap:
     Attributes
     ----------
     tasks, retries : that were done, and given out again when the scheduler was lost.
-    bytes : that went to workers.
     busy : seconds of all workers' work.
     """
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self.tasks = self.retries = self.bytes = 0
+        self.tasks = self.retries = 0
         self.busy = 0.0
 
     def summary(self) -> dict[str, Any]:
         """Return the cost as plain data."""
-        names = "tasks", "retries", "bytes", "busy"
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in ("tasks", "retries", "busy")}
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
         """Yield the results of `work` for each of the arguments.
@@ -178,7 +175,7 @@ class OrderedMap:
             for n, (call, _) in enumerate(waiting):
                 waiting[n] = call, self._submitted(call)
         if isinstance(answer, Failed):
-            raise DiffractionError(f"worker {answer.worker}: {answer.text}")
+            raise DiffractionError(str(answer))
         waiting.popleft()
         result, seconds = answer
         self.tasks += 1
@@ -186,19 +183,14 @@ class OrderedMap:
         return result
 
     def _submitted(self, call: tuple[Any, Any]) -> Any:
-        content = pickle.dumps((versions(), *call), protocol=5)
-        self.bytes += len(content)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
-            return self._client.submit(_done, content, pure=False)
+            return self._client.submit(_done, versions(), *call, pure=False)
 
 
-def _done(content: bytes) -> tuple[Any, float] | Failed:
-    """Run a pickled call; return its result and its seconds."""
+def _done(wanted: tuple[str, ...], work: Callable[[Any], Any], argument: Any) -> tuple[Any, float]:
+    """Return the result of a call, and its seconds."""
     start = time.perf_counter()
-    try:
-        wanted, work, argument = pickle.loads(content)
+    with failures():
         check_versions(wanted)  # a late worker has not been checked
         return work(argument), time.perf_counter() - start
-    except Exception as error:
-        return failure(error)

@@ -1,18 +1,19 @@
-"""Work of a worker: some passes of one frame, and the sum of their films.
+"""Work of a worker: passes of one frame rendered and added up, and sums of other workers added.
 
 The files of a scene are known by content: used in place, or copied to where a worker lacks them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import tempfile
 import time
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
 from ..scene.load import load_scene, sensor_of, set_variant, shrink
 from ..scene.parameters import files_of
-from ..scene.passes import Pass, integrator_of, render_pass
+from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor
 from ..tables.store import cache_folder, key_of
 
@@ -33,7 +34,7 @@ _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
 @dataclass(frozen=True)
 class Task:
-    """Passes of one frame, in the order in which their films are added up."""
+    """Passes of one frame, a part of the frame's tree of additions."""
 
     files: SceneFiles  # the scene
     # variant, sensor, preview: as in `cluster.render`
@@ -41,50 +42,72 @@ class Task:
     sensor: int
     preview: bool
     film: str  # the client's film, see `film_of`
-    # frame, first: numbers of the frame and of the first pass, for people
-    frame: int
-    first: int
-    passes: tuple[Pass, ...]  # seeds and samples
+    frame: int  # number of the frame
+    span: Span  # numbers of the passes
+    passes: tuple[Pass, ...]  # seeds and samples of the span
     versions: tuple[str, ...]  # packages that decide the bits of a picture
     threads: int  # threads of Dr.Jit; 0 for one a core
 
-    @property
+    def part(self, span: Span) -> Task:
+        """Return the task of a part of the passes."""
+        start = span.first - self.span.first
+        return replace(self, span=span, passes=self.passes[start : start + span.count])
+
+    @cached_property
     def key(self) -> str:
         """Key of the sum: all that decides it, except the threads and processor that add it up."""
         passes = [(render.seed, render.spp) for render in self.passes]
         what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
-        return key_of("passes", *what, self.versions)
+        return key_of("sum of passes", *what, self.versions)
 
     def __str__(self) -> str:
-        last = self.first + len(self.passes) - 1
-        passes = f"pass {self.first}" if last == self.first else f"passes {self.first} to {last}"
-        return f"frame {self.frame}, {passes}"
+        return f"frame {self.frame}, {self.span}"
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Result of a task."""
+    """Sum of the films of passes, and what it cost."""
 
-    raw: NDArray[np.float64]  # (ny, nx, channels), the sum of the films' raw storage
-    where: str  # processor and Dr.Jit threads, which decide the last bits
-    worker: str  # address
-    seconds: float  # time of the work, loading included
-    peak: int  # bytes of the process at most
+    raw: NDArray[np.floating[Any]]  # (ny, nx, channels), the films' raw storage
+    where: Sequence[str]  # processors and Dr.Jit threads, which decide the last bits
+    workers: Sequence[str]  # addresses
+    tasks: int  # number of tasks that were added up
+    seconds: float  # time of all their work, loading included
+    peak: int  # bytes of a process at most
+
+    def __add__(self, other: Sums) -> Sums:
+        """Add the sum of the passes that follow in the tree."""
+        return Sums(
+            self.raw + other.raw,
+            tuple(sorted({*self.where, *other.where})),
+            tuple(sorted({*self.workers, *other.workers})),
+            self.tasks + other.tasks,
+            self.seconds + other.seconds,
+            max(self.peak, other.peak),
+        )
+
+    def __sizeof__(self) -> int:
+        """Return the number of bytes, which Dask weighs when it chooses where to add sums."""
+        return self.raw.nbytes
 
 
-@dataclass(frozen=True)
-class MissingFiles:
-    """Answer of a worker that lacks files, by their digests."""
+class MissingFiles(Exception):
+    """Files that a worker lacks, by their digests."""
 
-    digests: tuple[str, ...]
+    def __init__(self, digests: Sequence[str]) -> None:
+        super().__init__(digests)  # Dask pickles exceptions by their arguments
+        self.digests = digests
 
 
-@dataclass(frozen=True)
-class Failed:
+class Failed(Exception):
     """Error of a task in one line, and the worker's address."""
 
-    text: str
-    worker: str
+    def __init__(self, text: str, worker: str) -> None:
+        super().__init__(text, worker)
+        self.text, self.worker = text, worker
+
+    def __str__(self) -> str:
+        return f"worker {self.worker}: {self.text}"
 
 
 def versions() -> tuple[str, ...]:
@@ -92,28 +115,50 @@ def versions() -> tuple[str, ...]:
     return tuple(version(name) for name in _PACKAGES)
 
 
-def run_task(
-    task: Task, contents: Mapping[str, bytes] | None = None
-) -> Sums | MissingFiles | Failed:
-    """Do a task in this process. contents: content of files that are missing here, by digest."""
-    try:
+def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
+    """Render and add up passes in this process.
+
+    contents : content of files that are missing here, by digest.
+
+    Raises
+    ------
+    MissingFiles
+        If more are missing.
+    Failed
+        After any other error.
+    """
+    with failures():
         task.files.keep(contents or {})
         lacking = task.files.missing()
+        if {*lacking} & {*(contents or {})}:
+            raise DiffractionError("its files changed since the command began; run it again")
         if lacking:
-            return MissingFiles(tuple(lacking))
+            raise MissingFiles(lacking)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
+
+
+def add_sums(sums: Sequence[Sums]) -> Sums:
+    """Add sums of spans that follow one another and are of one size, except the last."""
+    with failures():
+        return added(
+            Span(0, len(sums)), lambda span: sums[span.first] if span.count == 1 else None
+        )  # fmt: skip
+
+
+@contextlib.contextmanager
+def failures() -> Iterator[None]:
+    """Raise errors of a worker as `Failed`, in one line."""
+    try:
+        yield
+    except MissingFiles:
+        raise
+    except DiffractionError as error:
+        raise Failed(str(error), worker_address()) from None
     except Exception as error:
-        return failure(error)
-
-
-def failure(error: Exception) -> Failed:
-    """Return a worker's answer to an error, without its traceback."""
-    text = str(error)
-    if not isinstance(error, DiffractionError):
-        text = f"unexpected {type(error).__name__}: {one_line(text)}"
-    return Failed(text, worker_address())
+        text = f"unexpected {type(error).__name__}: {one_line(str(error))}"
+        raise Failed(text, worker_address()) from None
 
 
 def _sums(task: Task) -> Sums:
@@ -125,22 +170,26 @@ def _sums(task: Task) -> Sums:
     set_variant(task.variant)  # per process and thread: mitsuba3 #1685
     if task.variant.startswith("llvm") and dr.thread_count() != threads:
         dr.set_thread_count(threads)
-    scene, sensor = _scene(task.files, task.variant, task.sensor, task.preview)
+    scene, sensor = loaded_scene(task.files, task.variant, task.sensor, task.preview)
     if film_of(scene, sensor) != task.film:
         raise DiffractionError(
             "its film is not that of frame 0; parameters that change the film's size or format "
             "take one process, or a run for each"
         )
-    total: Any = 0.0
-    for render in task.passes:
-        total = total + render_pass(scene, sensor, render)
+
+    def sum_of(span: Span) -> Any:
+        if span.count > 1:
+            return None
+        return render_pass(scene, sensor, task.passes[span.first - task.span.first])
+
+    total = added(task.span, sum_of)
     peak = peak_memory()
     where = f"{processor()}, {threads} threads"
-    return Sums(total, where, worker_address(), time.perf_counter() - start, peak)
+    return Sums(total, (where,), (worker_address(),), 1, time.perf_counter() - start, peak)
 
 
 @lru_cache(1)
-def _scene(files: SceneFiles, variant: str, number: int, preview: bool) -> tuple[Any, Any]:
+def loaded_scene(files: SceneFiles, variant: str, number: int, preview: bool) -> tuple[Any, Any]:
     """Load the scene of a task; the one before stays loaded meanwhile, for what both need."""
     path, values = files.here()
     scene = load_scene(path, values)

@@ -8,17 +8,21 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import Any
 
 from ..errors import DiffractionError, one_line
+from ..extras import optional
 from ..scene.passes import Stop
-from .tasks import Failed, check_versions, versions
+from .tasks import Failed, MissingFiles, check_versions, versions
 
 #: Names a running cluster, as Dask has it.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
-_PATIENCE = 60.0  # seconds for the first worker to come, and for a scheduler that was lost
+#: Seconds for the first worker to come, and for a scheduler that was lost.
+PATIENCE = 60.0
+#: Seconds between counts of the workers.
+COUNT_EVERY = 2.0
 
 
 @contextlib.contextmanager
@@ -42,7 +46,7 @@ def connect(
     DiffractionError
         If Dask is not installed, or nobody answers at the address.
     """
-    distributed = require_dask()
+    distributed = optional("distributed")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # ours are the words
     if count is not None:
         import dask
@@ -50,7 +54,7 @@ def connect(
         # the processes that are started ignore Ctrl-C: it is for the client
         with _ctrl_c_ignored(), _silent_tracker():
             cluster = distributed.LocalCluster(
-                n_workers=count, threads_per_worker=1, processes=True,
+                n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
                 dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
             )  # fmt: skip
         # a worker that died is started again, and not given up if that takes more than 15 s
@@ -69,7 +73,7 @@ def connect(
     try:
         distributed.Client(**named, timeout=patience).close()
         # the same time is for a scheduler that is lost and comes back
-        client = distributed.Client(**named, timeout=_PATIENCE)
+        client = distributed.Client(**named, timeout=PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
         raise DiffractionError(
             f"no scheduler answers at '{address}' ({one_line(str(error))[:80]}); start one with "
@@ -77,17 +81,6 @@ def connect(
         ) from error
     with client:
         yield client
-
-
-def require_dask() -> Any:
-    """Import the module `distributed`."""
-    try:
-        import distributed
-    except ImportError as error:
-        raise DiffractionError(
-            "workers need Dask, which is not installed: pip install 'mitsuba-diffraction[cluster]'"
-        ) from error
-    return distributed
 
 
 def check_workers(client: Any, variant: str | None) -> list[str]:
@@ -103,12 +96,12 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
     DiffractionError
         If there are none, or one has several Dask threads, other versions, or no LLVM or GPU.
     """
-    distributed = require_dask()
+    distributed = optional("distributed")
     try:
-        client.wait_for_workers(1, timeout=_PATIENCE)
+        client.wait_for_workers(1, timeout=PATIENCE)
     except (TimeoutError, distributed.TimeoutError) as error:
         raise DiffractionError(
-            f"no worker came within {_PATIENCE:.0f} s; start some with 'dask worker --nthreads 1'"
+            f"no worker came within {PATIENCE:.0f} s; start some with 'dask worker --nthreads 1'"
         ) from error
     for address, about in workers_of(client).items():
         if about["nthreads"] != 1:
@@ -116,7 +109,7 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
-    reasons = client.run(_trouble, versions(), variant, on_error="return")
+    reasons = client.run(trouble_of_process, versions(), variant, on_error="return")
     answers = {a: trouble for a, trouble in reasons.items() if not isinstance(trouble, OSError)}
     for address, trouble in answers.items():  # the others have just gone
         if trouble is not None:
@@ -134,11 +127,40 @@ def workers_of(client: Any) -> dict[str, Any]:
         return {}
 
 
+class Headcount:
+    """Number of workers, counted every `COUNT_EVERY` seconds.
+
+    Parameters
+    ----------
+    client : `distributed.Client`.
+    there : addresses of the workers at the start.
+    """
+
+    def __init__(self, client: Any, there: Iterable[str]) -> None:
+        self._client, self._seen, self._there = client, set(there), set(there)
+        self._time = time.monotonic()
+
+    def now(self) -> int:
+        """Return the number of workers."""
+        if time.monotonic() - self._time > COUNT_EVERY:
+            self.lost()
+        return len(self._there)
+
+    def lost(self) -> int:
+        """Count now, and return how many workers were there and are not any more."""
+        self._time, self._there = time.monotonic(), set(workers_of(self._client))
+        self._seen |= self._there
+        return len(self._seen - self._there)
+
+
 def outcome(future: Any) -> Any:
-    """Return the result of a task: `Failed` if its workers died; None if the scheduler lost it."""
-    distributed = require_dask()
+    """Return the result of a task, or its error: `MissingFiles`, or `Failed`, also if its workers
+    died. None if the scheduler lost it."""
+    distributed = optional("distributed")
     try:
         return future.result()
+    except (Failed, MissingFiles) as error:
+        return error
     except distributed.scheduler.KilledWorker as error:
         return Failed(
             "it died, as did those before that had the same task; a worker may lack memory, see "
@@ -151,7 +173,7 @@ def outcome(future: Any) -> Any:
 
 def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
     """Wait until the scheduler answers again, or `stop` is asked."""
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + PATIENCE
     while client.status != "running" and not (stop and stop.asked):
         if client.status == "closed" or time.monotonic() > end:
             raise DiffractionError(
@@ -172,7 +194,7 @@ def memory_warnings(client: Any, needed: float) -> Iterator[str]:
             )
 
 
-def _trouble(wanted: tuple[str, ...], variant: str | None) -> str | None:
+def trouble_of_process(wanted: tuple[str, ...], variant: str | None) -> str | None:
     """Return the reason why this process cannot serve, or None."""
     from ..scene.load import set_variant
 

@@ -4,8 +4,10 @@ Contents
 --------
 bsdf            `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
 transmission    the plugin `diffraction_dielectric`, which lets light through as well
+orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, the part that both plugins share
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
+nesting         methods of a BSDF over a nested one
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives

@@ -9,9 +9,13 @@ import mitsuba as mi
 
 from ..errors import DiffractionError, quoted
 from ..heights.field import HeightField
+from ..tables.orders import OrderTable
+from ..tables.orders.file import is_order_table
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
+#: BSDF of a table of orders.
+ORDERS = "diffraction_orders"
 
 
 class HeightData(mi.Object):
@@ -22,14 +26,25 @@ class HeightData(mi.Object):
         self.field = field
 
 
+class OrderData(mi.Object):
+    """Table of orders in an object that a dictionary of Mitsuba's can hold."""
+
+    def __init__(self, table: OrderTable) -> None:
+        super().__init__()
+        self.table = table
+
+
 def bsdf_dict(
-    field: HeightField | str | os.PathLike[str], plugin: str = "diffraction", **parameters: Any
+    field: HeightField | OrderTable | str | os.PathLike[str],
+    plugin: str = "diffraction",
+    **parameters: Any,
 ) -> dict[str, Any]:
-    """Return the dictionary of a BSDF for a height field in memory, or for a file.
+    """Return the dictionary of a BSDF for a height field or a table of orders, or for a file.
 
     Parameters
     ----------
-    field : heights in µm; or the path of a file, as for the parameter `heightfield`.
+    field : heights in µm; or the path of a file, as for the parameter `heightfield`. Or a table of
+        orders, whose plugin is `diffraction_orders`.
     plugin : `diffraction`, which reflects light, or `diffraction_dielectric`, which lets it through
         as well.
     parameters : any other parameter of the plugin, e.g. material="Al", tolerance=1e-4; None is
@@ -49,6 +64,10 @@ def bsdf_dict(
             f"bsdf_dict: plugin={quoted(plugin)} is unknown; choose one of {', '.join(PLUGINS)}"
         )
     arguments = {name: value for name, value in parameters.items() if value is not None}
+    if isinstance(field, OrderTable):
+        return {"type": ORDERS, "data": OrderData(field), **arguments}
+    if isinstance(field, str | os.PathLike) and is_order_table(field):
+        return {"type": ORDERS, "table": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):
         return {"type": plugin, "heightfield": os.fspath(field), **arguments}
     if not isinstance(field, HeightField):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..optics import fresnel
-from ..optics.colour import metal_tint
+from ..optics.colour import LONGEST, SHORTEST, metal_tint
 from .parameter_changes import Bounded, Changeable, ObjectValues, children
 from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
@@ -130,6 +130,9 @@ INDEX_PARTS = {"eta": INDICES, "k": (0.0, INDICES[1])}
 Array = NDArray[Any]
 #: Wavelengths of a metal's spectrum that its colour is made of, nm.
 _VISIBLE = np.arange(380.0, 780.0)
+#: Wavelengths that a table of optical constants has to cover, nm. Daylight beyond is 0.3 % of what
+#: eyes see; there the index is that of the nearest end of the table.
+_REQUIRED = (400.0, 700.0)
 
 
 class Perfect:
@@ -241,10 +244,22 @@ class Conductor:
         """Return one of Mitsuba's tabulated conductors, by the names that `roughconductor` accepts.
 
         wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
+
+        Raises a DiffractionError if the material is unknown, or its table is too short.
         """
         objects = children(_load("conductor", material=material))
+        first, last = tabulated_range(material) or (SHORTEST, LONGEST)
+        needed = (wavelength, wavelength) if mi.is_monochromatic else _REQUIRED
+        if not first <= needed[0] <= needed[1] <= last:
+            raise DiffractionError(
+                f"material={material!r} is tabulated from {first:.4g} to {last:.4g} nm, and light "
+                f"from {needed[0]:g} to {needed[1]:g} nm needs it; choose another material, or "
+                "give spectra of eta and k"
+            )
         if mi.is_monochromatic:
-            objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
+            objects = {name: _at(material, name, wavelength) for name in INDEX_PARTS}
+        elif mi.is_spectral and not first <= SHORTEST < LONGEST <= last:
+            objects = {name: _extended(material, name) for name in INDEX_PARTS}
         eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
         conductor = cls(eta, k, material)
         if mi.is_rgb:
@@ -348,11 +363,26 @@ def _conductors() -> list[str]:
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
+    file = _file(material, "eta")
     if not file.is_file():
         return None
-    nodes = np.loadtxt(file)[:, 0]
+    nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
+
+
+def tabulated_index(material: str) -> tuple[Array, Array]:
+    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba has no such table.
+    """
+    if tabulated_range(material) is None:
+        raise DiffractionError(_unknown_conductor(material))
+    nodes, eta = _table(material, "eta")
+    k = _tabulated(material, "k", nodes)
+    return nodes, np.asarray(eta + 1j * k)
 
 
 def _at(material: str, name: str, wavelength: float) -> Texture:
@@ -361,8 +391,30 @@ def _at(material: str, name: str, wavelength: float) -> Texture:
     return mi.load_dict({"type": "uniform", "value": value})
 
 
+def _extended(material: str, name: str) -> Texture:
+    """Part of a material's index as a texture, constant beyond the ends of the table.
+
+    Mitsuba's own has the index 0 there.
+    """
+    nodes, _ = _table(material, name)
+    nodes = np.union1d(nodes, [SHORTEST, LONGEST])
+    wavelengths, values = (
+        ", ".join(map(str, numbers.tolist()))
+        for numbers in (nodes, _tabulated(material, name, nodes))
+    )
+    return mi.load_dict({"type": "irregular", "wavelengths": wavelengths, "values": values})
+
+
 def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
-    """Part of a material's index, as Mitsuba has it tabulated."""
-    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
-    nodes, values = np.loadtxt(file).T
-    return np.asarray(np.interp(wavelengths, nodes, values))
+    """Part of a material's index at wavelengths in nm, as Mitsuba has it tabulated."""
+    return np.asarray(np.interp(wavelengths, *_table(material, name)))
+
+
+def _table(material: str, name: str) -> Array:
+    """Wavelengths in nm and values of a part of a material's index, (2, n)."""
+    return np.asarray(np.loadtxt(_file(material, name)).T)
+
+
+def _file(material: str, name: str) -> Path:
+    """Return the path of Mitsuba's table of a part of a material's index."""
+    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..tables.orders import OrderTable
 from ..tables.table import DiffractionTable
 from .types import Callback, Float
 
@@ -222,7 +223,7 @@ def arrays_within(*holders: Any) -> list[Any]:
     return list(values.values())
 
 
-def marks(table: DiffractionTable, *constants: object) -> list[Any]:
+def marks(table: DiffractionTable | OrderTable, *constants: object) -> list[Any]:
     """Return zeros whose types tell apart the kernels of this table and these constants.
 
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.

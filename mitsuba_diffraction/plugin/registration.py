@@ -8,7 +8,7 @@ import sys
 import mitsuba as mi
 
 # Base classes first: the plugins inherit from `surface`
-_MODULES = ("surface", "bsdf", "transmission.bsdf", "blended_patches")
+_MODULES = ("surface", "bsdf", "transmission.bsdf", "orders.bsdf", "blended_patches")
 
 
 def register(old: str | None, new: str | None) -> None:

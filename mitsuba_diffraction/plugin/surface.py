@@ -20,9 +20,6 @@ from .power import power_model
 from .surface_parameters import SurfaceParameters
 from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 
-#: Component of a context that asks for all of them.
-ALL_COMPONENTS = 0xFFFFFFFF
-
 
 class ScaleRange(NamedTuple):
     """Height scales that energy is conserved for.
@@ -90,6 +87,16 @@ class DiffractingSurface(mi.BSDF):
         bounded = Bounded("height_scale", factor, LEAST_SCALE, most, partial(_scale_refusal, most))
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
         self._scale_changeable = (bounded,)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return self.table.sigma
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Shortest wavelength that the table serves, nm."""
+        return self.table.wavelength_range[0]
 
     # ------------------------------------------------------------------ the model
 

@@ -17,7 +17,7 @@ from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
-from .dictionary import PLUGINS
+from .dictionary import ORDERS, PLUGINS
 from .factors import HEIGHT, LATERAL, LateralScale, VaryingFactor, largest_of, read_factor
 from .llvm import require_loaded_llvm
 from .properties import choice, flag, kind_of, number
@@ -67,6 +67,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
         *_COMMON, *PLACING, "second_order", "material", "eta", "k", *_LAYERS, "shadowing",
     ),
     TRANSMITTING: (*_COMMON, "thin"),
+    ORDERS: ("table", "data", "coherence_width", "orientation", "wavelength"),
 }  # fmt: skip
 
 
@@ -134,7 +135,7 @@ def read_surface(
         table=table,
         heights=heights,
         window_positions=_window_positions(props, table),
-        orientation=_orientation(props),
+        orientation=orientation_of(props),
         lateral_scale=lateral,
         height_scale=height_scale,
         optical=optical,
@@ -232,7 +233,7 @@ def _table(
         return table_of_heights(heights, settings, height_scale, provider), lambda: heights
     if not isinstance(value, str):
         raise DiffractionError(f"{source}={value!r} must be the name of a file")
-    path = _resolved(value, source)
+    path = resolved_path(value, source)
     must_be_table, factors = source == "table", Factors(height_scale, stretch)
     table = table_of_file(path, must_be_table, options, settings, factors, provider)
     return table, lambda: heights_of_file(path, must_be_table, options).stretched(stretch)
@@ -272,8 +273,8 @@ def _window_positions(props: Properties, table: DiffractionTable) -> WindowPosit
     return WindowPositions((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 
-def _resolved(name: str, parameter: str) -> Path:
-    """The file of this name: as it is, or in a folder where Mitsuba looks for files.
+def resolved_path(name: str, parameter: str) -> Path:
+    """Return the file of this name: as it is, or in a folder where Mitsuba looks for files.
 
     Raises
     ------
@@ -305,7 +306,14 @@ def _wavelength(props: Properties, table: DiffractionTable) -> float:
     return wavelength
 
 
-def _orientation(props: Properties) -> Orientation:
+def orientation_of(props: Properties) -> Orientation:
+    """Return the angle, or the texture of angles, from the first tangent to the patch's x axis.
+
+    Raises
+    ------
+    DiffractionError
+        If the element is no texture, or the number no angle.
+    """
     objects = dict(props.objects())
     if "orientation" in objects:
         texture = objects["orientation"]

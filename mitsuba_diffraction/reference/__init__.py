@@ -9,6 +9,7 @@ model         the default model in one file: the equations, numbered as in docs/
 bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
 coat, film    wrappers of the model
 transmission  `btdf`: light that goes through a dielectric
+orders        `orders_brdf`: a grating from the efficiencies of its orders
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
 second_order  whether "auto" applies the second order
 arguments     checks of the arguments
@@ -20,6 +21,16 @@ from ..optics.boundary import MODELS
 from ..settings import COHERENCES
 from .bsdf import brdf, mueller
 from .integral import screen_power, window_power
+from .orders import orders_brdf
 from .transmission import btdf
 
-__all__ = ["COHERENCES", "MODELS", "brdf", "btdf", "mueller", "screen_power", "window_power"]
+__all__ = [
+    "COHERENCES",
+    "MODELS",
+    "brdf",
+    "btdf",
+    "mueller",
+    "orders_brdf",
+    "screen_power",
+    "window_power",
+]

@@ -6,13 +6,17 @@ import os
 import signal
 
 import drjit as dr
+import hypothesis
 import mitsuba as mi
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 
 from mitsuba_diffraction.scene.passes import (
     Pass,
+    Span,
     Stop,
+    added,
     render_pass,
     render_passes,
     samples_per_pass,
@@ -78,6 +82,42 @@ def test_one_thread_gives_the_same_bits_again_and_several_almost(scene, own_thre
         np.testing.assert_allclose(other, first, rtol=0, atol=1e-6 * first.max())
 
 
+class Tree:
+    """A sum as text, that counts how many exist."""
+
+    alive = most = 0
+
+    def __init__(self, text):
+        self.text = text
+        Tree.alive += 1
+        Tree.most = max(Tree.most, Tree.alive)
+
+    def __del__(self):
+        Tree.alive -= 1
+
+    def __add__(self, other):
+        return Tree(f"({self.text} {other.text})")
+
+
+@hypothesis.given(st.integers(1, 300), st.lists(st.integers(0, 6), max_size=3))
+def test_however_passes_are_cut_they_are_added_in_one_tree(count, sizes):
+    def whole(span):
+        return None if span.count > 1 else Tree(f"{span.first}")
+
+    def cut(span, sizes):
+        """As a group, added from its tasks, added from theirs."""
+        parts = span.pieces(2 ** sizes[0]) if sizes else [span]
+        if len(parts) == 1:
+            return added(span, whole)
+        sums = [cut(part, sizes[1:]) for part in parts]
+        return added(Span(0, len(sums)), lambda at: None if at.count > 1 else sums[at.first])
+
+    Tree.alive = Tree.most = 0
+    expected = added(Span(0, count), whole).text
+    assert Tree.most <= np.log2(count) + 3  # sums of the tree, the two that are added, their sum
+    assert cut(Span(0, count), sorted(sizes, reverse=True)).text == expected
+
+
 def test_a_pass_of_one_size_divides_the_samples():
     pixels = 512 * 512
     assert samples_per_pass(256, pixels, "llvm_ad_rgb") == 8
@@ -104,7 +144,7 @@ def test_asked_to_stop_it_keeps_the_passes_so_far(scene):
 def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
     def interrupt(self, done, total, text):
         if done == 2:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-s", "50", "-o", "a.exr")
@@ -119,7 +159,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
 def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
     monkeypatch.setattr(
         "mitsuba_diffraction.cli.console.Bar.__call__",
-        lambda *_: os.kill(os.getpid(), signal.SIGINT),
+        lambda *_: signal.raise_signal(signal.SIGINT),
     )
     assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
     assert os.listdir() == ["room.xml"]
@@ -128,7 +168,7 @@ def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
 def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
     def interrupt(self, done, total, text):
         if text == "compiling":
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-o", "a.exr")

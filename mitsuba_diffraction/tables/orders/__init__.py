@@ -5,7 +5,9 @@ Contents
 OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
 Band        efficiencies of the directions with the same number of propagating orders
 cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
-lookup      interpolation in NumPy; `resample` to the even grids that the BSDF reads
+lookup      interpolation in NumPy
+grids       even grids that the BSDF reads, under a coat where the table has one
+daylight    the sum of an order's lobe over daylight, for RGB variants
 file        tables as NetCDF files
 """
 

@@ -1,8 +1,6 @@
-"""Efficiencies between the nodes of a table: the polynomials, and even grids for the renderer."""
+"""Efficiencies between the nodes of a table, by its polynomials."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,15 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import cells
 from .cells import Array, Cell
 from .table import Band, OrderTable
-
-
-class EvenGrid(NamedTuple):
-    """Unpolarised efficiencies of one kind of a band, between whose points one interpolates.
-
-    values : (nτ, nρ, nw, j, q) float32, at even steps from 0 to 1 along τ, ρ and w.
-    """
-
-    values: NDArray[np.float32]
 
 
 def efficiency(
@@ -61,21 +50,8 @@ def polarised_efficiency(
             here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
             if len(here):
                 rows = _polynomial(table.bands[k], kind, cell, w, here)
-                result[here] = _clamped(rows)[np.arange(len(here)), q[here]]
+                result[here] = clamped(rows)[np.arange(len(here)), q[here]]
     return result.reshape(*shape, 2)
-
-
-def resample(table: OrderTable, band: Band, kind: int, counts: tuple[int, int, int]) -> EvenGrid:
-    """Evaluate the polynomials of a kind, unpolarised, at so many even steps of τ, ρ and w.
-
-    A variable with a single node keeps a single value.
-    """
-    values = band.kind(kind).mean(axis=-1, dtype=np.float64)
-    for axis, (known, wanted) in enumerate(zip(band.counts, counts, strict=True)):
-        places = np.linspace(0.0, 1.0, wanted) if known > 1 else np.array([0.5])
-        matrix = cells.interpolation(known, places)
-        values = np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
-    return EvenGrid(_clamped(values[..., None])[..., 0].astype(np.float32))
 
 
 def _polynomial(band: Band, kind: int, cell: Cell, w: Array, here: NDArray[np.int64]) -> Array:
@@ -94,7 +70,7 @@ def _polynomial(band: Band, kind: int, cell: Cell, w: Array, here: NDArray[np.in
     return rows
 
 
-def _clamped(values: Array) -> Array:
+def clamped(values: Array) -> Array:
     """Clamp efficiencies (…, q, 2) to at least 0, and their sums over q to at most 1."""
     positive = np.maximum(values, 0.0)
     total = positive.sum(axis=-2, keepdims=True)

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
-from mitsuba_diffraction.tables.orders.lookup import resample
+from mitsuba_diffraction.tables.orders.grids import rows, wavelength_of
+from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.orders import thin_grating
 
 GRATING = thin_grating()
@@ -68,20 +70,30 @@ def test_a_mirror_reflects_order_0_alone():
 
 
 def test_even_grids_follow_the_polynomials():
+    counts = Counts(16, 8, 4)
     band = GRATING.bands[4]
-    grid = resample(GRATING, band, cells.B, (17, 9, 5)).values
+    grid = rows(GRATING, band, cells.B, counts).within
     assert grid.shape == (17, 9, 5, 4, 4)
-    matrix = cells.interpolation(6, [8 / 16])
-    values = band.b.mean(axis=-1)
-    centre = np.einsum(
-        "a,b,c,abcjq->jq",
-        matrix[0],
-        *(cells.interpolation(n, [0.5])[0] for n in band.counts[1:]),
-        values,
+    big_k = 4 + cells.sine_squared(0.5)
+    wavelength = wavelength_of(GRATING, big_k, 0.75)
+    at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
+    expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
+    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
+    mirror = OrderTable.mirror(1.6, 0.8, superstrate=1.5)
+    band = mirror.bands[6]
+    grid = rows(mirror, band, cells.A, Counts(4, 4, 4))
+    big_k = 6 + cells.sine_squared(0.5)
+    at = cells.from_cell(
+        6, cells.A, 3, 0.5, 0.5, wavelength_of(mirror, big_k, 0.75), mirror.optical_period
     )
-    assert grid[8, 4, 2] == pytest.approx(centre, abs=1e-6)
-    single = resample(GRATING, OrderTable.mirror(1.6).bands[4], cells.A, (17, 9, 5)).values
-    assert single.shape == (1, 1, 1, 5, 5)
+    face = reflectance(np.sqrt(1.0 - 1.5**2 * (at.x**2 + at.y**2)), 1.5)
+    # geometric series of R ρ
+    expected = 0.8 / (1.0 - 0.8 * face)
+    assert grid.within[2, 2, 3, 3, 3] == pytest.approx(expected, rel=1e-3)
+    assert grid.through[2, 2, 3, 3, 3] == pytest.approx(expected * (1.0 - face), rel=1e-3)
 
 
 def test_wavelengths_outside_hold_the_end_values():

@@ -1,0 +1,9 @@
+"""The BSDF `diffraction_orders`: gratings whose orders were solved (Dr.Jit).
+
+Contents
+--------
+bsdf        `DiffractionOrders`, the plugin
+parameters  parameters of the plugin, read from Mitsuba's Properties and checked
+lookup      a table of orders inside a kernel
+lobes       light of all orders in a variant's channels, and directions drawn by it
+"""

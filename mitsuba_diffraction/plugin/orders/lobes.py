@@ -1,0 +1,299 @@
+"""Lobes of solved orders under the coherence window, in a variant's own channels (Dr.Jit).
+
+With q = k (u, v) of ωi + ωo, f cosθo = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²) cosθo: each
+lobe's integral over directions is its order's efficiency, but for what lies beyond the horizon.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ...optics.colour import RGB_WAVELENGTHS
+from ...optics.geometry import sigma_of
+from ...tables.orders import OrderTable
+from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
+from ..directions import Pair
+from ..memory import index_between, read_record, upload
+from ..sampling import BELOW_ONE, invert
+from ..types import Colour, Float, Index, Interaction, Mask, Vector2f
+from .lookup import OrderLookup, Row, order_lookup
+
+#: Efficiency and probability of an order, from wavelength and order.
+Shares = Callable[[Float, Float], tuple[Float, Float]]
+#: Term of a sum: from its number and the sums, the next number and the sums with it added.
+Term = Callable[[Index, list[Float]], tuple[Index, list[Float]]]
+
+#: Squared distance from a lobe's centre, in units of its width, beyond which it is 0.
+_FAR = 18.0
+#: Sum of efficiencies below which nothing is drawn, against division by 0.
+_LEAST = 1e-12
+
+
+class Reflected(NamedTuple):
+    """Light of a pair of directions.
+
+    Attributes
+    ----------
+    value : f cosθo, per channel.
+    density : of `Lobes.draw`, per solid angle.
+    """
+
+    value: Colour
+    density: Float
+
+
+class Draw(NamedTuple):
+    """Tangential part of ωi + ωo in the patch's frame, drawn, and whether there is any."""
+
+    uv: Vector2f
+    valid: Mask
+
+
+class Lobes(Protocol):
+    """Light of all orders in the variant's channels, and directions drawn by it."""
+
+    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
+        """Return value and density of a pair."""
+
+    def draw(
+        self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
+    ) -> Draw:
+        """Draw a direction for light from ωi, given by its tangential part and cosine."""
+
+    def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
+        """Return the sum of the orders' efficiencies."""
+
+
+class _Window:
+    """Lobe of an order, in units of orders.
+
+    Attributes
+    ----------
+    sigma : standard deviation σ of the amplitude window, µm.
+    period : µm.
+    """
+
+    def __init__(self, table: OrderTable, coherence_width: float) -> None:
+        self.sigma, self.period = sigma_of(coherence_width), table.period
+        self.lookup: OrderLookup = order_lookup(table)
+        self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
+        # where an order's neighbour adds to its lobe
+        self._overlaps = 0.25 * self._sharpness < _FAR
+
+    def orders(self, position: Float) -> list[Float]:
+        """Return the orders whose lobes reach a position, in units of orders along x."""
+        nearest = dr.round(position)
+        if not self._overlaps:
+            return [nearest]
+        return [nearest, nearest + dr.select(position < nearest, -1.0, 1.0)]
+
+    def lobe(self, position: Vector2f, order: Float) -> Float:
+        """Return exp(−σ²|q − q_m|²), of a position in units of orders."""
+        squared = dr.square(position.x - order) + dr.square(position.y)
+        return dr.exp(-self._sharpness * squared)
+
+    def drawn(self, row: Row, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
+        """Draw an order of a row, and a direction in its lobe."""
+        order, valid = self.lookup.draw(row, sample1)
+        wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
+        spread = mi.warp.square_to_std_normal(dr.minimum(sample2, BELOW_ONE)) * wide
+        centre = mi.Vector2f(order * wavelength * (1e-3 / self.period), 0.0)
+        return Draw(centre + mi.Vector2f(spread), valid)
+
+
+class SpectralLobes(_Window):
+    """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
+
+    wavelength : nm, of mono variants.
+    """
+
+    def __init__(self, table: OrderTable, coherence_width: float, wavelength: float) -> None:
+        super().__init__(table, coherence_width)
+        self._fixed = mi.Float(wavelength)
+        dr.make_opaque(self._fixed)
+
+    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
+        """See `Lobes.reflected`; the density is the mean over wavelengths."""
+        values, density = [], mi.Float(0.0)
+        wavelengths = self._wavelengths(si)
+        for wavelength in wavelengths:
+            row = self.lookup.row(pair.incident, pair.cos_i, wavelength)
+            position = pair.uv * (1e3 * self.period * dr.rcp(wavelength))
+            light, chance = mi.Float(0.0), mi.Float(0.0)
+            for order in self.orders(position.x):
+                share, lobe = self.lookup.order(row, order), self.lobe(position, order)
+                light = dr.fma(share.efficiency, lobe, light)
+                chance = dr.fma(share.chance, lobe, chance)
+            peak = dr.square((2e3 * math.sqrt(math.pi) * self.sigma) * dr.rcp(wavelength))
+            peak *= pair.cos_o
+            values.append(light * peak)
+            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row), _LEAST))
+        mean = density * (1.0 / len(wavelengths))
+        return Reflected(mi.UnpolarizedSpectrum(values), dr.detach(mean))
+
+    def draw(
+        self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
+    ) -> Draw:
+        """See `Lobes.draw`: by one of the wavelengths, chosen with equal probability."""
+        wavelengths = self._wavelengths(si)
+        count = float(len(wavelengths))
+        number = index_between(dr.floor(sample1 * count), 0.0, count - 1.0)
+        wavelength = wavelengths[0]
+        for n, other in enumerate(wavelengths[1:], 1):
+            wavelength = dr.select(number == float(n), other, wavelength)
+        row = self.lookup.row(incident, cos_i, wavelength)
+        return self.drawn(row, wavelength, sample1 * count - number, sample2)
+
+    def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
+        """See `Lobes.albedo`."""
+        rows = [self.lookup.row(incident, cos_i, lam) for lam in self._wavelengths(si)]
+        return mi.UnpolarizedSpectrum([self.lookup.total(row) for row in rows])
+
+    def _wavelengths(self, si: Interaction) -> list[Float]:
+        return list(si.wavelengths) if mi.is_spectral else [self._fixed]
+
+
+class DaylightLobes(_Window):
+    """RGB variants: sums over daylight, see `tables.orders.daylight`."""
+
+    def __init__(self, table: OrderTable, coherence_width: float) -> None:
+        super().__init__(table, coherence_width)
+        weights = daylight_weights(self.sigma, self.period)
+        self._waves, self._variances = weights.waves, weights.variances
+        rows = weights.smoothed.astype("float32")
+        self._counts = rows.shape[0] - 1, rows.shape[1] - 1
+        corners = [rows[a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)]
+        self._smoothed = upload(mi.Float, np.concatenate(corners, axis=-1))
+        order_0 = np.column_stack([weights.order_0, weights.wavelengths])
+        self._order_0 = upload(mi.Float, np.pad(order_0, ((0, 0), (0, 3))).astype("float32"))
+        self._wavelengths = len(order_0)
+        self._bins = len(weights.cumulative) - 1
+        self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
+
+    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
+        """See `Lobes.reflected`."""
+        radius = dr.squared_norm(pair.uv)
+        # before the loops: a cached property that a loop computed would belong to it
+        shares = functools.partial(self._shares, pair.incident, pair.cos_i)
+        total = self._zeroth(shares, radius)
+        total = [a + b for a, b in zip(total, self._others(shares, pair.uv, radius), strict=True)]
+        *colours, density = (part * pair.cos_o for part in total)
+        return Reflected(mi.Color3f(*colours), dr.detach(density))
+
+    def draw(
+        self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
+    ) -> Draw:
+        """See `Lobes.draw`: by a wavelength of daylight."""
+        # the place in its bin draws the order, a number of its own the place of the wavelength
+        bin_, rest = invert(self._cumulative, mi.UInt32(0), self._bins, self._bins, sample1)
+        step = (ENDS[1] - ENDS[0]) / self._bins
+        fine = rest * 64.0
+        place = index_between(dr.floor(fine), 0.0, 63.0)
+        wavelength = dr.fma(mi.Float(bin_) + (place + 0.5) * (1.0 / 64.0), step, ENDS[0])
+        row = self.lookup.row(incident, cos_i, wavelength)
+        return self.drawn(row, wavelength, fine - place, sample2)
+
+    def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
+        """See `Lobes.albedo`; of the wavelength that is a channel's mean."""
+        rows = [self.lookup.row(incident, cos_i, mi.Float(lam)) for lam in RGB_WAVELENGTHS]
+        return mi.Color3f(*(self.lookup.total(row) for row in rows))
+
+    def _shares(
+        self, incident: Vector2f, cos_i: Float, wavelength: Float, order: Float
+    ) -> tuple[Float, Float]:
+        """Return the efficiency of an order, and its probability."""
+        row = self.lookup.row(incident, cos_i, wavelength)
+        share, total = self.lookup.order(row, order), self.lookup.total(row)
+        return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _LEAST))
+
+    def _zeroth(self, shares: Shares, radius: Float) -> list[Float]:
+        """Sum order 0 over wavelengths, for red, green, blue and the density."""
+        longest = dr.square(2e3 * math.pi * self.sigma / ENDS[1])
+        count = dr.select(radius * longest < _FAR, mi.UInt32(self._wavelengths), mi.UInt32(0))
+
+        def body(n: Index, sums: list[Float]) -> tuple[Index, list[Float]]:
+            node = read_record(self._order_0, n, 8)
+            squared = dr.square((2e3 * math.pi * self.sigma) * dr.rcp(node[CHANNELS]))
+            value, share = shares(node[CHANNELS], mi.Float(0.0))
+            lobe = squared * dr.exp(-radius * squared) * (1.0 / math.pi)
+            return n + 1, _added(sums, node, lobe, value, share)
+
+        return self._loop(count, self._wavelengths, body)
+
+    def _others(self, shares: Shares, uv: Vector2f, radius: Float) -> list[Float]:
+        """Sum all other orders, for red, green, blue and the density."""
+        u, v = uv.x, uv.y
+        unit = 2.0 * math.pi / self.period
+        square = dr.maximum(radius, 1e-8)
+        # k_m = m · step, of the sign of u
+        step = dr.maximum(dr.abs(u), 1e-8) * unit * dr.rcp(square)
+        aside = dr.square(self.sigma * unit * v) * dr.rcp(square)
+        first = dr.maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
+        last = dr.minimum(
+            dr.floor(self._waves[1] * dr.rcp(step)), dr.sqrt(_FAR * dr.rcp(dr.maximum(aside, 1e-8)))
+        )
+        most = int(2.0 * self._waves[1] / unit) + 1
+        lit = (last >= first) & (radius * (self._waves[1] / unit) ** 2 > 0.25)
+        count = dr.select(lit, mi.UInt32(index_between(last - first + 1.0, 0.0, float(most))), 0)
+        variance = dr.rcp(square) * (0.5 / self.sigma**2)
+        place = (variance - self._variances[0]) * (
+            self._counts[0] / (self._variances[1] - self._variances[0])
+        )
+        lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
+        upper_share = dr.clip(place - lower, 0.0, 1.0)
+        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
+
+        def body(n: Index, sums: list[Float]) -> tuple[Index, list[Float]]:
+            m = first + mi.Float(n)
+            k = m * step
+            weights = self._weights(k, mi.UInt32(lower), upper_share)
+            wavelength = 2e3 * math.pi * dr.rcp(k)
+            value, share = shares(wavelength, dr.mulsign(m, u))
+            lobe = scale * dr.exp(-aside * dr.square(m))
+            return n + 1, _added(sums, weights, lobe, value, share)
+
+        return self._loop(count, most, body)
+
+    def _weights(self, k: Float, row: Index, share: Float) -> list[Float]:
+        """Interpolate the smoothed weights of a wavenumber."""
+        place = (k - self._waves[0]) * (self._counts[1] / (self._waves[1] - self._waves[0]))
+        lower = index_between(dr.floor(place), 0.0, self._counts[1] - 1.0)
+        t = dr.clip(place - lower, 0.0, 1.0)
+        values = read_record(self._smoothed, row * self._counts[1] + mi.UInt32(lower), 4 * CHANNELS)
+        return [
+            dr.lerp(
+                dr.lerp(values[c], values[CHANNELS + c], t),
+                dr.lerp(values[2 * CHANNELS + c], values[3 * CHANNELS + c], t),
+                share,
+            )
+            for c in range(CHANNELS)
+        ]
+
+    def _loop(self, count: Index, most: int, body: Term) -> list[Float]:
+        sums = [mi.Float(0.0) for _ in range(CHANNELS)]
+        state = (mi.UInt32(0), sums)
+        return list(dr.while_loop(state, lambda n, _: n < count, body, max_iterations=most)[1])
+
+
+def _added(
+    sums: list[Float], weights: list[Float], lobe: Float, value: Float, share: Float
+) -> list[Float]:
+    """Add a term to red, green, blue (by its efficiency) and the density (by its probability)."""
+    *colours, density = sums
+    light = lobe * value
+    added = [dr.fma(w, light, total) for w, total in zip(weights, colours, strict=False)]
+    return [*added, dr.fma(weights[CHANNELS - 1], lobe * share, density)]
+
+
+def lobes_of(table: OrderTable, coherence_width: float, wavelength: float) -> Lobes:
+    """Return the lobes of the current variant; wavelength : nm, of mono variants."""
+    if mi.is_rgb:
+        return DaylightLobes(table, coherence_width)
+    return SpectralLobes(table, coherence_width, wavelength)

@@ -1,0 +1,204 @@
+"""A table of solved orders inside a kernel: twin of `tables.orders.grids` (Dr.Jit)."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from ...tables.orders import OrderTable
+from ...tables.orders.grids import corners, least_c
+from ..layers import transmittances
+from ..memory import index_between, read, read_record, upload
+from ..types import Float, Index, Mask, Vector2f
+
+# Against division by 0, in single precision
+_LEAST = 1e-7
+#: Half floats round: sums are raised so that no order is left out where one is drawn.
+_RAISED = 1.0 + 2.0**-10
+
+
+@dataclass(frozen=True)
+class Row:
+    """Efficiencies of all orders for one direction and wavelength.
+
+    Attributes
+    ----------
+    start : record of channel 0.
+    channel : j of the incident light.
+    channels : number of channels.
+    weights : of the eight corners of a cell.
+    incident, wavelength : tangential part of ωi, and the wavelength in nm.
+    face : share of the light that the coat's face reflects, 0 without a coat.
+    """
+
+    start: Index
+    channel: Index
+    channels: Index
+    weights: list[Float]
+    incident: Vector2f
+    wavelength: Float
+    face: Float
+
+
+class Share(NamedTuple):
+    """Light of an order.
+
+    Attributes
+    ----------
+    efficiency : share of the incident light.
+    chance : probability of drawing, times `OrderLookup.total`; the efficiency, but under a coat.
+    """
+
+    efficiency: Float
+    chance: Float
+
+
+class OrderLookup:
+    """Rows of efficiencies for directions in the patch's frame and wavelengths.
+
+    Parameters
+    ----------
+    table : the table; its superstrate is a coat with a flat face.
+    """
+
+    def __init__(self, table: OrderTable) -> None:
+        records = corners(table)
+        self._cells = records.cells
+        self._starts = upload(mi.UInt32, records.starts)
+        self._values = upload(mi.Float16, records.values)
+        self._period = 1e3 * table.optical_period
+        self._last = float(table.last_band)
+        self._ends = table.wavelengths
+        self._steps = 1e-3 / table.period
+        self._index, self._least_c = table.superstrate, least_c(table.superstrate)
+        self._floats = records.values.shape[1]
+
+    @property
+    def coated(self) -> bool:
+        """Whether a flat face lies above the grating."""
+        return self._index != 1.0
+
+    def row(self, incident: Vector2f, cos_i: Float, wavelength: Float) -> Row:
+        """Return the row of light from ωi.
+
+        incident, cos_i : tangential part of ωi in the patch's frame, and its cosine.
+        wavelength : in vacuum, nm.
+        """
+        vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
+        x, y = (incident.x * (-1.0 / self._index), incident.y * (1.0 / self._index))
+        c = dr.sqrt(dr.maximum(dr.fma(-y, y, 1.0), _LEAST))
+        inverse = self._period * dr.rcp(wavelength)
+        big_k = 2.0 * c * inverse
+        p = dr.clip((c - x) * inverse, 0.0, big_k)
+        band = index_between(dr.floor(big_k), 0.0, self._last)
+        channel = index_between(dr.floor(p), 0.0, band)
+        r, f = dr.clip(big_k - band, 0.0, 1.0), p - channel
+        is_a = (f < r) | (channel >= band)
+        above = (f - r) * dr.rcp(dr.maximum(1.0 - r, _LEAST))
+        t = dr.select(is_a, f * dr.rcp(dr.maximum(r, _LEAST)), above)
+        places = [_smooth(t), _smooth(r), self._w(wavelength, big_k)]
+        kind = mi.UInt32(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
+        channels = mi.UInt32(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
+        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
+        for place, count in zip(places, self._cells, strict=True):
+            position = place * float(count)
+            lower = index_between(dr.floor(position), 0.0, count - 1.0)
+            share = position - lower
+            cell = cell * count + mi.UInt32(lower)
+            weights = [
+                part for weight in weights for part in (weight - weight * share, weight * share)
+            ]
+        row = cell * channels + mi.UInt32(channel)
+        start = read(mi.UInt32, self._starts, kind) + row * (channels + 1)
+        face = mi.Float(0.0)
+        if self.coated:
+            face = 1.0 - self._through(cos_i)
+        return Row(start, mi.UInt32(channel), channels, weights, incident, vacuum, face)
+
+    def order(self, row: Row, order: Float) -> Share:
+        """Return the light of an order, a whole number; 0 if it does not propagate."""
+        q = mi.Float(row.channel) - order
+        propagates = (q >= 0.0) & (q < mi.Float(row.channels))
+        values = self._read(row, mi.UInt32(dr.select(propagates, q, 0.0)))
+        if not self.coated:
+            efficiency = dr.select(propagates, self._between(row, values), 0.0)
+            return Share(efficiency, efficiency)
+        x = dr.fma(order * self._steps, row.wavelength, -row.incident.x)
+        squared = dr.fma(x, x, dr.square(row.incident.y))
+        leaves = propagates & (squared < 1.0)
+        through = self._through(dr.safe_sqrt(1.0 - squared))
+        mirror = dr.select(order == 0.0, row.face, 0.0)
+        shares = self._between(row, values[:8]) * through, self._between(row, values[8:])
+        return Share(*(dr.select(leaves, self._outside(row, s, mirror), 0.0) for s in shares))
+
+    def total(self, row: Row) -> Float:
+        """Return the sum of all orders' chances, rounded up."""
+        value = self._between(row, self._read(row, row.channels)[-8:])
+        if self.coated:
+            value = self._outside(row, value, row.face)
+        return value * _RAISED
+
+    def draw(self, row: Row, sample: Float) -> tuple[Float, Mask]:
+        """Return an order drawn by its efficiency over `total`, and whether there is one."""
+        target, channels = sample * self.total(row), mi.UInt32(row.channels)
+
+        def body(q: Index, reached: Float) -> tuple[Index, Float]:
+            order = mi.Float(row.channel) - mi.Float(q)
+            reached = reached + self.order(row, order).chance
+            return q + 1, reached
+
+        def further(q: Index, reached: Float) -> Mask:
+            return (reached <= target) & (q < channels)
+
+        q, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
+        return mi.Float(row.channel) - mi.Float(q) + 1.0, reached > target
+
+    def _read(self, row: Row, q: Index) -> list[Float]:
+        return read_record(self._values, row.start + q, self._floats)
+
+    @staticmethod
+    def _between(row: Row, corners: list[Float]) -> Float:
+        """Interpolate between the corners of a cell."""
+        value = row.weights[0] * mi.Float(corners[0])
+        for weight, corner in zip(row.weights[1:], corners[1:], strict=True):
+            value = dr.fma(weight, mi.Float(corner), value)
+        return value
+
+    @staticmethod
+    def _outside(row: Row, within: Float, mirror: Float) -> Float:
+        """Return light that enters through the coat's face, and adds to that of the face."""
+        return dr.fma(1.0 - row.face, within, mirror)
+
+    def _through(self, cosine: Float) -> Float:
+        """Return the unpolarised transmittance of the coat's face, for the cosine outside."""
+        s, p = transmittances(cosine, mi.Float(self._index))
+        return 0.5 * (s + p)
+
+    def _w(self, wavelength: Float, big_k: Float) -> Float:
+        if self._cells.w == 1:
+            return mi.Float(0.0)
+        longest = 2.0 * self._period * dr.rcp(dr.maximum(big_k, _LEAST))
+        low, high = (dr.clip(end, self._least_c * longest, longest) for end in self._ends)
+        return dr.clip((wavelength - low) * dr.rcp(dr.maximum(high - low, 1e-3)), 0.0, 1.0)
+
+
+def _smooth(t: Float) -> Float:
+    """Return τ of t = sin²(πτ/2)."""
+    return dr.asin(dr.sqrt(dr.clip(t, 0.0, 1.0))) * (2.0 / dr.pi)
+
+
+_lookups: weakref.WeakKeyDictionary[OrderTable, dict[str, OrderLookup]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def order_lookup(table: OrderTable) -> OrderLookup:
+    """Return the table in the current variant's memory, shared by all BSDFs of the table."""
+    variants = _lookups.setdefault(table, {})
+    if mi.variant() not in variants:
+        variants[mi.variant()] = OrderLookup(table)
+    return variants[mi.variant()]

@@ -1,0 +1,119 @@
+"""Parameters of the plugin `diffraction_orders`, read from Mitsuba's Properties and checked."""
+
+from __future__ import annotations
+
+import os
+import weakref
+from dataclasses import dataclass
+from pathlib import Path
+
+import mitsuba as mi
+
+from ...errors import DiffractionError
+from ...heights.coherence import USUAL_WIDTH
+from ...heights.lengths import is_auto
+from ...settings import checked
+from ...tables.orders import OrderTable
+from ..dictionary import ORDERS, OrderData
+from ..properties import number
+from ..surface_parameters import DEFAULT_WAVELENGTH, nested_of, orientation_of, resolved_path
+from ..textures import Orientation
+from ..types import BSDF, Properties
+
+#: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
+LEAST_PERIODS = 2.0
+
+_tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters of `diffraction_orders`, checked.
+
+    Attributes
+    ----------
+    table : efficiencies of the orders.
+    coherence_width : 4σ of the amplitude window, µm.
+    orientation : angle from the first tangent to the patch's x axis.
+    wavelength : nm, of mono variants.
+    nested : the BSDF beneath, or None.
+    """
+
+    table: OrderTable
+    coherence_width: float
+    orientation: Orientation
+    wavelength: float
+    nested: BSDF | None
+
+
+def read_parameters(props: Properties) -> Parameters:
+    """Read and check everything, and load the table.
+
+    Raises
+    ------
+    DiffractionError
+        With the parameter, its value and the choices.
+    """
+    nested = nested_of(props, ORDERS)
+    table = _table(props)
+    return Parameters(
+        table=table,
+        coherence_width=_coherence_width(props, table),
+        orientation=orientation_of(props),
+        wavelength=_wavelength(props, table),
+        nested=nested,
+    )
+
+
+def _table(props: Properties) -> OrderTable:
+    if ("table" in props) == ("data" in props):
+        raise DiffractionError(
+            f"{ORDERS} takes one of table, a file of 'mitsuba-diffraction solve', and data, an "
+            "OrderTable of md.bsdf_dict"
+        )
+    if "data" in props:
+        data = props.get("data")
+        if not isinstance(data, OrderData):
+            raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
+        return data.table
+    name = props.get("table")
+    if not isinstance(name, str):
+        raise DiffractionError(f"table={name!r} must be the name of a file")
+    return loaded_orders(resolved_path(name, "table"))
+
+
+def loaded_orders(path: Path) -> OrderTable:
+    """Load a file once for all that use it at the same time."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return OrderTable.load(path)  # which says what is wrong
+    key = f"{path.resolve()} {status.st_mtime_ns} {status.st_size}"
+    table = _tables.get(key)
+    if table is None:
+        table = _tables.setdefault(key, OrderTable.load(path))
+    return table
+
+
+def _coherence_width(props: Properties, table: OrderTable) -> float:
+    value = props.get("coherence_width", "auto")
+    width = USUAL_WIDTH if is_auto(value) else checked("coherence_width", value)
+    if width < LEAST_PERIODS * table.period:
+        raise DiffractionError(
+            f"coherence_width={width:g} µm must be at least {LEAST_PERIODS:g} periods of the "
+            f"grating, {LEAST_PERIODS * table.period:g} µm: narrower windows have no orders"
+        )
+    return float(width)
+
+
+def _wavelength(props: Properties, table: OrderTable) -> float:
+    """Wavelength of mono variants in nm; a scene for all variants may give it in all."""
+    wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
+    if not mi.is_monochromatic and "wavelength" not in props:
+        return wavelength
+    shortest, longest = table.wavelengths
+    if not shortest <= wavelength <= longest:
+        raise DiffractionError(
+            f"wavelength={wavelength:g} nm is outside the table's {shortest:g} to {longest:g} nm"
+        )
+    return wavelength

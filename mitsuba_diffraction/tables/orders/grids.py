@@ -1,0 +1,158 @@
+"""Even grids of a table that the renderer interpolates linearly, with its coat included.
+
+Along w they reach over the wavelengths at which light of some K comes from outside of the coat:
+c is at least √(1 − 1/n²).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics.fresnel import reflectance
+from . import cells
+from .cells import Array
+from .lookup import clamped
+from .table import Band, Counts, OrderTable
+
+#: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
+#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
+#: critical angles of orders lie along w.
+CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
+#: Share of the light that a totally reflecting face sends back: trapped light would never end.
+_TRAPPED = 1.0 - 1e-4
+#: Least transmittance in probabilities, so that no order that leaves has none.
+_LEAST = 1e-3
+
+
+class Corners(NamedTuple):
+    """Rows of efficiencies at the corners of cells, for one gather of 8 or 16 numbers.
+
+    Attributes
+    ----------
+    cells : numbers of cells along τ, ρ and w.
+    starts : (2 × bands,) first record of kind A and B of each band.
+    values : (records, 8) float16, at the corners (τ, ρ, w) = 000, 001, 010 … 111 of a cell. Of n
+        channels a cell has n rows of n + 1 records: efficiencies of the channels, and their sum.
+        Under a coat (records, 16): efficiencies without the transmittances of the coat's face, and
+        the probabilities of drawing, which have that towards q; the sum is that of the latter.
+    """
+
+    cells: Counts
+    starts: NDArray[np.uint32]
+    values: NDArray[np.float16]
+
+
+class Rows(NamedTuple):
+    """Efficiencies on an even grid, (τ, ρ, w, j, q) from 0 to 1.
+
+    Attributes
+    ----------
+    within : of the grating, with all reflections between the coat's face and the grating.
+    through : times the face's transmittance towards q.
+    """
+
+    within: Array
+    through: Array
+
+
+def corners(table: OrderTable) -> Corners:
+    """Resample a table for the renderer."""
+    counts = _cells(table)
+    starts, parts, total = [], [], 0
+    for band in table.bands:
+        for kind in (cells.A, cells.B):
+            starts.append(total)
+            if kind == cells.B and band.b is None:
+                continue
+            of_kind = rows(table, band, kind, counts)
+            records = [_records(of_kind.within, counts)]
+            if table.superstrate != 1.0:
+                records.append(_records(of_kind.through, counts))
+            parts.append(np.concatenate(records, axis=-1))
+            total += len(parts[-1])
+    return Corners(counts, np.array(starts, np.uint32), np.concatenate(parts))
+
+
+def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
+    """Evaluate the polynomials of a kind on a grid with so many cells, unpolarised."""
+    unpolarised = band.kind(kind).mean(axis=-1, dtype=np.float64)
+    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
+    along_tau, along_rho = (
+        cells.interpolation(known, places)
+        for known, places in zip(band.counts, (tau, rho), strict=False)
+    )
+    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, unpolarised, optimize=True)
+    big_k = (band.k + cells.sine_squared(rho))[:, None]
+    lam = wavelength_of(table, big_k, w)
+    at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
+    along_w = cells.interpolation(band.counts.w, at)
+    summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
+    values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
+    if table.superstrate == 1.0:
+        return Rows(values, values)
+    channels = np.arange(values.shape[-1])
+    places = tau[:, None, None, None], rho[:, None, None]
+    light = cells.from_cell(band.k, kind, channels, *places, lam[..., None], table.optical_period)
+    through = face_transmittance(light.x**2 + light.y**2, table.superstrate)
+    # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
+    # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
+    back = _TRAPPED * (1.0 - through)
+    repeated = np.eye(len(channels)) - values * back[..., None, :]
+    within = np.linalg.solve(repeated, values)
+    return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
+
+
+def least_c(index: float) -> float:
+    """Return the least c = √(1 − y²) in a coat of light from outside."""
+    return math.sqrt(1.0 - 1.0 / index**2)
+
+
+def wavelength_of(table: OrderTable, big_k: Array, w: Array) -> Array:
+    """Return the wavelength (vacuum, nm) at w of the even grids."""
+    longest = 2e3 * table.optical_period / np.maximum(big_k, 1e-12)
+    shortest = least_c(table.superstrate) * longest
+    low, high = (np.clip(end, shortest, longest) for end in table.wavelengths)
+    return np.asarray(low + w * (high - low))
+
+
+def face_transmittance(squared_sine: Array, index: float) -> Array:
+    """Return the unpolarised transmittance of a coat's face; 0 at total reflection.
+
+    squared_sine : of the angle within the coat.
+    """
+    outside = index**2 * squared_sine
+    cosine = np.sqrt(np.maximum(1.0 - outside, 0.0))
+    return np.where(outside < 1.0, 1.0 - reflectance(cosine, index), 0.0)
+
+
+def _cells(table: OrderTable) -> Counts:
+    """Return the numbers of cells that fit into memory."""
+    counts, size = (CELLS, 16) if table.superstrate == 1.0 else (CELLS_UNDER_COAT, 32)
+    if table.superstrate == 1.0 and all(band.counts == (1, 1, 1) for band in table.bands):
+        counts = Counts(1, 1, 1)
+    records = sum(n * (n + 1) for n in _channels(table))
+    while size * records * math.prod(counts) > MOST_BYTES and max(counts) > 4:
+        counts = Counts(*(max(min(n, 4), 3 * n // 4) for n in counts))
+    return counts
+
+
+def _channels(table: OrderTable) -> Iterator[int]:
+    for band in table.bands:
+        yield from (kind.shape[3] for kind in band.kinds)
+
+
+def _records(values: Array, counts: Counts) -> NDArray[np.float16]:
+    """Return records (n, 8) of a grid (τ, ρ, w, j, q)."""
+    whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+    eighths = [
+        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w].astype(np.float16)
+        for i in (0, 1)
+        for j in (0, 1)
+        for n in (0, 1)
+    ]
+    return np.stack(eighths, axis=-1).reshape(-1, 8)

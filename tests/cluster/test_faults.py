@@ -1,0 +1,207 @@
+"""Workers, clients and schedulers that are killed or stopped, and disks that are full."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.thorough
+
+pytest.importorskip("distributed")
+
+from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
+from mitsuba_diffraction.cluster import groups, workers  # noqa: E402
+from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task  # noqa: E402
+from mitsuba_diffraction.scene.passes import Span, Stop  # noqa: E402
+from tests.support import ROOT  # noqa: E402
+from tests.support.clusters import VARIANT, film, passes_of_picture, rendered, silent  # noqa: E402
+from tests.support.room import SCENE  # noqa: E402
+
+
+def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, three_groups):
+    happened = []
+
+    def disturb(done, total, text):
+        if done >= 2 and not happened:
+            happened.append(text)
+            victim = next(iter(client.cluster.workers.values()))
+            os.kill(victim.pid, signal.SIGKILL)
+            client.cluster.scale(3)
+
+    result = rendered(client, scene, progress=disturb)
+    assert happened
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    client.wait_for_workers(3, timeout=300)
+    np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
+    client.cluster.scale(2)
+
+
+def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, monkeypatch):
+    keep = tmp_path / "passes"
+
+    def interrupt(done, total, text):
+        if done >= 4:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(DiffractionError, match="interrupted"):
+        rendered(client, scene, keep=keep, progress=interrupt)
+    there = len(list(keep.iterdir()))
+    assert 4 <= there < 12
+    monkeypatch.setattr(groups, "GROUPS", 4)  # single passes are continued with in fours
+    again = film(client, scene, keep)
+    (result,) = again.render(Stop(), silent)
+    assert again.report.kept == there
+    assert again.report.tasks == 12 - there
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    again.forget(0)
+    assert not keep.exists()
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(client, scene, expected, tmp_path):
+    resource = pytest.importorskip("resource")  # of Unix
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    try:
+        with pytest.raises(DiffractionError, match=r"cannot write .*File too large"):
+            rendered(client, scene, keep=tmp_path / "passes")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list((tmp_path / "passes").iterdir())
+    again = rendered(client, scene, keep=tmp_path / "passes")
+    np.testing.assert_array_equal(np.array(again.bitmap), expected)
+
+
+KILLED = """
+import os, signal
+from mitsuba_diffraction import cluster
+from mitsuba_diffraction.scene import passes
+
+passes.SAMPLES["llvm"] = 2 * 24 * 16
+
+def kill(done, *_):
+    if done >= 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+with cluster.connect(scheduler={address!r}) as client:
+    cluster.render(
+        "room.xml", client=client, spp=24, seed=3, variant={variant!r}, threads=1, keep="passes",
+        progress=kill,
+    )
+"""
+
+
+def test_a_client_that_was_killed_goes_on(client, scene, expected):
+    code = KILLED.format(address=client.scheduler.address, variant=VARIANT)
+    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ran = subprocess.run([sys.executable, "-c", code], env=variables)
+    assert ran.returncode == -signal.SIGKILL
+    there = len(list(Path("passes").glob("*.sum")))
+    assert 4 <= there
+    again = film(client, scene, Path("passes"))
+    (result,) = again.render(Stop(), silent)
+    assert again.report.tasks == 12 - there
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+
+
+CLUSTER = """
+import time
+from distributed import LocalCluster
+
+LocalCluster(
+    n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+    scheduler_port={port}, dashboard_address=None,
+)
+time.sleep(3600)
+"""
+
+
+@pytest.fixture
+def start():
+    """`start(port)`: a process that is a scheduler and its worker."""
+    running = []
+
+    def call(port):
+        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        running.append(
+            subprocess.Popen(
+                [sys.executable, "-c", CLUSTER.format(port=port)],
+                env={**os.environ, "PYTHONPATH": path}, stderr=subprocess.DEVNULL,
+            )
+        )  # fmt: skip
+        return running[-1]
+
+    yield call
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+def free_port():
+    """A port that stays free while a scheduler starts: none that the system gives to others."""
+    for port in range(20_000 + os.getpid() % 10_000, 32_000):
+        with socket.socket() as free, contextlib.suppress(OSError):
+            free.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("all ports are taken")
+
+
+def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
+    scene, expected, start, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(workers, "COUNT_EVERY", 0.0)  # or a quick restart would not be seen
+    monkeypatch.setattr(workers, "PATIENCE", 300.0)  # of a busy machine
+    port = free_port()
+    first, killed = start(port), []
+
+    def disturb(done, total, text):
+        if done >= 4 and not killed:
+            first.kill()
+            first.wait()
+            killed.extend((tmp_path / "passes").iterdir())
+            start(port)
+
+    with cluster.connect(scheduler=f"tcp://127.0.0.1:{port}", patience=300) as mine:
+        job = film(mine, scene, tmp_path / "passes")
+        (result,) = job.render(Stop(), disturb)
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    assert len(killed) >= 4
+    # none of those that were kept a second time; whether one was under way is chance
+    assert job.report.tasks == 12
+    assert job.report.lost == 1
+
+
+def test_files_that_a_worker_lacks_come_by_content(
+    client, scene, expected, monkeypatch, three_groups
+):
+    def without_files(task, contents=None):
+        if not contents:
+            raise MissingFiles([task.files.files[0][1]])
+        return run_task(task)
+
+    monkeypatch.setattr(groups, "run_task", without_files)
+    job = film(client, scene, scene.parent / "passes")
+    (result,) = job.render(Stop(), silent)
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    assert job.report.tasks == 12
+
+
+def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
+    (tmp_path / "part.xml").write_text('<scene version="3.0.0"/>')
+    scene.write_text(SCENE.replace("</scene>", '<include filename="part.xml"/></scene>'))
+    task = passes_of_picture(scene).part(Span(0, 1))
+    contents = {digest: Path(path).read_bytes() for path, digest in task.files.files}
+    assert len(contents) == 2
+    scene.rename(tmp_path / "elsewhere.xml")
+    (tmp_path / "part.xml").unlink()
+    with pytest.raises(MissingFiles) as missing:
+        run_task(task)
+    assert missing.value.digests == sorted(contents)
+    assert run_task(task, contents).raw.shape[:2] == expected.shape[:2]

@@ -1,0 +1,111 @@
+"""Which workers can serve, how they are found, and who can reach them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.thorough
+
+distributed = pytest.importorskip("distributed")
+
+from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
+from mitsuba_diffraction.cluster import workers  # noqa: E402
+from tests.support import ROOT  # noqa: E402
+from tests.support.clusters import VARIANT, Recorder, film, rendered  # noqa: E402
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_other_versions_are_refused_by_name(number, client, scene, monkeypatch):
+    versions = list(workers.versions())
+    versions[number] = "0.1"
+    monkeypatch.setattr(workers, "versions", lambda: tuple(versions))
+    name = ("mitsuba_diffraction", "mitsuba", "drjit")[number]
+    words = rf"worker tcp://\S+ is of no use: it has {name} \S+, and the client 0\.1"
+    with pytest.raises(DiffractionError, match=words):
+        rendered(client, scene)
+
+
+def test_a_process_without_llvm_says_so_as_a_worker():
+    code = (
+        "from mitsuba_diffraction.cluster.workers import trouble_of_process, versions\n"
+        f"print(trouble_of_process(versions(), {VARIANT!r}))"
+    )
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), "DRJIT_LIBLLVM_PATH": "/none/libLLVM.so"}
+    ran = subprocess.run(
+        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.startswith('DRJIT_LIBLLVM_PATH="/none/libLLVM.so": there is no such file')
+
+
+def test_workers_with_several_dask_threads_are_refused(scene):
+    with (
+        distributed.LocalCluster(
+            n_workers=1,
+            threads_per_worker=2,
+            processes=False,
+            dashboard_address="127.0.0.1:0",
+            protocol="tcp://",
+            host="127.0.0.1",
+        ) as local,
+        distributed.Client(local) as mine,
+        pytest.raises(DiffractionError, match="has 2 Dask threads"),
+    ):
+        rendered(mine, scene)
+
+
+def test_a_worker_that_has_just_gone_is_no_reason_to_refuse():
+    leaving = Recorder()
+    leaving.run = lambda *_, **__: {"one": None, "gone": distributed.comm.CommClosedError("closed")}
+    assert workers.check_workers(leaving, None) == ["one"]
+
+
+def test_no_scheduler_is_one_line():
+    with (
+        pytest.raises(DiffractionError, match=r"no scheduler answers at 'tcp://127\.0\.0\.1:1'"),
+        cluster.connect(scheduler="tcp://127.0.0.1:1", patience=1),
+    ):
+        pass
+
+
+def test_a_scheduler_file_stands_for_the_address(client, tmp_path):
+    client.write_scheduler_file(str(tmp_path / "scheduler.json"))
+    with cluster.connect(scheduler=str(tmp_path / "scheduler.json")) as mine:
+        assert mine.scheduler.address == client.scheduler.address
+
+
+def test_workers_with_too_little_memory_are_named(scene, tmp_path):
+    lines = []
+    job = film(Recorder(memory_limit=1e8), scene, tmp_path, warn=lines.append)
+    assert job.needed > 5e8
+    (line,) = lines
+    assert re.search(r"worker one may use 0\.1 GB, .* estimated to need 0\.5 GB", line)
+
+
+def test_pages_of_workers_are_for_this_machine_alone(client):
+    for address in (client.scheduler_info()["address"], client.dashboard_link):
+        assert "//127.0.0.1:" in address
+    assert _listening(os.getpid()) <= {"0100007F"}  # in hexadecimal: 127.0.0.1
+    for worker in client.cluster.workers.values():
+        assert _listening(worker.pid) <= {"0100007F"}
+
+
+def _listening(process: int) -> set[str]:
+    """Addresses of IPv4 and IPv6 at which a process listens, as /proc has them."""
+    sockets = set()
+    for link in Path(f"/proc/{process}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            sockets.add(os.readlink(link))
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
+                found.add(fields[1].partition(":")[0])
+    return found

@@ -1,0 +1,54 @@
+"""The BSDF `diffraction_orders`: its light is that of the table, however it is asked."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError, reference
+from tests.support.orders import PERIOD, lit_pairs, load, thin_grating
+from tests.support.variants import evaluate
+
+TABLE = thin_grating()
+
+
+def test_values_are_the_references_and_weights_the_albedo(some_variant):
+    wi, wo, samples, wavelength = lit_pairs(60)
+    wavelength[:] = wavelength[:, :1]
+    found = evaluate(load(TABLE), wi, wo, samples, wavelength)
+    values, pdf, again, pdf_again, drawn, _, weights = found
+    expected = reference.orders_brdf(TABLE.efficiency, PERIOD, wi, wo, wavelength[:, 0])
+    expected = expected * wo[:, 2]
+    # linear interpolation between the corners of cells
+    assert np.abs(values[:, 0] - expected).sum() <= 1e-3 * expected.sum()
+    assert np.array_equal(values, again)
+    assert np.array_equal(pdf, pdf_again)
+    steps = np.arange(-5, 6)[:, None]
+    albedo = TABLE.efficiency(-wi[:, 0], -wi[:, 1], wavelength[:, 0], steps).sum(axis=0)
+    # drawn exactly: half floats are rounded up
+    above = drawn[:, 2] > 0.0
+    assert weights[above, 0] == pytest.approx(albedo[above], rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"coherence_width": 2.0}, "periods"),
+        ({"orientations": 1.0}, "orientation"),
+        ({"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
+    ],
+)
+def test_unfit_parameters_are_refused_in_one_line(some_variant, parameters, message):
+    with pytest.raises(Exception, match=message) as caught:
+        load(TABLE, **parameters)
+    assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
+
+
+def test_files_are_loaded_by_name(some_variant, tmp_path):
+    path = tmp_path / "grating.nc"
+    thin_grating(0.6, counts=(2, 2, 1)).save(path)
+    bsdf = mi.load_dict({"type": "diffraction_orders", "table": str(path)})
+    assert "0.6 µm" in str(bsdf)
+    with pytest.raises(Exception, match="does not exist"):
+        mi.load_dict({"type": "diffraction_orders", "table": str(tmp_path / "none.nc")})

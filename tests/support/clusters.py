@@ -1,0 +1,55 @@
+"""A small picture on workers: a dozen passes of two samples, and a client that does nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from mitsuba_diffraction import cluster
+from mitsuba_diffraction.cluster.frames import Film, FrameRequest
+from mitsuba_diffraction.scene.load import set_variant
+
+VARIANT = "llvm_ad_rgb"
+SPP = 24
+REQUEST = FrameRequest({}, SPP, 3)
+
+
+def silent(*_):
+    """Take progress, and show nothing."""
+
+
+def rendered(client, scene, **more):
+    """The picture, from workers with one Dr.Jit thread."""
+    arguments = {"spp": SPP, "seed": 3, "variant": VARIANT, "threads": 1, **more}
+    return cluster.render(scene, client=client, **arguments)
+
+
+def film(client, scene, keep, frames=(REQUEST,), warn=pytest.fail):
+    """The film of one frame, or of these."""
+    set_variant(VARIANT)
+    return Film(client, scene, frames, VARIANT, keep=keep, warn=warn, threads=1)
+
+
+class Recorder:
+    """A client of one worker that is given nothing."""
+
+    status = "running"
+
+    def __init__(self, **about):
+        self.about = {"nthreads": 1, **about}
+
+    def wait_for_workers(self, *_, **__):
+        pass
+
+    def run(self, *_, **__):
+        return {"one": None}
+
+    def cancel(self, _):
+        pass
+
+    def scheduler_info(self, **_):
+        return {"workers": {"one": self.about}}
+
+
+def passes_of_picture(scene):
+    """All passes of the picture, as one task."""
+    return film(Recorder(), scene, scene.parent).frames[0]
