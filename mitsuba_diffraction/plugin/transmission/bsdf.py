@@ -414,7 +414,7 @@ class DiffractionDielectric(DiffractingSurface):
         """Compute what depends on the parameters: the index, and scales of both sides."""
         self.material.derive()
         if self._energy is not None:
-            self._energy.update(*self.scale_range())
+            self._energy.update(self.scale_range())
         self.freeze(
             (self._energy, self.boundary, self.inner_boundary, self.mirror),
             self.thin,

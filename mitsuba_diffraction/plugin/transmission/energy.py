@@ -13,6 +13,7 @@ from ...tables.energy.conservation import Energy
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, scales_of
 from ..directions import PatchFrame
+from ..energy_factors import ScaleRange
 from ..fresnel import Dielectric
 from ..layers import plain
 from ..types import Colour, Float, Vector3f
@@ -44,15 +45,12 @@ class DielectricEnergy:
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self._order_0, self._all_light = ([DirectionLookup(), DirectionLookup()] for _ in range(2))
 
-    def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
-        """Look up, or compute, c and s at another height scale or index: `EnergyModel.update`."""
+    def update(self, factors: ScaleRange) -> None:
+        """Look up, or compute, c and s at other factors or another index: `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
         dielectric = materials.Dielectric(index, self._model, self._thin)
-        energy = Energy(self._table, dielectric, self._range)
-        if lowest is None:
-            nodes = list(energy.nodes(height_scale, interval=differentiable))
-        else:
-            nodes = energy.between(lowest, height_scale)
+        energy = Energy(self._table, dielectric, factors.wavelengths(self._range))
+        nodes = factors.nodes(energy)
         conserved = [energy.at(node) for node in nodes]
         scales = {
             self._order_0[0]: [each.order_0 for each in conserved],
@@ -61,7 +59,7 @@ class DielectricEnergy:
             self._all_light[1]: [each.scale_below for each in conserved],
         }
         for lookup, tables in scales.items():
-            lookup.update(scales_of(tables), nodes, height_scale, lowest is not None)
+            lookup.update(scales_of(tables), nodes, factors)
 
     @property
     def scales_order_0(self) -> bool:
@@ -104,10 +102,10 @@ class DielectricEnergy:
         """Product of a scale at both directions, each on its side."""
         product = mi.UnpolarizedSpectrum(1.0)
         for direction in directions:
-            tangential, cosine = frame.turned(direction), mi.Frame3f.cos_theta(direction)
+            cosine = mi.Frame3f.cos_theta(direction)
             sides = zip(
-                lookups[0].at(tangential, cosine, wavenumbers, height_scale),
-                lookups[1].at(tangential, -cosine, wavenumbers, height_scale),
+                lookups[0].at(direction, cosine, frame, wavenumbers, height_scale),
+                lookups[1].at(direction, -cosine, frame, wavenumbers, height_scale),
                 strict=True,
             )
             product *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *both) for both in sides])
