@@ -84,6 +84,8 @@ class EnergyModel:
         self._scales = scales
         material = Reflector(self._model, partial(self._indices, INDEX_STEP))
         self._energy = Energy(self._table, material, scales.wavelengths(self._range))
+        if not (self.conserving or beneath or self._filmed):
+            return
         nodes = scales.nodes(self._energy)
         if self._filmed:
             # g costs little at any height scale: its slope is taken there, and not from nodes of s,
