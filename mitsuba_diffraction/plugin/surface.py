@@ -91,6 +91,16 @@ class DiffractingSurface(mi.BSDF):
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
         self._scale_changeable = (bounded,)
 
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return self.table.sigma
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Shortest wavelength that the table serves, nm."""
+        return self.table.wavelength_range[0]
+
     # ------------------------------------------------------------------ the model
 
     def geometry(self, pair: Pair) -> Float:

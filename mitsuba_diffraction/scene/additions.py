@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..tables.orders.file import is_order_table
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
 
@@ -176,17 +177,21 @@ def _targets(node: Any) -> list[int]:
 
 
 def _surface(text: str, beneath: int | None) -> Any:
-    """Return the properties of the BSDF `diffraction` for `FILE[,parameter=value…]`."""
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`.
+
+    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders.
+    """
     file, *parameters = _COMMA.split(text)
-    props = mi.Properties("diffraction")
-    props["heightfield"] = str(Path(file).absolute())
+    solved = is_order_table(file)
+    props = mi.Properties("diffraction_orders" if solved else "diffraction")
+    props["table" if solved else "heightfield"] = str(Path(file).absolute())
     names = []
     for parameter in parameters:
         name, _, value = parameter.partition("=")
         name = name.strip()
         names.append(name)
         props[name] = _value(value.strip())
-    if beneath is not None and not set(names) & set(_CONDUCTORS):
+    if beneath is not None and not solved and not set(names) & set(_CONDUCTORS):
         props["beneath"] = mi.Properties.ResolvedReference(beneath)
     return props
 

@@ -75,14 +75,15 @@ def brdf_map(
     check_map(bands, resolution, samples, spectral)
     _check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
-    table = getattr(bsdf, "table", None)
-    if table is not None and bands.low < table.wavelength_range[0]:
+    shortest = getattr(bsdf, "shortest_wavelength", 0.0)
+    if bands.low < shortest:
         raise DiffractionError(
-            f"{bands}: below the table's shortest wavelength, {table.wavelength_range[0]:g} "
-            "nm; build a wider table with 'mitsuba-diffraction precompute --wavelength-range'"
+            f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a wider table "
+            "with 'mitsuba-diffraction precompute --wavelength-range'"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
-    narrowest = 0.5 if table is None else 1 / (2**0.5 * table.sigma * float(wavenumber(bands.low)))
+    sigma = getattr(bsdf, "sigma", None)
+    narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
     sums: _SpectralSums | _RgbSums
@@ -105,7 +106,7 @@ def brdf_map(
         cosine=cosine,
         illuminant=illuminant,
         samples=samples,
-        lobe=0.0 if table is None else NEAR / (table.sigma * float(wavenumber(bands.high))),
+        lobe=0.0 if sigma is None else NEAR / (sigma * float(wavenumber(bands.high))),
     )
 
 

@@ -39,6 +39,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...errors import warn
+from ...optics.geometry import sigma_of
 from ..directions import Pair, PatchFrame
 from ..parameter_changes import arrays_within, check_parameters, marks, take_changes
 from ..sampling import direction_of
@@ -87,6 +88,11 @@ class DiffractionOrders(mi.BSDF):
             _warn_of_polarisation()
         check_parameters([self])
         self.derive()
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return sigma_of(self.coherence_width)
 
     # ------------------------------------------------------------------ Mitsuba's interface
 

@@ -91,7 +91,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = cells.interpolation(band.counts.w, at)
     summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
-    values = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
+    values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])

@@ -206,7 +206,7 @@ class OrderTable:
             "wavelength_range_nm": list(self.wavelengths),
             "superstrate_index": self.superstrate,
             "bands": len(self.bands),
-            "nodes": [list(band.counts) for band in self.bands],
+            "nodes": sorted({" x ".join(map(str, band.counts)) for band in self.bands}),
             "mean_albedo": round(self.albedo, 4),
             "reciprocity_residual": self.reciprocity,
             "memory_mb": round(self.nbytes / 1e6, 2),
