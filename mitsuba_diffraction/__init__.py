@@ -8,6 +8,9 @@ DiffractionTable   precomputed diffraction orders of a patch
 OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
+solve_orders       orders of a grating by a rigorous solver
+read_orders        orders from a file of efficiencies
+profiles           one period of a grating's grooves
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
 design             patches from their BRDF, reliefs for given colours
@@ -55,6 +58,9 @@ if TYPE_CHECKING:
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
+    from .solve import profiles
+    from .solve.measured import read_orders
+    from .solve.orders import solve_orders
     from .thesis import period_fit
 
 __version__ = version(__name__)
@@ -72,8 +78,11 @@ __all__ = [
     "hologram",
     "maps",
     "period_fit",
+    "profiles",
+    "read_orders",
     "reference",
     "shader_comparison",
+    "solve_orders",
     "spectrum",
     "tradeoff",
     "web",
@@ -86,11 +95,17 @@ _ON_DEMAND = {
     "glsl": "realtime.glsl",
     "maps": "analysis.maps",
     "period_fit": "thesis.period_fit",
+    "profiles": "solve.profiles",
     "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
-_FUNCTIONS = {"spectrum": "analysis.spectra", "hologram": "scene.hologram"}
+_FUNCTIONS = {
+    "hologram": "scene.hologram",
+    "read_orders": "solve.measured",
+    "solve_orders": "solve.orders",
+    "spectrum": "analysis.spectra",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -363,11 +363,26 @@ def _conductors() -> list[str]:
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
+    file = _file(material, "eta")
     if not file.is_file():
         return None
     nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
+
+
+def tabulated_index(material: str) -> tuple[Array, Array]:
+    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba has no such table.
+    """
+    if tabulated_range(material) is None:
+        raise DiffractionError(_unknown_conductor(material))
+    nodes, eta = _table(material, "eta")
+    k = _tabulated(material, "k", nodes)
+    return nodes, np.asarray(eta + 1j * k)
 
 
 def _at(material: str, name: str, wavelength: float) -> Texture:
@@ -397,5 +412,9 @@ def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
 
 def _table(material: str, name: str) -> Array:
     """Wavelengths in nm and values of a part of a material's index, (2, n)."""
-    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
-    return np.asarray(np.loadtxt(file).T)
+    return np.asarray(np.loadtxt(_file(material, name)).T)
+
+
+def _file(material: str, name: str) -> Path:
+    """Return the path of Mitsuba's table of a part of a material's index."""
+    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 import re
 import signal
 import time
@@ -239,7 +238,7 @@ def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
 
 def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
     def measure(job):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         time.sleep(60)
 
     monkeypatch.setattr(module, "measure", measure)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.systems import posix
+
 SCENE = """<scene version="3.0.0">
   <default name="width" value="8"/>
   <integrator type="path"/>
@@ -33,6 +35,7 @@ def alarm():
     signal.signal(signal.SIGALRM, before)
 
 
+@posix
 @pytest.mark.parametrize(
     ("suffix", "arguments"),  # {} is the pipe
     [
@@ -62,6 +65,7 @@ def test_a_pipe_is_refused_at_once(run, here, alarm, suffix, arguments):
     assert "pipe or a device" in ran.failed_in_one_line()
 
 
+@posix
 @pytest.mark.parametrize(
     "element",
     [
@@ -79,6 +83,7 @@ def test_a_pipe_that_a_scene_names_is_refused_at_once(run, here, alarm, element)
     assert "pipe or a device" in ran.failed_in_one_line()
 
 
+@posix
 def test_a_pipe_for_a_frame_or_a_table_of_treatments_is_refused_at_once(run, here, alarm, heights):
     Path("a.xml").write_text(SCENE.format(""))
     Path("frames").mkdir()

@@ -13,6 +13,7 @@ from mitsuba_diffraction import __version__
 from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from tests.support.systems import posix
 
 
 @pytest.fixture
@@ -158,6 +159,7 @@ def test_samples_below_zero_are_said_once_whatever_they_are(run, command):
     assert line.startswith("mitsuba-diffraction: warning: some samples are below zero")
 
 
+@posix
 def test_a_closed_pipe_is_no_traceback(heights):
     words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
     command = shlex.join([*words, "--pixel-size", "0.1", "--json"])
@@ -170,7 +172,7 @@ def test_a_closed_pipe_is_no_traceback(heights):
 def test_a_termination_is_an_exit_code(child, heights):
     prelude = (
         "import mitsuba_diffraction.cli.info as info\n"
-        "info._describe = lambda *_: os.kill(os.getpid(), signal.SIGTERM)"
+        "info._describe = lambda *_: signal.raise_signal(signal.SIGTERM)"
     )
     assert child(["info", heights], prelude).code == 143
 
