@@ -1,15 +1,18 @@
 """The Mitsuba BSDF plugin `diffraction_orders`: gratings whose orders were solved.
 
 For steep grooves, most of all of metal, where the models of `diffraction` are far off: a CD, a
-blazed grating, an embossed hologram. `mitsuba-diffraction solve` makes the table (docs/orders.md).
+blazed grating, an embossed hologram. `mitsuba-diffraction solve` makes the table
+([orders.md](orders.md)). The profile repeats along x.
 
+The grating
+-----------
 table : string
-    File of `mitsuba-diffraction solve`, or of a table saved in Python.
+    File of `mitsuba-diffraction solve`, or of `OrderTable.save`.
 data : OrderTable
     Instead: a table, in dictionaries only, by `md.bsdf_dict`.
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm, which is the width over which light is coherent, at
-    least 2 periods. `auto` is 65 (sunlight). It sets the width of the orders' lobes.
+    4σ of the Gaussian amplitude window, µm, over which light is coherent, at least 2 periods. It
+    sets the width of the orders' lobes. `auto` is 65 (sunlight).
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the direction in which the profile repeats, as of
     `diffraction`.
@@ -17,19 +20,31 @@ wavelength : float [550]
     Wavelength of mono variants, nm.
 (nested) : BSDF ∂
     BSDF beneath, which receives the light that is in no order, by T(ωi) T(ωo) with T = 1 − Σ η_m:
-    for a dielectric grating over pigment, for example. A metal absorbs that light: leave it out.
+    for a dielectric grating over pigment, for example. A metal absorbs that light: nest nothing.
 
-The profile's clear layer, the table's superstrate, is a coat with a flat face: the face is a mirror
-of the same coherence width, and light that it sends back to the grating is summed as of powers.
+The model is a sum of lobes, one for each order m, of the efficiency η_m of the table:
 
     f = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²),   q = k (u, v),   q_m = (2πm/d, 0)
 
-RGB variants sum this over daylight. Polarised variants depolarise the light, of which they warn.
-Wavelengths outside the table have the efficiencies of the nearest that it has.
+The table's clear layer (superstrate) is a coat with a flat face: a mirror of the same coherence
+width. Light that the face sends back to the grating is summed over all orders and reflections, in
+powers. RGB variants sum f over daylight. Efficiencies are those of unpolarised light: polarised
+variants depolarise it, and warn once. Wavelengths outside the table have the efficiencies of the
+nearest in it. f is reciprocal as far as the table is, at the centres of lobes.
+
+XML and the same in Python:
 
     <bsdf type="diffraction_orders">
         <string name="table" value="grating.nc"/>
+        <float name="orientation" value="90"/>
     </bsdf>
+
+    import mitsuba_diffraction as md  # before Mitsuba: registers the plugin
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    md.OrderTable.mirror(period=1.6, reflectance=0.9).save("grating.nc")
+    bsdf = mi.load_dict({"type": "diffraction_orders", "table": "grating.nc", "orientation": 90})
 """
 
 from __future__ import annotations
