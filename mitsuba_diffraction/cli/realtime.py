@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..extras import optional
 from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
@@ -54,12 +55,9 @@ def view(args: argparse.Namespace) -> int:
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
-    try:
-        from ..realtime.glsl.viewer import show
-    except ImportError as error:
-        raise DiffractionError(
-            f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
-        ) from error
+    for package in ("moderngl", "moderngl_window", "imgui_bundle"):
+        optional(package)
+    from ..realtime.glsl.viewer import show
 
     _set_variant(args)
     with mitsuba_warnings():

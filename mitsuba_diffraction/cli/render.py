@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError
-from ..scene.denoise import denoised, require_denoiser
+from ..extras import optional
+from ..scene.denoise import denoised
 from ..scene.frames import (
     FILMS,
     MISSING,
@@ -181,7 +182,7 @@ def _run_one(args: argparse.Namespace) -> int:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
     if args.denoise:
-        require_denoiser()
+        optional("pyoidn")
         for path in outputs.denoised:
             check_writable(path)
 

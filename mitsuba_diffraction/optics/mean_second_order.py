@@ -42,8 +42,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from .blend import RoughnessTable, ScaleRoughness, shares
 from .fresnel import Filmed, decaying_root
@@ -167,7 +167,7 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
     nodes = roughness.frequencies
     first, last = np.log2(nodes[[0, -1]])
     frequency = 2.0 ** np.arange(first, last + 1.0, 1.0 / _PER_OCTAVE)
-    variance, _ = nnls(shares(frequency, nodes), roughness.nodes)
+    variance, _ = scipy.optimize.nnls(shares(frequency, nodes), roughness.nodes)
     kept = variance > _LEAST * variance.sum()
     return ScaleRoughness(frequency[kept], variance[kept])
 

@@ -27,7 +27,8 @@ MOST_VERTICES = 10_000
 class Profile:
     """Cross-section of one period of the grooves, an open polygon.
 
-    It continues at (x[0] + period, z[0]), and the material lies below it. Undercut profiles, whose x turns back, are allowed.
+    It continues at (x[0] + period, z[0]), and the material lies below it. Undercut profiles, whose
+    x turns back, are allowed.
 
     Attributes
     ----------

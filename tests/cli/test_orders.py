@@ -23,4 +23,4 @@ def test_maps_show_a_table_of_orders(run, tmp_path, monkeypatch):
     assert (tmp_path / "grating-map.exr").is_file()
     refused = run("brdf-map", "grating.nc", "--material", "Al", *flags)
     assert refused.code != 0
-    assert "unknown parameter 'material'" in refused.err
+    assert "'material' is a parameter of the plugin 'diffraction'" in refused.err

@@ -25,7 +25,7 @@ import numpy as np
 
 from mitsuba_diffraction.cluster.frames import Kept
 from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task
-from mitsuba_diffraction.cluster.workers import require_dask
+from mitsuba_diffraction.extras import optional
 
 from . import pages
 from .pages import exit_code
@@ -116,7 +116,7 @@ def client_seconds(count: int = 20) -> float:
 def scheduler_seconds(count: int = 500) -> float:
     """Seconds of client, scheduler and worker together for an empty task, one after the other
     in the queue: more than the scheduler's own."""
-    distributed = require_dask()
+    distributed = optional("distributed")
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0"

@@ -19,9 +19,8 @@ from itertools import groupby
 from typing import Any, overload
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
@@ -237,7 +236,7 @@ def _scatter(
     mean, squares = np.zeros(1), np.zeros(1)
     for n in range(len(windows)):
         power = np.abs(windows.spectrum(n, last).of_phase(kappa)) ** 2
-        power = gaussian_filter(power.astype(np.float64), lobe, mode="constant")
+        power = scipy.ndimage.gaussian_filter(power.astype(np.float64), lobe, mode="constant")
         change = power - mean
         mean = mean + change / (n + 1)
         squares = squares + change * (power - mean)

@@ -20,8 +20,9 @@ from .lookup import clamped
 from .table import Band, Counts, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
-#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4.
-CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(24, 16, 8), 96 << 20
+#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
+#: critical angles of orders lie along w.
+CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
 #: Share of the light that a totally reflecting face sends back: trapped light would never end.
 _TRAPPED = 1.0 - 1e-4
 #: Least transmittance in probabilities, so that no order that leaves has none.

@@ -36,7 +36,7 @@ def test_values_are_the_references_and_weights_the_albedo(some_variant):
     [
         ({"coherence_width": 2.0}, "periods"),
         ({"orientations": 1.0}, "orientation"),
-        ({"coat_ior": 1.5}, "unknown"),
+        ({"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
     ],
 )
 def test_unfit_parameters_are_refused_in_one_line(some_variant, parameters, message):
