@@ -29,6 +29,7 @@ sampling        directions drawn where the orders are
 series          series in κ: weights of a bin's terms, and order 0
 rgb             power and look-up in the RGB variants' colours
 window_positions  where on the patch the window sits at a point of the surface
+energy_factors  factors on heights and lengths for which scales of energy are tabulated
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 boundary        what the material makes of the light, with its polarisation

@@ -350,8 +350,7 @@ class Diffraction(DiffractingSurface):
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
-                self._energy.reflected(frame.turned(d), mi.Frame3f.cos_theta(d), k, scale)
-                for d in (si.wi, wo)
+                self._energy.reflected(direction, frame, k, scale) for direction in (si.wi, wo)
             )
         return self.layering.beneath(si, wo, active, ratios)
 
@@ -394,10 +393,7 @@ class Diffraction(DiffractingSurface):
         """Compute what depends on the parameters: indices, scales of energy, the second order."""
         self.fresnel.derive()
         if self._energy is not None:
-            scales = self.scale_range()
-            self._energy.update(
-                scales.largest, scales.differentiable, self._light_beneath, scales.lowest
-            )
+            self._energy.update(self.scale_range(), self._light_beneath)
         if self._second_order is not None:
             self._second_order.update()
         material = self.boundary.material

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.energy.grid import SHARE, DirectionalTable
+from .directions import PatchFrame
+from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
-from .types import Buffer, Float, Index, Vector2f
+from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 Array = NDArray[np.float32]
 
@@ -26,22 +28,20 @@ class DirectionLookup:
         self.present = False
         self._values: Buffer = None
         self._nodes: Buffer = None
-        self._last, self._varies = 0, False
+        self._last, self._varies, self._centre = 0, False, 1.0
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = 1
 
     def update(
-        self,
-        tables: list[DirectionalTable] | None,
-        nodes: list[float],
-        height_scale: float,
-        varies: bool,
+        self, tables: list[DirectionalTable] | None, nodes: list[float], scales: ScaleRange
     ) -> None:
         """Take the tables at evenly spaced height scales, or none."""
         self.present = tables is not None
         if tables is None:
             return
+        height_scale, varies, self._centre = scales.height_scale, scales.varies, scales.centre
+        tables = [DirectionalTable(t.wavelengths * self._centre, t.values) for t in tables]
         maps = np.stack([_cells(table) for table in tables])
         self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
@@ -60,10 +60,20 @@ class DirectionLookup:
         dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
 
     def at(
-        self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
+        self,
+        direction: Vector3f,
+        cosine: Float,
+        frame: PatchFrame,
+        wavenumbers: list[Float],
+        height_scale: Float,
     ) -> list[Float]:
-        """For each channel; tangential in the patch's frame."""
-        share = None
+        """Return the value of each channel for a direction in the shading frame.
+
+        cosine : of its angle to the normal, on the side that the function is of.
+        """
+        tangential, share = frame.turned(direction), None
+        height_scale = height_scale * dr.rcp(frame.stretch)
+        wavenumbers = [k * (frame.stretch * (1.0 / self._centre)) for k in wavenumbers]
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
         cell, s, t = self._cell(*self._place(tangential, cosine))

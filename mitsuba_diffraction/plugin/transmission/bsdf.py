@@ -415,7 +415,7 @@ class DiffractionDielectric(DiffractingSurface):
         """Compute what depends on the parameters: the index, and scales of both sides."""
         self.material.derive()
         if self.balance is not None:
-            self.balance.update(*self.scale_range())
+            self.balance.update(self.scale_range())
         self.freeze(
             (self.balance, self.boundary, self.inner_boundary, self.mirror),
             self.thin,

@@ -13,6 +13,7 @@ from ...tables.energy.transmission import Medium
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, scales_of
 from ..directions import PatchFrame
+from ..energy_factors import ScaleRange
 from ..fresnel import Dielectric
 from ..layers import plain
 from ..types import Colour, Float, Vector3f
@@ -45,19 +46,16 @@ class SidesModel:
         #: c above and below, t above and below
         self._lookups = [DirectionLookup() for _ in range(4)]
 
-    def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
-        """Look up, or compute, c and t at another height scale or index: `EnergyModel.update`."""
+    def update(self, factors: ScaleRange) -> None:
+        """Look up, or compute, c and t at other factors or another index: `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
         medium = Medium(index, self._model, self._thin)
-        energy = SidesEnergy(self._table, medium, self._range)
-        if lowest is None:
-            nodes = list(energy.nodes(height_scale, interval=differentiable))
-        else:
-            nodes = energy.between(lowest, height_scale)
+        energy = SidesEnergy(self._table, medium, factors.wavelengths(self._range))
+        nodes = factors.nodes(energy)
         scales = [energy.at(node) for node in nodes]
         for n, lookup in enumerate(self._lookups):
             tables = scales_of([scale[n] if n < len(scale) else None for scale in scales])
-            lookup.update(tables, nodes, height_scale, lowest is not None)
+            lookup.update(tables, nodes, factors)
 
     @property
     def scales_order_0(self) -> bool:
@@ -100,10 +98,10 @@ class SidesModel:
         """Product of a scale at both directions, each on its side."""
         product = mi.UnpolarizedSpectrum(1.0)
         for direction in directions:
-            tangential, cosine = frame.turned(direction), mi.Frame3f.cos_theta(direction)
+            cosine = mi.Frame3f.cos_theta(direction)
             sides = zip(
-                lookups[0].at(tangential, cosine, wavenumbers, height_scale),
-                lookups[1].at(tangential, -cosine, wavenumbers, height_scale),
+                lookups[0].at(direction, cosine, frame, wavenumbers, height_scale),
+                lookups[1].at(direction, -cosine, frame, wavenumbers, height_scale),
                 strict=True,
             )
             product *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *both) for both in sides])
