@@ -78,8 +78,8 @@ def test_a_target_that_a_program_holds_open_is_one_line_and_stays(tmp_path, monk
         raise PermissionError(13, "Access is denied")
 
     monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises(DiffractionError, match="Access is denied; close the programs"):
-        with atomic_path(target) as path:
-            path.write_text("after")
+    denied = pytest.raises(DiffractionError, match="Access is denied; close the programs")
+    with denied, atomic_path(target) as path:
+        path.write_text("after")
     assert target.read_text() == "before"
     assert os.listdir(tmp_path) == ["a.txt"]
