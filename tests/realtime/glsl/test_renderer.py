@@ -23,7 +23,7 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     visibility,
     with_lights,
 )
-from mitsuba_diffraction.tables.energy.grid import FINE
+from mitsuba_diffraction.tables.directional import FINE
 from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
@@ -251,7 +251,7 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     ("name", "method", "material"),
     [
         ("llvm_ad_rgb", "fast", {"int_ior": 1.58}),
-        ("llvm_ad_spectral", "exact", {"int_ior": 2.2, "coat_ior": 1.2}),
+        ("llvm_ad_spectral", "exact", {"int_ior": 2.2, "coat_ior": 1.2, "lateral_scale": 0.85}),
     ],
 )
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
@@ -282,6 +282,32 @@ def test_light_diffracted_twice_is_the_plugins(
     assert np.abs(change).sum() > 0.02 * np.abs(expected[0]).sum()
     # besides what the first order's table is off by: half floats of r and c, lobes at two points
     assert off(found[1] - found[0], change) < first + 4e-3
+
+
+def test_a_mix_is_drawn_by_its_weights(gl: Any, some_variant: str, table_file: Path) -> None:
+    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
+    paint = {"type": "diffuse", "reflectance": 0.7}
+
+    def drawn(bsdf: dict[str, Any]) -> NDArray[np.float32]:
+        made = Renderer(mi.load_dict(under_a_sun(bsdf, turned(1.2))), context=gl)
+        picture = made.render("fast", supersampling=16)[..., :3]
+        made.release()
+        return picture
+
+    def mix(weight: Any) -> dict[str, Any]:
+        both = {"skin": skin, "paint": paint}
+        return {"type": "diffraction_mix", **both, "weight_skin": weight}
+
+    # the plate's middle, where the halves of a texture of two texels meet
+    halves = mi.Bitmap(np.array([[1.0, 0.0]], np.float32))
+    texture = {"type": "bitmap", "bitmap": halves, "raw": True, "filter_type": "nearest"}
+    alone = [drawn(skin), drawn(mix(0.0))]
+    picture = drawn(mix(texture))
+    for half, expected in ((np.s_[:, :2], alone[0]), (np.s_[:, 2:], alone[1])):
+        np.testing.assert_allclose(picture[half], expected[half], rtol=1e-5)
+    # blended by a pattern of samples, 256 a pixel: its noise
+    blend = 0.25 * alone[0] + 0.75 * alone[1]
+    np.testing.assert_allclose(drawn(mix(0.25)).mean((0, 1)), blend.mean((0, 1)), rtol=0.02)
 
 
 def off(found: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
