@@ -48,8 +48,8 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. Scales of
-    energy are those of that factor (docs/holograms.md). A table serves factors up to 1.
+    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
+    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
 lateral_scale_max : float [of a bitmap]
     Largest factor of such a texture, above which factors are clipped. Required unless the texture
     is a bitmap.
@@ -136,7 +136,7 @@ second_order : string or boolean [auto]
     matrices by the factor for unpolarised light. Order 0, sampled directions and the light for what
     lies beneath are the same without it. Coefficients follow the index in steps of 0.01.
 energy_conserving : boolean [true]
-    Scales the BSDF by e(ωi) e(ωo) so that no direction reflects more than it receives; reciprocal.
+    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
     The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
     gratings of metal lose some per cent of the light in directions without gain, too
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
@@ -208,7 +208,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.grid import DirectionalTable
+from ..tables.directional import DirectionalTable
 from . import nesting
 from .boundary import Kirchhoff
 from .directions import Pair, vcavity
@@ -335,7 +335,7 @@ class Diffraction(DiffractingSurface):
             power = power + others * mi.UnpolarizedSpectrum(added)
         power = factor * power
         if self._energy is not None and self._energy.active_factors:
-            # Energy scales e(ωi) e(ωo), so that no direction reflects more than it receives
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
             power *= self._energy.factor(pair, k, scale)
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, si, pair, self.boundary, power, active)
@@ -436,7 +436,7 @@ class Diffraction(DiffractingSurface):
     def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
         """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
 
-        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
+        (polar + 1, azimuthal) on `tables.directional.FINE`.
         """
         if self._energy is None or not self._energy.conserving:
             return None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.energy.grid import SHARE, DirectionalTable
+from ..tables.directional import SHARE, DirectionalTable
 from .directions import PatchFrame
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload

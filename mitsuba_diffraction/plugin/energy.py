@@ -1,6 +1,6 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by e(ωi) e(ωo), reciprocal, where the model would reflect more than
+What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
 it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
@@ -19,9 +19,9 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import Conservation
-from ..tables.energy.grid import FINE, DirectionalTable
-from ..tables.energy.store import Energy
+from ..tables.directional import FINE, DirectionalTable
+from ..tables.energy.conservation import Conservation, Energy
+from ..tables.energy.materials import Reflector
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
@@ -82,12 +82,8 @@ class EnergyModel:
         scales : the factors; beneath : whether light goes on to something.
         """
         self._scales = scales
-        self._energy = Energy(
-            self._table,
-            self._model,
-            partial(self._indices, INDEX_STEP),
-            scales.wavelengths(self._range),
-        )
+        material = Reflector(self._model, partial(self._indices, INDEX_STEP))
+        self._energy = Energy(self._table, material, scales.wavelengths(self._range))
         if not (self.conserving or beneath or self._filmed):
             return
         nodes = scales.nodes(self._energy)
@@ -128,7 +124,7 @@ class EnergyModel:
             )
 
     def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale e over wavelengths, (polar + 1, azimuthal)."""
+        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
@@ -154,7 +150,7 @@ class EnergyModel:
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """e(ωi) e(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
+        """Return s(ωi) s(ωo) per channel; of a film g(ωi) g(ωo) too (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.

@@ -104,10 +104,10 @@ def test_a_long_value_in_a_scene_is_not_taken_for_a_file(run, here):
 
 
 @pytest.mark.parametrize("command", ["render", "info", "precompute", "brdf-map", "survey"])
-def test_a_name_that_is_no_utf_8_is_refused_in_one_line(child, tmp_path, command):
+def test_a_name_that_is_no_utf_8_is_refused_in_one_line(run, here, command):
     name = os.fsdecode(b"caf\xe9.xml")
-    (tmp_path / name).write_text(SCENE.format(""))
-    line = child([command, name]).failed_in_one_line()
+    Path(name).write_text(SCENE.format(""))
+    line = run(command, name).failed_in_one_line()
     assert "caf" in line
     assert "UTF-8" in line
 

@@ -115,15 +115,15 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     """
     from ...plugin.surface import DiffractingSurface  # which only a variant has
 
+    if lacking := getattr(bsdf, "not_in_shaders", None):
+        raise DiffractionError(
+            f"the surface has {lacking}, which the shaders do not support: export it without, or "
+            "render it with Mitsuba"
+        )
     if not isinstance(bsdf, DiffractingSurface):
         raise DiffractionError(
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
             "instance mi.load_dict(md.bsdf_dict(...))"
-        )
-    if lacking := bsdf.not_in_shaders:
-        raise DiffractionError(
-            f"the surface has {lacking}, which the shaders do not support: export it without, or "
-            "render it with Mitsuba"
         )
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
         raise DiffractionError(

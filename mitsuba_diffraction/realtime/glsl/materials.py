@@ -13,7 +13,7 @@ from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...plugin.parameter_changes import children
-from ...tables.energy.grid import FINE
+from ...tables.directional import FINE
 from ...tables.table import DiffractionTable
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, interval_maps, raw_picture
 from .packing import (

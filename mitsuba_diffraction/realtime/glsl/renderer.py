@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import warn
 from ...extras import optional
 from ...optics.display import check_view
-from ...tables.energy.grid import FINE
+from ...tables.directional import FINE
 from .camera import Camera
 from .context import (
     Bindings,

@@ -47,7 +47,7 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     shortened,
 )
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
-from mitsuba_diffraction.tables.energy.grid import FINE, DirectionalTable
+from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 

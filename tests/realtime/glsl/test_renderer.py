@@ -23,7 +23,7 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     visibility,
     with_lights,
 )
-from mitsuba_diffraction.tables.energy.grid import FINE
+from mitsuba_diffraction.tables.directional import FINE
 from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
