@@ -8,6 +8,9 @@ DiffractionTable   precomputed diffraction orders of a patch
 OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
+solve_orders       orders of a grating by a rigorous solver
+read_orders        orders from a file of efficiencies
+profiles           one period of a grating's grooves
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
 design             patches from their BRDF, reliefs for given colours
@@ -16,6 +19,7 @@ cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
+hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   error of every bad input, in one line
 
@@ -53,6 +57,10 @@ if TYPE_CHECKING:
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
+    from .scene.hologram import hologram
+    from .solve import profiles
+    from .solve.measured import read_orders
+    from .solve.orders import solve_orders
     from .thesis import period_fit
 
 __version__ = version(__name__)
@@ -67,10 +75,14 @@ __all__ = [
     "design",
     "glsl",
     "gratings",
+    "hologram",
     "maps",
     "period_fit",
+    "profiles",
+    "read_orders",
     "reference",
     "shader_comparison",
+    "solve_orders",
     "spectrum",
     "tradeoff",
     "web",
@@ -83,15 +95,22 @@ _ON_DEMAND = {
     "glsl": "realtime.glsl",
     "maps": "analysis.maps",
     "period_fit": "thesis.period_fit",
+    "profiles": "solve.profiles",
     "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
+}
+_FUNCTIONS = {
+    "hologram": "scene.hologram",
+    "read_orders": "solve.measured",
+    "solve_orders": "solve.orders",
+    "spectrum": "analysis.spectra",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name in _ON_DEMAND:
         return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
-    if name == "spectrum":
-        return importlib.import_module(f"{__name__}.analysis.spectra").spectrum
+    if name in _FUNCTIONS:
+        return getattr(importlib.import_module(f"{__name__}.{_FUNCTIONS[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -14,9 +14,13 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
-from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support import ROOT
+
+# read when Dr.Jit is imported: kernels of tests are not optimised, the user's have to be
+os.environ["DRJIT_CACHE_DIR"] = str(ROOT / ".pytest_cache" / "kernels")
+
+import mitsuba_diffraction  # noqa: F401 - before Dr.Jit: it chooses the LLVM that Dr.Jit loads
+from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.command_line import Ran
 from tests.support.variants import VARIANTS, obstacle
 
@@ -104,17 +108,11 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def own_vectors() -> Iterator[int]:
-    """Kernels are made for vectors of 8 lanes at most; how many the processor's own have.
+def own_vectors() -> int:
+    """Compile kernels quickly; returns how many lanes the vectors of child processes have."""
+    from tests.support.kernels import compile_quickly
 
-    Child processes have these.
-    """
-    from tests.support.coarse import vectors_of
-
-    before = vectors_of(8)
-    vectors_of(min(8, before))
-    yield before
-    vectors_of(before)
+    return compile_quickly()
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ import pytest
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning, warn
 from tests.support import ROOT
-
-PACKAGE = ROOT / "mitsuba_diffraction"
+from tests.support.docstrings import PACKAGE
 
 
 def test_what_lies_between_two_quotations_is_not_cut():

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import functools
 import gzip
+import re
+import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
 import mitsuba_diffraction as md
 from tests.support import ROOT
@@ -129,6 +133,29 @@ def test_the_sdist_holds_what_the_tests_need(in_sdist):
 def test_the_sdist_holds_nothing_made(in_sdist):
     assert not {n for n in in_sdist if n.startswith((".venv/", "out/", "precompute/tables/"))}
     assert not {n for n in in_sdist if n.endswith(".pyc") or n.startswith(".git/")}
+
+
+def test_version_is_that_of_changelog_citation_and_tag():
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        version = tomllib.load(file)["project"]["version"]
+    assert md.__version__ == version
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert citation["version"] == version
+    headings = re.findall(r"^## (\d\S*)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
+    assert headings[:1] in ([], [version])  # none before the first release
+    if shutil.which("git") and (ROOT / ".git").exists():
+        words = ["git", "tag", "--points-at", "HEAD", "v*"]
+        tags = subprocess.run(words, cwd=ROOT, capture_output=True, text=True).stdout.split()
+        assert tags == [f"v{heading}" for heading in headings[:1]] or not tags
+
+
+def test_ci_runs_the_quick_tests_on_three_systems():
+    job = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text("utf-8"))["jobs"]["quick"]
+    systems = {name.partition("-")[0] for name in job["strategy"]["matrix"]["os"]}
+    assert systems == {"ubuntu", "macos", "windows"}
+    commands = " ".join(step.get("run", "") for step in job["steps"])
+    (quick,) = re.findall(r"\$\(PYTEST\) -n 2 (.*)", (ROOT / "Makefile").read_text("utf-8"))
+    assert quick in commands
 
 
 def test_everything_public_is_there():

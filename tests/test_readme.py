@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import mitsuba_diffraction as md
-
 pytestmark = pytest.mark.usefixtures("coarse")
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
@@ -62,8 +60,3 @@ def test_the_parameter_table_names_ten_that_the_plugin_takes():
 
 def test_it_is_read_in_ten_minutes():
     assert len(README.splitlines()) <= 200
-
-
-def test_changelog_and_package_agree_on_the_version():
-    text = (Path(__file__).parent.parent / "pyproject.toml").read_text(encoding="utf-8")
-    assert f'version = "{md.__version__}"' in text

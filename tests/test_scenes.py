@@ -21,6 +21,7 @@ STUDIO = (
     "cd_window",
     "grating",
     "grating_window",
+    "hologram",
     "material_ball",
     "own_mesh",
     "scales",

@@ -30,7 +30,7 @@ def test_it_renders_at_its_defaults(name: str) -> None:
     assert 0.02 < np.median(image.mean(axis=2)) < 0.8
 
 
-@pytest.mark.parametrize("name", ["film", "spectrometer", "scales_macro", "snake"])
+@pytest.mark.parametrize("name", ["film", "hologram", "spectrometer", "scales_macro", "snake"])
 @pytest.mark.usefixtures("variant")
 def test_it_renders_with_a_gentle_patch(name: str, gentle: dict[str, str]) -> None:
     tiny = {"spp": "2", "resx": "24", "resy": "20"}

@@ -19,9 +19,9 @@ import filelock, psutil, tqdm  # other packages
 for name in ("fcntl", "resource", "termios", "pty", "pwd", "grp"):
     sys.modules[name] = None
 for name in ("fork", "setsid", "killpg", "sched_getaffinity", "getloadavg", "sysconf", "mkfifo"):
-    delattr(os, name)
+    vars(os).pop(name, None)
 for name in ("SIGALRM", "SIGKILL", "SIGHUP", "SIGUSR1", "alarm", "pthread_sigmask"):
-    delattr(signal, name)
+    vars(signal).pop(name, None)
 """
 
 COMMANDS = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import Index, Surface
-from ..tables.energy.store import Energy, SidesEnergy
-from ..tables.energy.transmission import Medium, Sides
-from ..tables.energy.transport import Orders
+from ..tables.energy.conservation import Energy, Surface
+from ..tables.energy.materials import Dielectric, Reflector
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.
@@ -31,12 +30,12 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
     650 nm, not at the nodes for which the scale is computed.
     """
-    materials: dict[str, tuple[str, Index]] = {
-        "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
-        "aluminium": ("small_slope", _aluminium),
-        "none (R = 1)": ("kirchhoff", lambda wavelengths: None),
+    materials = {
+        "dielectric 1.5": Reflector("small_slope", lambda lam: np.full(len(lam), 1.5 + 0j)),
+        "aluminium": Reflector("small_slope", _aluminium),
+        "none (R = 1)": Reflector("kirchhoff", lambda lam: None),
     }
-    return {name: _material_summary(table, *material) for name, material in materials.items()}
+    return {name: _material_summary(table, material) for name, material in materials.items()}
 
 
 def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -50,17 +49,13 @@ def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
     return np.asarray(parts[0] + 1j * parts[1])
 
 
-def _material_summary(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
+def _material_summary(table: DiffractionTable, material: Reflector) -> dict[str, Any]:
     """Return the summary of one material."""
-    energy = Energy(table, model, index, table.wavelength_range).at(1.0)
-    theta, phi = np.radians(ANGLES), _azimuths()
-    surface = Surface(Orders(table), model, index)
-    pairs = [surface.albedos(energy.scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
-    raw, conserved = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
+    raw, conserved = np.moveaxis(_sums(table, material, ANGLES)[:, :, 0], 1, 0)
     removed = 1.0 - conserved / raw
     gains = raw > 1.0
     result: dict[str, Any] = {
-        "model": model,
+        "model": material.model,
         "albedo": _range(raw),
         "albedo, conserved": _range(conserved),
         "taken, largest": round(float(removed.max()), 4),
@@ -83,14 +78,9 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
     Values are the least and the largest of 24 azimuths at 450, 550 and 650 nm, for light from above
     and from below.
     """
-    theta, phi = np.radians(PASSED), _azimuths()
     result: dict[str, Any] = {}
     for name, thin in (("dielectric 1.5, both sides", False), ("sheet 1.5", True)):
-        medium = Medium(1.5, "small_slope", thin)
-        scale = SidesEnergy(table, medium, table.wavelength_range).at(1.0) or None
-        model = Sides(table, 1.0, medium)
-        pairs = [model.sums(scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
-        sums = np.stack(pairs)  # (wavelengths, raw or scaled, sides, angles, azimuths)
+        sums = _sums(table, Dielectric(1.5, "small_slope", thin), PASSED)
         result[name] = {
             f"{kind}, from {side}": {
                 f"{angle:g}°": _range(sums[:, n, m, i]) for i, angle in enumerate(PASSED)
@@ -101,9 +91,18 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
     return result
 
 
-def _azimuths() -> NDArray[np.float64]:
-    """Return azimuths in radians, off the grid's nodes and the axes of symmetry."""
-    return (np.arange(AZIMUTHS, dtype=np.float64) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+def _sums(
+    table: DiffractionTable, material: Reflector | Dielectric, angles: Sequence[float]
+) -> NDArray[np.float64]:
+    """Return R or R + T, (wavelengths, raw or conserved, sides, angles, azimuths).
+
+    Azimuths are off the grid's nodes and the axes of symmetry; angles in degrees.
+    """
+    conservation = Energy(table, material, table.wavelength_range).at(1.0)
+    phi = (np.arange(AZIMUTHS, dtype=np.float64) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+    surface, theta = Surface(table, material), np.radians(angles)
+    pairs = [surface.albedos(conservation, theta, phi, wavelength) for wavelength in WAVELENGTHS]
+    return np.array(pairs, float)
 
 
 def _range(values: NDArray[np.floating]) -> list[float]:

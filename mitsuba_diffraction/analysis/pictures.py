@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
-from ..tables.energy.gain import Boundary
-from ..tables.energy.grid import FINE
-from ..tables.energy.transport import Orders
+from ..tables.energy.conservation import Conservation, Surface
+from ..tables.energy.materials import Reflector
 from ..tables.table import DiffractionTable
 
 RED, GREEN, BLUE = 650.0, 550.0, 450.0  # nm
@@ -142,14 +141,15 @@ def albedo_figure(table: DiffractionTable) -> Figure:
     (shaded) and their mean. Right: the largest over the wavelengths, against both angles; the
     colour scale is centred at 1, where energy is conserved, and ends at the largest value at 80°.
     """
-    orders, weights = Orders(table), FINE.ones
+    surface = Surface(table, Reflector("kirchhoff", lambda wavelengths: None))
     theta = LAST * (1.0 - np.linspace(1.0, 0.0, 64) ** 1.5)  # denser towards grazing angles
     phi = np.arange(0.0, 360.1, 5.0)
     wavelengths = np.geomspace(*table.wavelength_range, WAVELENGTHS)
     azimuths = np.radians(np.concatenate([AZIMUTHS, phi]))
-    boundary, angles = Boundary(None, "kirchhoff"), np.radians(theta)
-    gains = [orders.gain(wavelength, boundary) for wavelength in wavelengths.tolist()]
-    albedo = np.array([orders.transport(angles, azimuths, gain, FINE)(weights) for gain in gains])
+    directions = np.radians(theta), azimuths
+    albedo = np.stack(
+        [surface.albedos(Conservation(), *directions, lam)[0][0] for lam in wavelengths.tolist()]
+    )
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     name = table.source.get("name", "table")
     figure.suptitle(f"{name}: raw directional albedo, R = 1")

@@ -1,15 +1,18 @@
-"""Tables and BSDFs of scans and recipes, for measurements of them."""
+"""Heights, tables and BSDFs of scans and recipes, for measurements of them.
+
+All measurements of a scan share its table in the cache.
+"""
 
 from __future__ import annotations
 
 import tempfile
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import mitsuba as mi
+from typing import Any, NamedTuple
 
 from ..errors import DiffractionWarning
+from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
 from ..heights.recipes import Recipe
@@ -21,33 +24,45 @@ from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
 
-def table_of(
-    path: Path, options: LoadOptions, settings: dict[str, Any], progress: Progress = silent
-) -> DiffractionTable:
-    """Return the table of a file of heights or a recipe, from the cache or built.
+class Scan(NamedTuple):
+    """Heights of a scan, or the patches of a recipe, and the settings of their table."""
+
+    patches: list[HeightField]
+    settings: TableSettings
+
+
+def read_scan(path: Path, options: LoadOptions, settings: Mapping[str, Any]) -> Scan:
+    """Read a file of heights or a recipe.
 
     Parameters
     ----------
-    path : heights of any format, or a recipe, whose own settings the others precede.
+    path : heights of any format, or a recipe.
     options : how heights are read.
-    settings : settings of the table by name.
-    progress : called as progress(done, total, text).
+    settings : settings of the table by name, which precede the recipe's.
 
     Raises
     ------
     DiffractionError
-        If the file cannot be read, or no table can be made of it.
+        If the file cannot be read, or a setting is not allowed.
     """
-    if is_recipe(path):
-        recipe = Recipe.load(path)
-        fields, settings = recipe.fields(options), {**recipe.table, **settings}
-    else:
-        fields = [load_heights(path, options)]
-    asked = TableSettings(**settings)
-    digest = key_of("scan", *(field.digest() for field in fields))
+    if not is_recipe(path):
+        return Scan([load_heights(path, options)], TableSettings(**settings))
+    recipe = Recipe.load(path)
+    return Scan(recipe.fields(options), TableSettings(**{**recipe.table, **settings}))
+
+
+def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
+    """Return the table of a scan, from the cache or built; it keeps its warnings to itself.
+
+    progress : called as progress(done, total, text).
+
+    Raises a DiffractionError if no table can be made of the scan.
+    """
+    patches, settings = scan
+    digest = key_of("scan", *(patch.digest() for patch in patches))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)  # the table keeps its warnings
-        return cached_table(digest, asked, lambda: build_with(fields, asked, progress))
+        warnings.simplefilter("ignore", DiffractionWarning)
+        return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
 def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
@@ -57,6 +72,8 @@ def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
 
     Raises a DiffractionError if a parameter has no valid value.
     """
+    import mitsuba as mi
+
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table.exr"
         table.save(file)

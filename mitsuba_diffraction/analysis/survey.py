@@ -24,20 +24,17 @@ from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
 from ..heights.coherence import REPEATS, widest_window
-from ..heights.field import HeightField
-from ..heights.load import load_heights
 from ..heights.read import is_recipe
 from ..heights.recipes import Recipe
 from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
-from ..scene.load import error_of
-from ..settings import TableSettings
-from ..tables.build.build import build_with
-from ..tables.store import cached_table, key_of
+from ..tables.store import key_of
+from ..tables.table import DiffractionTable
 from .iridescence import WINDOW, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
 from .repeats import sample_of, scan_files, write_repeats
+from .scans import bsdf_of, read_scan, table_of
 from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
@@ -101,7 +98,6 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
 def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
     import drjit as dr
-    import mitsuba as mi
 
     from ..scene.load import set_variant
 
@@ -109,21 +105,21 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
-    fields, settings = _heights(path, job.treatment)
+    scan = read_scan(path, job.treatment.options, job.treatment.settings)
+    patches = scan.patches
     for name in ("range", "rms_height", "rms_slope"):
-        row[f"{name}_um" if name != "rms_slope" else name] = getattr(fields[0], name)
-    (ny, nx), (width, height) = fields[0].shape, fields[0].extent
-    row |= {"patches": len(fields), "pixels_x": nx, "pixels_y": ny}
+        row[f"{name}_um" if name != "rms_slope" else name] = getattr(patches[0], name)
+    (ny, nx), (width, height) = patches[0].shape, patches[0].extent
+    row |= {"patches": len(patches), "pixels_x": nx, "pixels_y": ny}
     row |= {"width_um": width, "height_um": height}
-    gratings, weak = examine_periods(fields[0], PERIODS)
+    gratings, weak = examine_periods(patches[0], PERIODS)
     for n, grating in enumerate(gratings, 1):
         row |= {f"period_{n}_um": grating.period, f"direction_{n}_deg": grating.direction}
         row[f"share_{n}"] = grating.share
     if weak is not None:
         row |= {"weak_period_um": weak.period, "weak_direction_deg": weak.direction}
         row["weak_share"] = weak.share
-    digest = key_of("survey", *(field.digest() for field in fields))
-    table = cached_table(digest, settings, lambda: build_with(fields, settings))
+    table = table_of(scan)
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
     row["coherence_width_um"] = table.coherence_width
@@ -133,33 +129,25 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(table.source.get("warnings", ()))
     phi = gratings[0].direction if gratings else 0.0
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "table.exr"
-        table.save(file)
-        # ideal reflection: the effect of the structure alone, without a material
-        try:
-            bsdf = mi.load_dict({"type": "diffraction", "table": str(file), "material": "none"})
-        except RuntimeError as error:
-            raise error_of("cannot map it", error) from error
-        measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
-        content = file.read_bytes()
+    # ideal reflection: the effect of the structure alone, without a material
+    bsdf = bsdf_of(table, material="none")
+    measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     diffracted = diffracted_light(table, Light(job.theta, phi))
     row["diffracted"] = diffracted.share
     # a smaller scan has too few orders of its own: chance decides
-    enough = widest_window(fields) >= 0.99 * WINDOW
+    enough = widest_window(patches) >= 0.99 * WINDOW
     row["iridescence"] = diffracted.iridescence() if enough else ""
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
-    return {".exr": content, ".png": _png(measured)}
+    return {".exr": _exr(table), ".png": _png(measured)}
 
 
-def _heights(path: Path, treatment: Treatment) -> tuple[list[HeightField], TableSettings]:
-    """Read the patches of a scan or a recipe, and return them with the settings of their table."""
-    if is_recipe(path):
-        recipe = Recipe.load(path)
-        settings = {**recipe.table, **treatment.settings}
-        return recipe.fields(treatment.options), TableSettings(**settings)
-    return [load_heights(path, treatment.options)], TableSettings(**treatment.settings)
+def _exr(table: DiffractionTable) -> bytes:
+    """Encode the table as an EXR file."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table.exr"
+        table.save(file)
+        return file.read_bytes()
 
 
 def _png(brdf_map: BrdfMap) -> bytes:

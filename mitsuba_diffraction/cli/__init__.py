@@ -6,6 +6,7 @@ main                   the parser, and the boundary at which every error becomes
 precompute             from heights to a table
 info                   what is in a file
 tangents               a patch laid smoothly over any mesh
+solve                  orders of a periodic profile
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 tonemap                a linear EXR to a PNG
@@ -16,6 +17,7 @@ survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
 options                options that several commands share, declared once, and their types
+scene_options          the scene, its parameters and materials; a mesh on a stage
 workers                options of commands that may run on many processes
 console                lines and bars on stderr, what Mitsuba says among them; Ctrl-C and SIGTERM
 report                 output files, checked before the work; plain data as text and JSON

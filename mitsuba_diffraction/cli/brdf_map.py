@@ -272,16 +272,20 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
+    from ..plugin.orders.bsdf import DiffractionOrders
+    from ..tables.orders.file import is_order_table
 
     parameters = surface_parameters(args)
     settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)
-    props = mi.Properties("diffraction")
-    for name, value in {"heightfield": str(args.source), **settings, **parameters}.items():
+    solved = is_order_table(args.source)
+    props = mi.Properties("diffraction_orders" if solved else "diffraction")
+    source = "table" if solved else "heightfield"
+    for name, value in {source: str(args.source), **settings, **parameters}.items():
         props[name] = value
-    return Diffraction(props)
+    return DiffractionOrders(props) if solved else Diffraction(props)
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
@@ -304,12 +308,19 @@ def _is_number(text: str) -> bool:
 
 def _surface(bsdf: Any) -> str:
     """Describe the reflecting surface in a line."""
-    table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
+    from ..tables.orders import OrderTable
+
+    table, turn = bsdf.table, bsdf.orientation.degrees[0]
+    turned = [f"turned by {turn:g}°"] if turn != 0.0 else []
+    if isinstance(table, OrderTable):
+        parts = [str(table), f"coherence width {bsdf.coherence_width:g} µm", *turned]
+        return "; ".join(parts)
+    scale = bsdf.height_scale[0]
     return "; ".join(
         [
             "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.model}",
             f"{table.coherence}, coherence width {table.width_text}",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
-            *([f"turned by {turn:g}°"] if turn != 0.0 else []),
+            *turned,
         ]
     )

@@ -25,10 +25,12 @@ _TABLE = ("coherence_width", "wavelength_range")
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "info", run, "describe a table, a height field, a recipe or a mesh",
-        "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "
-        "whether its tangents suit a measured patch.",
+        "Describe a table, a table of orders, a file of heights, a recipe, or a mesh (PLY, OBJ, "
+        "serialized) and whether its tangents suit a measured patch.",
     )  # fmt: skip
-    parser.add_argument("file", metavar="FILE", type=Path, help="table, heights, recipe or mesh")
+    parser.add_argument(
+        "file", metavar="FILE", type=Path, help="table, table of orders, heights, recipe or mesh"
+    )
     options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
     parser.add_argument(
         "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
@@ -77,6 +79,8 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..files import readable_file
     from ..heights.read import is_recipe
     from ..tables.exr import is_table
+    from ..tables.orders import OrderTable
+    from ..tables.orders.file import is_order_table
 
     readable_file(file)
     if is_recipe(file):
@@ -93,6 +97,9 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     if is_table(file):
         _refuse_heights_options(args, "a table")
         return _table(file)
+    if is_order_table(file):
+        _refuse_heights_options(args, "a table of orders")
+        return {"kind": "table of orders", **OrderTable.load(file).summary()}
     return _heights(file, args)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..progress import Progress
 from ..scene.load import load_scene, sensor_of, set_variant
-from . import options
+from . import options, scene_options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
 from .report import check_writable, lines_of, save_report
@@ -31,7 +31,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
         "these, for `precompute` and `render --plan`.",
     )  # fmt: skip
-    options.add_scene(parser)
+    scene_options.add_scene(parser)
     add_plan_options(parser)
     options.add_output(
         parser, "write the recipe; those of further tables are OUT_2.toml and so on", ".toml",
@@ -68,8 +68,8 @@ def planning_variant(requested: str | None) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, report, and return the exit code."""
-    options.put_on_stage(args)
-    parameters = options.scene_parameters(args)
+    scene_options.put_on_stage(args)
+    parameters = scene_options.scene_parameters(args)
     if args.output is not None:
         check_writable(args.output)
     if args.paths > _MOST_PATHS:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "precompute", run, "build the table of a height field",
-        "Build a table of diffraction orders from measured or made heights, and measure its "
+        "Build a table of diffraction orders from measured or generated heights, and measure its "
         "error. Options override the settings of a recipe.",
     )  # fmt: skip
     parser.add_argument(
@@ -93,7 +93,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
             fields = recipe.fields(how)
         else:
             fields = [load_heights(source, how) for source in sources]
-    # Before the table is waited for: whoever treats the heights will not want this one
+    # Warn before the table is built: who treats the heights will need another one
     shortest = settings.wavelength_range[0] / 1000
     # windows are levelled, and fade at their edges
     cut_out = (field for field in fields if field.cut_out and settings.windows is None)

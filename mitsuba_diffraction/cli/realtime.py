@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..extras import optional
 from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
-from . import options
+from . import options, scene_options
 from .brdf_map import add_surface, surface_bsdf
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
@@ -28,7 +29,7 @@ def add_view(subparsers: options.Subparsers) -> None:
         "light with the right one, move with the middle one or shift, zoom with the wheel; "
         "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
     )  # fmt: skip
-    options.add_scene(parser)
+    scene_options.add_scene(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="fast", help="method of the shaders; default: fast"
     )
@@ -51,15 +52,12 @@ def add_view(subparsers: options.Subparsers) -> None:
 
 def view(args: argparse.Namespace) -> int:
     """Show the scene, and return the exit code."""
-    options.put_on_stage(args)
-    parameters = options.scene_parameters(args)
+    scene_options.put_on_stage(args)
+    parameters = scene_options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
-    try:
-        from ..realtime.glsl.viewer import show
-    except ImportError as error:
-        raise DiffractionError(
-            f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
-        ) from error
+    for package in ("moderngl", "moderngl_window", "imgui_bundle"):
+        optional(package)
+    from ..realtime.glsl.viewer import show
 
     _set_variant(args)
     with mitsuba_warnings():
@@ -81,7 +79,7 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "transport; and, as a detail, where both see the same lit surface under lights "
         "without extent, by points and directions in place of the scene's.",
     )  # fmt: skip
-    options.add_scene(parser)
+    scene_options.add_scene(parser)
     options.add_output(
         parser, "for pictures (EXR), sheets (PNG) and compare.json; default: the scene's name "
         "with _compare in the current folder",
@@ -109,8 +107,8 @@ def add_compare(subparsers: options.Subparsers) -> None:
 
 def compare(args: argparse.Namespace) -> int:
     """Compare, and return the exit code."""
-    options.put_on_stage(args)
-    parameters = options.scene_parameters(args)
+    scene_options.put_on_stage(args)
+    parameters = scene_options.scene_parameters(args)
     folder = args.output or Path(f"{args.name.stem}_compare")
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
@@ -145,7 +143,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
         "as fit; the resulting ΔE2000 is printed, and shown on the page.",
     )  # fmt: skip
-    options.add_scene(parser)
+    scene_options.add_scene(parser)
     parser.add_argument(
         "output", metavar="OUT", type=path_ending_in(".html"), help="the page to write"
     )
@@ -162,8 +160,8 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
 
 def export_viewer(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
-    options.put_on_stage(args)
-    parameters = options.scene_parameters(args)
+    scene_options.put_on_stage(args)
+    parameters = scene_options.scene_parameters(args)
     check_writable(args.output)
 
     from ..realtime.web import export_viewer

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError
-from ..scene.denoise import denoised, require_denoiser
+from ..extras import optional
+from ..scene.denoise import denoised
 from ..scene.frames import (
     FILMS,
     MISSING,
@@ -30,9 +31,9 @@ from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, sh
 from ..scene.parameters import values_of_frames
 from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
-from . import options
+from . import options, scene_options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
-from .options import change, number_between, whole_number
+from .options import number_between, whole_number
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, default_output, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
@@ -46,7 +47,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "files while parameters of the scene change; existing frames with the same "
         "settings are kept, so an interrupted run can be continued.",
     )  # fmt: skip
-    options.add_scene(parser)
+    scene_options.add_scene(parser)
     options.add_output(
         parser, "EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
         "the current folder. With --frames: a folder, or a film, .webp, .gif or .mp4, whose "
@@ -76,7 +77,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
     )
     film.add_argument(
-        "--animate", metavar="KEY=FROM:TO", type=change, action="append", default=[],
+        "--animate", metavar="KEY=FROM:TO", type=scene_options.change, action="append", default=[],
         help="change a parameter of the scene from the first frame to the last, e.g. "
         "sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
     )  # fmt: skip
@@ -87,9 +88,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
     film.add_argument(
-        "--fps", metavar="N", type=number_between(1, 100),
-        help="frames a second of the film; default: 24",
-    )  # fmt: skip
+        "--fps", metavar="N", type=number_between(1, 100), help="frames a second; default: 24"
+    )
     add_workers(parser)
     add_threads(parser)
 
@@ -97,7 +97,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
     check_plan_options(args)
-    options.put_on_stage(args)
+    scene_options.put_on_stage(args)
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
@@ -155,7 +155,7 @@ def _outputs(args: argparse.Namespace) -> Outputs:
 
 
 def _on_workers(args: argparse.Namespace) -> int:
-    parameters = options.scene_parameters(args)
+    parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
 
     from ..cluster.frames import FrameRequest
@@ -178,10 +178,10 @@ def _on_workers(args: argparse.Namespace) -> int:
 
 
 def _run_one(args: argparse.Namespace) -> int:
-    parameters = options.scene_parameters(args)
+    parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
     if args.denoise:
-        require_denoiser()
+        optional("pyoidn")
         for path in outputs.denoised:
             check_writable(path)
 
@@ -365,7 +365,7 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 
 def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
-    fixed = options.scene_parameters(args)
+    fixed = scene_options.scene_parameters(args)
     animated = [change.name for change in args.animate]
     names = animated + args.turn
     for name in names:

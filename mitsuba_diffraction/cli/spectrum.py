@@ -135,7 +135,7 @@ def _measured(
     args: argparse.Namespace, file: Path, geometry: Geometry, lam: Any, bar: Bar
 ) -> Spectra:
     """Measure the spectra of one file."""
-    from ..analysis.scans import bsdf_of, table_of
+    from ..analysis.scans import bsdf_of, read_scan, table_of
     from ..analysis.spectra import spectrum
     from ..heights.load import notes_line
     from ..optics.colour import LONGEST, SHORTEST
@@ -158,7 +158,7 @@ def _measured(
         how = options.load_options(args)
         asked = options.table_options(args) | {"wavelength_range": span}
         bar(0, 0, f"tabulating {file.name}")
-        table = table_of(file, how, asked, bar)
+        table = table_of(read_scan(file, how, asked), bar)
         if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
             say(line)
     return spectrum(

@@ -6,7 +6,7 @@ import argparse
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import DiffractionWarning
 from ..scene.load import set_variant
@@ -15,8 +15,18 @@ from .console import Bar
 from .options import number_between
 from .report import check_writable, save_json, save_report
 
-#: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
-_FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
+
+class Effort(NamedTuple):
+    """Sizes of a measurement."""
+
+    side: int  # pixels of the default patch, along either axis
+    pairs: int  # pairs of directions
+    lanes: int  # calls in a kernel launch
+    rounds: int  # timed launches
+    depths: int  # height scales
+
+
+FULL, QUICK = Effort(1332, 240, 1 << 19, 7, 14), Effort(400, 160, 1 << 17, 5, 9)
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -66,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from ..heights import gratings
     from ..heights.coherence import resolved_width
 
-    side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
+    side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     field = options.own_patch(args)
     if field is None:
         field = gratings.elaphe_like(side * PIXEL, side)

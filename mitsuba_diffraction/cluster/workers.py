@@ -13,6 +13,7 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from ..errors import DiffractionError, one_line
+from ..extras import optional
 from ..scene.passes import Stop
 from .tasks import Failed, MissingFiles, check_versions, versions
 
@@ -45,7 +46,7 @@ def connect(
     DiffractionError
         If Dask is not installed, or nobody answers at the address.
     """
-    distributed = require_dask()
+    distributed = optional("distributed")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # ours are the words
     if count is not None:
         import dask
@@ -87,17 +88,6 @@ def connect(
         yield client
 
 
-def require_dask() -> Any:
-    """Import the module `distributed`."""
-    try:
-        import distributed
-    except ImportError as error:
-        raise DiffractionError(
-            "workers need Dask, which is not installed: pip install 'mitsuba-diffraction[cluster]'"
-        ) from error
-    return distributed
-
-
 def check_workers(client: Any, variant: str | None) -> list[str]:
     """Refuse workers that cannot serve, by name, and return the addresses of all.
 
@@ -111,7 +101,7 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
     DiffractionError
         If there are none, or one has several Dask threads, other versions, or no LLVM or GPU.
     """
-    distributed = require_dask()
+    distributed = optional("distributed")
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except (TimeoutError, distributed.TimeoutError) as error:
@@ -171,7 +161,7 @@ class Headcount:
 def outcome(future: Any) -> Any:
     """Return the result of a task, or its error: `MissingFiles`, or `Failed`, also if its workers
     died. None if the scheduler lost it."""
-    distributed = require_dask()
+    distributed = optional("distributed")
     try:
         return future.result()
     except (Failed, MissingFiles) as error:

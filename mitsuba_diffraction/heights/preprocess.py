@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage, sparse
+import scipy
+from scipy import sparse
 from scipy.sparse import linalg
 
 from ..errors import DiffractionError
@@ -137,7 +138,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
 
 def _nearest(heights: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
     """Fill with the height of the nearest measured point (exact Euclidean distance transform)."""
-    rows, columns = ndimage.distance_transform_edt(
+    rows, columns = scipy.ndimage.distance_transform_edt(
         missing, return_distances=False, return_indices=True
     )
     filled: FloatArray = heights[rows, columns]
@@ -331,11 +332,12 @@ def periodic_taper(field: HeightField) -> HeightField:
     The window spans a tenth of the patch on each side; the patch is flat there and reflects more
     like a mirror.
     """
-    from scipy.signal.windows import tukey  # importing it takes half of the package's import time
 
     mean = field.heights.mean()
     # every other sample of a window of 2n + 1: taken at the pixels' centres, near 0 at both ends
-    rows, columns = (tukey(2 * n + 1, 2 * TAPER_SHARE)[1::2] for n in field.shape)
+    rows, columns = (
+        scipy.signal.windows.tukey(2 * n + 1, 2 * TAPER_SHARE)[1::2] for n in field.shape
+    )
     window = rows[:, None] * columns
     heights = mean + (field.heights - mean) * window
     return _reported(

@@ -12,6 +12,7 @@ second_order_change  change of a surface's colours by the second order, for "aut
 mean_second_order    mean of the second order under a thin film, for either direction
 coat       a clear coat over a structure
 through    light that goes through a dielectric, or a thin sheet
+paths      paths of light by a boundary: sides, widths w, matrices, order 0
 colour     spectra to XYZ and sRGB; differences of colours
 display    linear sRGB to the values of a screen, by a view
 """

@@ -118,7 +118,7 @@ MODELS: dict[str, Matrices] = {"small_slope": small_slope, "kirchhoff": kirchhof
 
 
 def matrices_of(model: str) -> Matrices:
-    """Jones matrices of a model by name; an unknown one is refused."""
+    """Return the Jones matrices of a model by name; refuse an unknown name."""
     return MODELS[checked_model(model)]
 
 

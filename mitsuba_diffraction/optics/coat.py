@@ -22,6 +22,8 @@ although the face returns all of it and some leaves in the end (docs/validation/
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -34,6 +36,16 @@ def refracted(direction: ArrayLike, n: float) -> Real:
     outside = np.asarray(direction, np.float64)
     x, y = outside[..., 0] / n, outside[..., 1] / n
     return np.stack([x, y, np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))], axis=-1)
+
+
+def matrices(
+    model: Callable[..., Complex], wi: ArrayLike, wo: ArrayLike, n: float, index: ArrayLike
+) -> Complex:
+    """Jones matrices (..., 2, 2) of a model in the coat; arguments as for `transmitted`.
+
+    model : one of `boundary.MODELS`.
+    """
+    return transmitted(model(refracted(wi, n), refracted(wo, n), index), wi, wo, n, index)
 
 
 def transmitted(

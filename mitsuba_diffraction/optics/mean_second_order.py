@@ -42,8 +42,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from .blend import RoughnessTable, ScaleRoughness, shares
 from .fresnel import Filmed, decaying_root
@@ -59,10 +59,10 @@ LIMIT = 0.5
 #: Number of angles from which on ln g is interpolated linearly between this many nodes.
 NODES = 46
 #: Azimuths of ξ, from 0 to π.
-_AZIMUTHS = 12
+AZIMUTHS = np.pi * (np.arange(12) + 0.5) / 12
 #: i|ε − 1| times this is added to ε of film and material, so that a guided mode is no pole between
 #: nodes. A third or three times of it changes the films of docs/validation/layers.md by 0.5 %.
-_WIDTH = 0.01
+MODE_WIDTH = 0.01
 #: Bands of the spectrum in an octave, and lines in a band: g has no finer features.
 _PER_OCTAVE, _LINES = 4, 3
 #: Bands with less than this share of the variance are left out.
@@ -108,14 +108,15 @@ def exponents(
     """ln g (t,) before the limit at cosines (t,); other arguments as for `mean_gain`."""
     material, film, depth = index.parts
     bare, heights = Filmed(material, film, np.zeros_like(depth)), _heights(roughness, wavenumber)
-    return _of_waves(cosine, index, *heights, index) - _of_waves(cosine, bare, *heights, index)
+    of_film = mean_of_waves(cosine, index, *heights, index)
+    return of_film - mean_of_waves(cosine, bare, *heights, index)
 
 
 def coherent(
     cosine: Real, index: complex, roughness: ScaleRoughness | RoughnessTable, wavenumber: float
 ) -> Real:
     """m (t,) of a material without a film, over all waves in between, at cosines (t,)."""
-    return _of_waves(cosine, Filmed(index, index, 0.0), *_heights(roughness, wavenumber))
+    return mean_of_waves(cosine, Filmed(index, index, 0.0), *_heights(roughness, wavenumber))
 
 
 def _heights(roughness: ScaleRoughness | RoughnessTable, wavenumber: float) -> tuple[Real, Real]:
@@ -166,22 +167,38 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
     nodes = roughness.frequencies
     first, last = np.log2(nodes[[0, -1]])
     frequency = 2.0 ** np.arange(first, last + 1.0, 1.0 / _PER_OCTAVE)
-    variance, _ = nnls(shares(frequency, nodes), roughness.nodes)
+    variance, _ = scipy.optimize.nnls(shares(frequency, nodes), roughness.nodes)
     kept = variance > _LEAST * variance.sum()
     return ScaleRoughness(frequency[kept], variance[kept])
 
 
-def _of_waves(
-    cosine: Real, index: Filmed, step: Real, power: Real, fringes: Filmed | None = None
+def mean_of_waves(
+    cosine: Real,
+    index: Filmed,
+    step: Real,
+    power: Real,
+    fringes: Filmed | None = None,
+    *,
+    azimuths: Real = AZIMUTHS,
+    mode_width: float = MODE_WIDTH,
 ) -> Real:
-    """m (t,) of one film; step, power : from `_heights`; fringes : the film that defines φ."""
+    """Return m (t,) of one film over waves of heights.
+
+    Parameters
+    ----------
+    cosine : (t,) of the light's angle to the normal.
+    index : material and film.
+    step, power : (n,) spatial frequency over k, and variance of k times the heights.
+    fringes : film that defines φ; by default all waves count in full.
+    azimuths : of ξ, radians.
+    mode_width : see `MODE_WIDTH`.
+    """
     sine = np.sqrt(1.0 - cosine**2)
-    azimuth = _azimuths()
-    ux = sine[:, None, None] + step[:, None] * np.cos(azimuth)
-    uy = step[:, None] * np.sin(azimuth)
+    ux = sine[:, None, None] + step[:, None] * np.cos(azimuths)
+    uy = step[:, None] * np.sin(azimuths)
     square = np.maximum(ux**2 + uy**2, 1e-20)
     turn = ux / np.sqrt(square), uy / np.sqrt(square)
-    wave, between = _Film(sine**2, index), _Film(square, index)
+    wave, between = (_Film(k2, index, mode_width) for k2 in (sine**2, square))
     seen = np.ones(square.shape)
     if fringes is not None:
         seen = -np.expm1(-(_apart(sine[:, None, None] ** 2, square, fringes) ** 2))
@@ -202,10 +219,6 @@ def _apart(square: Real, between: Real, index: Filmed) -> Real:
     _, film, depth = index.parts
     first, second = (decaying_root(film**2 - k2 + 0j).real for k2 in (square, between))
     return np.asarray(2.0 * depth.real * (first - second))
-
-
-def _azimuths() -> Real:
-    return np.pi * (np.arange(_AZIMUTHS) + 0.5) / _AZIMUTHS
 
 
 class _Light(NamedTuple):
@@ -245,11 +258,11 @@ class _Film:
     amplitude of p light is H across k; E along k is q/ε times it.
     """
 
-    def __init__(self, square: Real, index: Filmed) -> None:
+    def __init__(self, square: Real, index: Filmed, mode_width: float) -> None:
         material, film, depth = index.parts
         self.square = square
         bare = np.array([1.0, film**2, material**2])
-        self.epsilons = bare + 1j * _WIDTH * np.abs(bare - 1.0)
+        self.epsilons = bare + 1j * mode_width * np.abs(bare - 1.0)
         self.steps = self.epsilons[:-1] - self.epsilons[1:]
         self.inverse_steps = 1.0 / self.epsilons[:-1] - 1.0 / self.epsilons[1:]
         self._q = [decaying_root(e - square) for e in self.epsilons]

@@ -30,8 +30,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from .fresnel import decaying_root
 
@@ -211,7 +211,9 @@ def interpolated(index: float, wi: ArrayLike, wo: ArrayLike) -> Complex:
     turn = np.arctan2(outgoing[..., 1], outgoing[..., 0])
     turn = turn - np.arctan2(-incident[..., 1], -incident[..., 0])
     angles.append(np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi))
-    table = RegularGridInterpolator((nodes, nodes, 2.0 * nodes), coefficient_table(index))
+    table = scipy.interpolate.RegularGridInterpolator(
+        (nodes, nodes, 2.0 * nodes), coefficient_table(index)
+    )
     return np.asarray(table(np.stack(angles, axis=-1)))
 
 

@@ -23,10 +23,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import interp1d
-from scipy.ndimage import map_coordinates
 
 from ..heights.field import HeightField
 
@@ -133,7 +131,7 @@ class SlopeRatios:
         depth = (np.asarray(kappa, np.float64) - low) / (high - low) * (count - 1)
         coordinates = np.stack(np.broadcast_arrays(depth, cells[..., 1], cells[..., 0]))
         ratios = [
-            map_coordinates(part, coordinates.reshape(3, -1), order=1, mode="nearest")
+            scipy.ndimage.map_coordinates(part, coordinates.reshape(3, -1), order=1, mode="nearest")
             for part in (self.values[:, 0], self.values[:, 1])
         ]
         return np.stack(ratios, axis=-1).reshape(*coordinates.shape[1:], 2).astype(complex)
@@ -266,7 +264,9 @@ class CellSums:
         ratios *= self.gate
         ratios /= np.maximum(1.0, np.abs(ratios) / MOST)
         if summed is not nodes:
-            linear = interp1d(summed, summed[:, None, None, None] * ratios, axis=0)
+            linear = scipy.interpolate.interp1d(
+                summed, summed[:, None, None, None] * ratios, axis=0
+            )
             ratios = linear(nodes) / nodes[:, None, None, None]
         halves = np.ascontiguousarray(ratios, np.complex64).view(np.float32).astype(np.float16)
         values = halves.astype(np.float32).view(np.complex64)

@@ -29,14 +29,14 @@ In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. Th
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
+from .coat import refracted
 from .fresnel import amplitudes, decaying_root
-
-#: Boundary models that are known for light that goes through.
-MODELS = ("small_slope", "kirchhoff")
 
 
 def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
@@ -95,6 +95,25 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     zero = np.zeros_like(t_s)
     facet = np.stack([t_s, zero, zero, t_p], axis=-1).reshape(*t_s.shape, 2, 2)
     return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
+
+
+#: Boundary models of light that goes through, by name, as `boundary.MODELS`.
+MODELS: dict[str, Callable[[ArrayLike, ArrayLike, float], Complex]] = {
+    "small_slope": small_slope,
+    "kirchhoff": kirchhoff,
+}
+
+
+def matrices(model: str, wi: ArrayLike, wo: ArrayLike, index: float, thin: bool = False) -> Complex:
+    """Jones matrices (..., 2, 2) of a model by name, of an interface or a thin sheet.
+
+    wi, wo : above and below the surface, (..., 3); below a sheet, beyond its flat other side.
+    """
+    if not thin:
+        return MODELS[model](wi, wo, index)
+    down = np.array([1.0, 1.0, -1.0])
+    inside = refracted(np.asarray(wo, np.float64) * down, index) * down
+    return out_of_sheet(MODELS[model](wi, inside, index), wi, wo, index)
 
 
 def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:

@@ -7,6 +7,7 @@ transmission    the plugin `diffraction_dielectric`, which lets light through as
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, the part that both plugins share
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
+nesting         methods of a BSDF over a nested one
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
@@ -28,10 +29,12 @@ sampling        directions drawn where the orders are
 series          series in κ: weights of a bin's terms, and order 0
 rgb             power and look-up in the RGB variants' colours
 window_positions  where on the patch the window sits at a point of the surface
+energy_factors  factors on heights and lengths for which scales of energy are tabulated
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 boundary        what the material makes of the light, with its polarisation
 second_order    what light diffracted twice makes of orders
+conductors      optical constants of conductors in Mitsuba's tables
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
 layers          a clear coat, a thin film, and how much light reaches what lies beneath
 memory          arrays in the variant's memory, and reading them

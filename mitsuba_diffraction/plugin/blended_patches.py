@@ -72,8 +72,8 @@ Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
 class DiffractionMix(mi.BSDF):
     """Several BSDFs, blended by weights that vary over the surface."""
 
-    #: Feature that shaders do not support, as `Diffraction.not_in_shaders`.
-    not_in_shaders = "a mix of surfaces"
+    #: Feature that shaders do not support, beside those of the surfaces.
+    not_in_shaders = None
 
     def __init__(self, props: Properties) -> None:
         super().__init__(props)
@@ -99,13 +99,13 @@ class DiffractionMix(mi.BSDF):
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """Return f cosθo per wavelength."""
-        weights = [self._weights_at(si, _wide(active, si, wo.z))]
+        weights = [self.weights_at(si, _wide(active, si, wo.z))]
         ask: Ask = lambda bsdf, context, on: [bsdf.eval(context, si, wo, on)]  # noqa: E731
         return self._sum(ctx, weights, ask, "v")[0]
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Return the density of `sample` per solid angle."""
-        shares = [self._shares(ctx, self._weights_at(si, _wide(active, si, wo.z)))]
+        shares = [self._shares(ctx, self.weights_at(si, _wide(active, si, wo.z)))]
         ask: Ask = lambda bsdf, context, on: [bsdf.pdf(context, si, wo, on)]  # noqa: E731
         return self._sum(ctx, shares, ask, "d")[0]
 
@@ -113,7 +113,7 @@ class DiffractionMix(mi.BSDF):
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
         """Return `eval` and `pdf` at once."""
-        weights = self._weights_at(si, _wide(active, si, wo.z))
+        weights = self.weights_at(si, _wide(active, si, wo.z))
         both = [weights, self._shares(ctx, weights)]
         value, density = self._sum(
             ctx, both, lambda bsdf, context, on: bsdf.eval_pdf(context, si, wo, on), "vd"
@@ -132,7 +132,7 @@ class DiffractionMix(mi.BSDF):
 
         Lobes of one direction are that surface's alone.
         """
-        weights = self._weights_at(si, _wide(active, si, sample1, sample2.x))
+        weights = self.weights_at(si, _wide(active, si, sample1, sample2.x))
         shares = self._shares(ctx, weights)
         result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
         chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
@@ -163,7 +163,7 @@ class DiffractionMix(mi.BSDF):
 
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
         """Return the weighted reflectances of the surfaces, for denoisers."""
-        weights = [self._weights_at(si, _wide(active, si))]
+        weights = [self.weights_at(si, _wide(active, si))]
         ask: Ask = lambda bsdf, context, on: [bsdf.eval_diffuse_reflectance(si, on)]  # noqa: E731
         return self._sum(mi.BSDFContext(), weights, ask, "v")[0]
 
@@ -207,7 +207,7 @@ class DiffractionMix(mi.BSDF):
 
     # ------------------------------------------------------------------ the weights
 
-    def _weights_at(self, si: Interaction, active: Mask) -> list[Float]:
+    def weights_at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
         explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
         rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
@@ -258,7 +258,7 @@ class DiffractionMix(mi.BSDF):
         """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
         if any(weight is None or is_attribute(weight) for weight in self.weights.values()):
             return None
-        totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in uv_square()]
+        totals = [sum(self.weights_at(si, True), mi.Float(0.0)) for si in uv_square()]
         if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
             return None
         names = ", ".join(_PREFIX + name for name in self.weights)

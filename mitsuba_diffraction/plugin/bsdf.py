@@ -48,8 +48,8 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. Scales of
-    energy are those of that factor (docs/holograms.md). A table serves factors up to 1.
+    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
+    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
 lateral_scale_max : float [of a bitmap]
     Largest factor of such a texture, above which factors are clipped. Required unless the texture
     is a bitmap.
@@ -136,7 +136,7 @@ second_order : string or boolean [auto]
     matrices by the factor for unpolarised light. Order 0, sampled directions and the light for what
     lies beneath are the same without it. Coefficients follow the index in steps of 0.01.
 energy_conserving : boolean [true]
-    Scales the BSDF by e(ωi) e(ωo) so that no direction reflects more than it receives; reciprocal.
+    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
     The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
     gratings of metal lose some per cent of the light in directions without gain, too
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
@@ -201,8 +201,6 @@ XML and the same in Python:
 
 from __future__ import annotations
 
-import functools
-import operator
 from collections.abc import Iterator
 
 import drjit as dr
@@ -210,7 +208,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.grid import DirectionalTable
+from ..tables.directional import DirectionalTable
+from . import nesting
 from .boundary import Kirchhoff
 from .directions import Pair, vcavity
 from .energy import EnergyModel
@@ -220,7 +219,7 @@ from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 from .support import ABSORBING, refusal
-from .surface import ALL_COMPONENTS, DiffractingSurface
+from .surface import DiffractingSurface
 from .types import (
     BSDF,
     Callback,
@@ -230,7 +229,6 @@ from .types import (
     Interaction,
     Mask,
     Properties,
-    Sample,
     Spectrum,
     Vector2f,
     Vector3f,
@@ -257,122 +255,56 @@ class Diffraction(DiffractingSurface):
         if read.scales_energy:
             mean, conserving = read.surface.mean_table, read.surface.energy_conserving
             self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving)
-        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | mi.BSDFFlags.FrontSide
-        components = [glossy]
         if self.nested is not None:
-            components += [self.nested.flags(n) for n in range(self.nested.component_count())]
             self.parameters.append(ObjectValues("nested", self.nested))
+        components = nesting.components_of(self.nested)
         self.m_components = components  # at once: reading it makes a copy
-        self.m_flags = functools.reduce(operator.or_, components)
+        self.m_flags = nesting.flags_of(components)
         check_parameters([self])
         self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
-    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """Return f cosθo per wavelength."""
-        active = self._lit(si, wo, active)
-        diffracts, nested = self._lobes(ctx)
-        value = mi.Spectrum(0.0)
-        if diffracts:
-            # Eq. 1: (u, v, w) = ωi + ωo
-            pair = self._pair(si, wo, active)
-            # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
-            power = self.power.power(pair, self.scale_at(si, active), si)
-            # Eq. 4 to 10: times N' of the material and the rest
-            value = self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
-        if nested is not None:
-            # T(ωi) T(ωo) f of the BSDF beneath
-            beneath = mi.Spectrum(self._beneath(si, wo, active))
-            value += beneath * self.nested.eval(nested, si, wo, active)
-        return dr.select(active, value, 0.0)
+    eval, pdf, eval_pdf = nesting.evaluate, nesting.density, nesting.evaluate_both
+    sample = nesting.sample
+    eval_diffuse_reflectance = nesting.evaluate_diffuse_reflectance
 
-    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Return the density of `sample` per solid angle."""
-        active = self._lit(si, wo, active)
-        diffracts, nested = self._lobes(ctx)
-        density = mi.Float(0.0)
-        if diffracts:
-            pair = self._pair(si, wo, active).outer
-            density = with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
-        if nested is not None:
-            beneath = self.nested.pdf(nested, si, wo, active)
-            density = dr.lerp(beneath, density, self._glossy_share(diffracts, si, active))
-        return dr.select(active, density, 0.0)
+    def diffracted_value(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+    ) -> Spectrum:
+        """See `Nesting.diffracted_value`."""
+        # Eq. 1: (u, v, w) = ωi + ωo
+        pair = self._pair(si, wo, active)
+        # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
+        power = self.power.power(pair, self.scale_at(si, active), si)
+        # Eq. 4 to 10: times N' of the material and the rest
+        return self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
 
-    def eval_pdf(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    def diffracted_density(self, si: Interaction, wo: Vector3f, active: Mask) -> Float:
+        """See `Nesting.diffracted_density`."""
+        pair = self._pair(si, wo, active).outer
+        return with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
+
+    def diffracted_both(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
-        """Return `eval` and `pdf` at once."""
-        active = self._lit(si, wo, active)
-        diffracts, nested = self._lobes(ctx)
-        value, density = mi.Spectrum(0.0), mi.Float(0.0)
-        if diffracts:
-            pair = self._pair(si, wo, active)
-            scales = self.scale_at(si, active), self._drawing_scale(si, active)
-            power, orders = self.power.both(pair, *scales, si)
-            density = with_even_share(orders)
-            value = self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
-        if nested is not None:
-            beneath = mi.Spectrum(self._beneath(si, wo, active))
-            nested_value, nested_density = self.nested.eval_pdf(nested, si, wo, active)
-            value += beneath * nested_value
-            density = dr.lerp(nested_density, density, self._glossy_share(diffracts, si, active))
-        return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
+        """See `Nesting.diffracted_both`."""
+        pair = self._pair(si, wo, active)
+        scales = self.scale_at(si, active), self._drawing_scale(si, active)
+        power, orders = self.power.both(pair, *scales, si)
+        value = self.diffracted(ctx, si, pair, power, active)
+        return self.layering.diffraction_share * value, with_even_share(orders)
 
-    def sample(
-        self,
-        ctx: Context,
-        si: Interaction,
-        sample1: Float,
-        sample2: Vector2f,
-        active: Mask = True,
-    ) -> tuple[Sample, Spectrum]:
-        """Draw a direction; return it with f cosθo over its density.
-
-        Lobes of a nested BSDF that have a single direction are returned alone: the diffraction has
-        no share in them. All others are mixed with it, in value and density.
-        """
-        active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
-        diffracts, nested = self._lobes(ctx)
-        result = dr.zeros(mi.BSDFSample3f)
-        result.eta = 1.0
-        result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        share, delta, weight = mi.Float(1.0), mi.Mask(False), mi.Spectrum(0.0)
-        if nested is not None:
-            share = self._glossy_share(diffracts, si, active)
-            chosen = active & (sample1 >= share)
-            remaining = (sample1 - share) / dr.select(chosen, 1.0 - share, 1.0)
-            below, weight = self.nested.sample(nested, si, remaining, sample2, chosen)
-            below.sampled_component += 1
-            result = dr.select(chosen, below, result)
-            delta = chosen & mi.has_flag(below.sampled_type, mi.BSDFFlags.Delta)
-            sample1 = dr.select(chosen, sample1, sample1 / dr.select(chosen, 1.0, share))
-        if diffracts:
-            drawn = self._draw(si, sample1, sample2, active)
-            result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
-        value, density = self.eval_pdf(ctx, si, result.wo, active & ~delta)
-        value = value / dr.select(density > 0.0, density, 1.0)
-        if nested is not None:
-            beneath = mi.Spectrum(self._beneath(si, result.wo, delta))
-            value = dr.select(delta, beneath * weight / dr.select(delta, 1.0 - share, 1.0), value)
-            density = dr.select(delta, result.pdf * (1.0 - share), density)
-        active &= (density > 0.0) & (mi.Frame3f.cos_theta(result.wo) > 0.0)
-        result.pdf = dr.select(active, density, 0.0)
-        return result, dr.select(active, value, 0.0)
-
-    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
-        """Return the reflectance at normal incidence, nested BSDF included, for denoisers."""
+    def normal_reflectance(self, si: Interaction, active: Mask) -> Spectrum:
+        """See `Nesting.normal_reflectance`."""
         reflectance = mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), si, active))
         if self.nested is not None:
-            level = mi.SurfaceInteraction3f(si)
-            level.wi = mi.Vector3f(0.0, 0.0, 1.0)
-            beneath = self._beneath(level, level.wi, active)
-            nested = self.nested.eval_diffuse_reflectance(level, active)
-            reflectance = (
-                self.layering.diffraction_share * reflectance + mi.Spectrum(beneath) * nested
-            )
-        return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
+            reflectance *= self.layering.diffraction_share
+        return reflectance
+
+    def reflected_share(self, si: Interaction, active: Mask) -> Colour:
+        """See `Nesting.reflected_share`."""
+        return self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
 
     def traverse(self, callback: Callback) -> None:
         """Expose the parameters that may change without another table."""
@@ -403,7 +335,7 @@ class Diffraction(DiffractingSurface):
             power = power + others * mi.UnpolarizedSpectrum(added)
         power = factor * power
         if self._energy is not None and self._energy.active_factors:
-            # Energy scales e(ωi) e(ωo), so that no direction reflects more than it receives
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
             power *= self._energy.factor(pair, k, scale)
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, si, pair, self.boundary, power, active)
@@ -411,15 +343,14 @@ class Diffraction(DiffractingSurface):
             value += self.face(ctx, si, pair.outer, self.mirror, active)
         return value
 
-    def _beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
-        """Factor of the nested BSDF."""
+    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
+        """See `Nesting.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
         if self._energy is not None and isinstance(self.layering, Transmission):
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
-                self._energy.reflected(frame.turned(d), mi.Frame3f.cos_theta(d), k, scale)
-                for d in (si.wi, wo)
+                self._energy.reflected(direction, frame, k, scale) for direction in (si.wi, wo)
             )
         return self.layering.beneath(si, wo, active, ratios)
 
@@ -433,25 +364,8 @@ class Diffraction(DiffractingSurface):
         pair = Pair(si, wo, self.frame_at(si, active), active)
         return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
-    def _lit(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
-        """Mask of lanes whose two directions lie above the surface."""
-        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
-        return mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
-
-    def _lobes(self, ctx: Context) -> tuple[bool, Context | None]:
-        """Whether a context asks for the diffraction, and its request to the nested BSDF."""
-        diffracts = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
-        if self.nested is None or ctx.component == 0:
-            return diffracts, None
-        lobes = self.nested.flags()
-        asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
-        if ctx.component != ALL_COMPONENTS:
-            asked.component -= 1
-            lobes = self.nested.flags(asked.component)
-        return diffracts, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
-
-    def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
-        """Draw a direction, possibly below the surface, where it has no density and no value."""
+    def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
+        """See `Nesting.draw`."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self._drawing_scale(si, active)),
@@ -462,15 +376,6 @@ class Diffraction(DiffractingSurface):
         total = self.frame_at(si, active).from_table(uv)
         ordered = direction_of(total - mi.Vector2f(si.wi.x, si.wi.y))
         return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
-
-    def _glossy_share(self, diffracts: bool, si: Interaction, active: Mask) -> Float:
-        """Share of the samples for diffraction over a nested BSDF: by reflected power."""
-        if not diffracts:
-            return mi.Float(0.0)
-        reflectance = self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
-        mean = dr.mean(mi.unpolarized_spectrum(reflectance))
-        # A nested BSDF is taken to return half of the light that it receives
-        return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
 
     # ------------------------------------------------------------------ changes of parameters
 
@@ -488,10 +393,7 @@ class Diffraction(DiffractingSurface):
         """Compute what depends on the parameters: indices, scales of energy, the second order."""
         self.fresnel.derive()
         if self._energy is not None:
-            scales = self.scale_range()
-            self._energy.update(
-                scales.largest, scales.differentiable, self._light_beneath, scales.lowest
-            )
+            self._energy.update(self.scale_range(), self._light_beneath)
         if self._second_order is not None:
             self._second_order.update()
         material = self.boundary.material
@@ -534,7 +436,7 @@ class Diffraction(DiffractingSurface):
     def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
         """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
 
-        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
+        (polar + 1, azimuthal) on `tables.directional.FINE`.
         """
         if self._energy is None or not self._energy.conserving:
             return None

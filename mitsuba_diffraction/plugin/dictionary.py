@@ -10,6 +10,7 @@ import mitsuba as mi
 from ..errors import DiffractionError, quoted
 from ..heights.field import HeightField
 from ..tables.orders import OrderTable
+from ..tables.orders.file import is_order_table
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -65,6 +66,8 @@ def bsdf_dict(
     arguments = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, OrderTable):
         return {"type": ORDERS, "data": OrderData(field), **arguments}
+    if isinstance(field, str | os.PathLike) and is_order_table(field):
+        return {"type": ORDERS, "table": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):
         return {"type": plugin, "heightfield": os.fspath(field), **arguments}
     if not isinstance(field, HeightField):

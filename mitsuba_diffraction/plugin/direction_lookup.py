@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.energy.grid import SHARE, DirectionalTable
+from ..tables.directional import SHARE, DirectionalTable
+from .directions import PatchFrame
+from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
-from .types import Buffer, Float, Index, Vector2f
+from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 Array = NDArray[np.float32]
 
@@ -32,17 +34,14 @@ class DirectionLookup:
         self._pages = self._polar = self._azimuthal = 1
 
     def update(
-        self,
-        tables: list[DirectionalTable] | None,
-        nodes: list[float],
-        height_scale: float,
-        varies: bool,
+        self, tables: list[DirectionalTable] | None, nodes: list[float], scales: ScaleRange
     ) -> None:
         """Take the tables at evenly spaced height scales, or none."""
         self.present = tables is not None
         if tables is None:
             return
-        maps = np.stack([_cells(table) for table in tables])
+        height_scale, varies = scales.height_scale, scales.varies
+        maps = np.stack([_cells(table, scales.centre) for table in tables])
         self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
@@ -60,10 +59,19 @@ class DirectionLookup:
         dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
 
     def at(
-        self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
+        self,
+        direction: Vector3f,
+        cosine: Float,
+        frame: PatchFrame,
+        wavenumbers: list[Float],
+        height_scale: Float,
     ) -> list[Float]:
-        """For each channel; tangential in the patch's frame."""
-        share = None
+        """Return the value of each channel for a direction in the shading frame.
+
+        cosine : of its angle to the normal, on the side that the function is of.
+        """
+        tangential, share = frame.turned(direction), None
+        height_scale = height_scale * dr.rcp(frame.stretch)
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
         cell, s, t = self._cell(*self._place(tangential, cosine))
@@ -77,7 +85,7 @@ class DirectionLookup:
             return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
         values = []
         for k in wavenumbers:
-            place = (self._first - dr.log2(k)) * self._pages_per_log
+            place = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
             n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
             values.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
         return values
@@ -130,14 +138,17 @@ def between(
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def _cells(table: DirectionalTable) -> Array:
+def _cells(table: DirectionalTable, stretch: float) -> Array:
     """Values at the corners of each cell, (rows, columns, channels or wavelengths, 4).
+
+    stretch : factor from the table's wavelengths to those of the light.
 
     All wavelengths of a cell lie together: a call reads several of them, within few cache lines.
     """
     values = table.values
     if mi.is_rgb and len(values) > 1:
-        values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
+        weights = _sensitivities(table.wavelengths * stretch)
+        values = np.tensordot(weights, values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)
     corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
     return np.stack(corners, axis=-1).transpose(1, 2, 0, 3)

@@ -91,20 +91,15 @@ class Pair:
         """The pair outside of a coat."""
         return self
 
-    @property
-    def cos_half(self) -> Float:
-        """Cosine of the angle between either direction and the half vector."""
-        return dr.safe_sqrt(0.5 * self.one_plus_dot)
-
     @cached_property
     def incident(self) -> Vector2f:
         """Tangential part of ωi, in the patch's frame."""
         return self.frame.turned(self.wi)
 
-    @cached_property
-    def outgoing(self) -> Vector2f:
-        """Tangential part of ωo, in the patch's frame."""
-        return self.frame.turned(self.wo)
+    @property
+    def cos_half(self) -> Float:
+        """Cosine of the angle between either direction and the half vector."""
+        return dr.safe_sqrt(0.5 * self.one_plus_dot)
 
 
 @dataclass(frozen=True)

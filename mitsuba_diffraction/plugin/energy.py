@@ -1,6 +1,6 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by e(ωi) e(ωo), reciprocal, where the model would reflect more than
+What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
 it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
@@ -19,17 +19,18 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import Conservation
-from ..tables.energy.grid import FINE, DirectionalTable
-from ..tables.energy.store import Energy
+from ..tables.directional import FINE, DirectionalTable
+from ..tables.energy.conservation import Conservation, Energy
+from ..tables.energy.materials import Reflector
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
 from .direction_lookup import DirectionLookup, between, scales_of
-from .directions import Pair
+from .directions import Pair, PatchFrame
+from .energy_factors import ScaleRange
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import UnderFilm, plain
-from .types import Colour, Float, Vector2f
+from .types import Colour, Float, Vector3f
 
 Array = NDArray[np.float32]
 #: Of wavelengths (n,).
@@ -63,58 +64,50 @@ class EnergyModel:
     def __init__(
         self, table: DiffractionTable, boundary: Boundary, wavelength: float, conserving: bool
     ) -> None:
-        low, high = table.wavelength_range
-        if mi.is_monochromatic:
-            low = high = wavelength
+        mono = wavelength, wavelength
+        self._table, self._model = table, str(boundary)
+        self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self._material = conserving, boundary.material
-        self._indices, self._exact = (
-            partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
-        )
-        model = str(boundary)
-        self._energy = Energy(table, model, self._indices, (low, high))
         self._warned = False
         self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
-    def update(
-        self,
-        height_scale: float,
-        differentiable: bool,
-        beneath: bool,
-        lowest: float | None = None,
-    ) -> None:
-        """Look up, or compute, what belongs to another height scale or material.
+    def update(self, scales: ScaleRange, beneath: bool) -> None:
+        """Look up, or compute, what belongs to other factors or another material.
 
         s is linear between height scales, 1 among them. At one of them its derivative is that of
         the interval above; g has derivatives of its own.
 
-        beneath : whether light goes on to something.
-        lowest : where height scales vary, the least of them; then height_scale is the largest.
+        scales : the factors; beneath : whether light goes on to something.
         """
+        self._scales = scales
+        material = Reflector(self._model, partial(self._indices, INDEX_STEP))
+        self._energy = Energy(self._table, material, scales.wavelengths(self._range))
         if not (self.conserving or beneath or self._filmed):
             return
-        if lowest is None:
-            nodes = list(self._energy.nodes(height_scale, interval=differentiable))
-        else:
-            nodes = self._energy.between(lowest, height_scale)
+        nodes = scales.nodes(self._energy)
         if self._filmed:
             # g costs little at any height scale: its slope is taken there, and not from nodes of s,
             # on both sides of which it differs by some per cent
-            near = [height_scale, height_scale + (NEAR if differentiable else 0.0)]
-            around = near if lowest is None else nodes
-            means = [self._mean_gain(node) for node in around]
-            self._mean.update(means, around, height_scale, lowest is not None)
+            height_scale = scales.height_scale
+            near = [height_scale, height_scale + (NEAR if scales.differentiable else 0.0)]
+            around = nodes if scales.varies else near
+            self._mean.update([self._mean_gain(node) for node in around], around, scales)
         if not (self.conserving or beneath):
             return
         conserved = [self._energy.at(node) for node in nodes]
         if self.conserving:
-            scales = scales_of([energy.scale for energy in conserved])
             self._warn(conserved)
-            self._scale.update(scales, nodes, height_scale, lowest is not None)
+            self._scale.update(scales_of([energy.scale for energy in conserved]), nodes, scales)
         if beneath:
             ratios = [self._ratio(energy.albedo) for energy in conserved]
-            self._reflected.update(ratios, nodes, height_scale, lowest is not None)
+            self._reflected.update(ratios, nodes, scales)
+
+    def _indices(self, step: float, wavelengths: NDArray[np.float64]) -> Indices | None:
+        """Return indices to a step, of the light that tables have at these wavelengths."""
+        light = np.clip(wavelengths * self._scales.centre, *self._range)
+        return _rounded_indices(self._material, step, light)
 
     def _warn(self, conserved: list[Conservation]) -> None:
         """Say once that much is taken of a real material."""
@@ -131,21 +124,25 @@ class EnergyModel:
             )
 
     def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale e over wavelengths, (polar + 1, azimuthal)."""
+        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
+        height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
         scales = scales_of([energy.scale for energy in conserved])
         if scales is None:
             return None
         scale = between([scale.on(FINE) for scale in scales], nodes, height_scale)
-        weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
+        wavelengths = scale.wavelengths * self._scales.centre
+        weights = response(wavelengths)[:, 1] * wavelengths
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
         """Return the table that `reflected` looks up, for shaders."""
+        height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
-        return between(ratios, nodes, height_scale)
+        ratio = between(ratios, nodes, height_scale)
+        return DirectionalTable(ratio.wavelengths * self._scales.centre, ratio.values)
 
     @property
     def active_factors(self) -> int:
@@ -153,7 +150,7 @@ class EnergyModel:
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """e(ωi) e(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
+        """Return s(ωi) s(ωo) per channel; of a film g(ωi) g(ωo) too (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
@@ -162,8 +159,8 @@ class EnergyModel:
         for lookup in (self._scale, self._mean):
             if lookup.present:
                 both = zip(
-                    lookup.at(pair.incident, pair.cos_i, wavenumbers, height_scale),
-                    lookup.at(pair.outgoing, pair.cos_o, wavenumbers, height_scale),
+                    lookup.at(pair.wi, pair.cos_i, pair.frame, wavenumbers, height_scale),
+                    lookup.at(pair.wo, pair.cos_o, pair.frame, wavenumbers, height_scale),
                     strict=True,
                 )
                 product *= mi.UnpolarizedSpectrum(
@@ -172,21 +169,27 @@ class EnergyModel:
         return product
 
     def reflected(
-        self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
+        self,
+        direction: Vector3f,
+        frame: PatchFrame,
+        wavenumbers: list[Float],
+        height_scale: Float,
     ) -> Colour:
         """a(ω) over the flat interface's reflectance, per channel; `update` was told `beneath`."""
+        cosine = mi.Frame3f.cos_theta(direction)
         return mi.UnpolarizedSpectrum(
-            self._reflected.at(tangential, cosine, wavenumbers, height_scale)
+            self._reflected.at(direction, cosine, frame, wavenumbers, height_scale)
         )
 
     def _mean_gain(self, height_scale: float) -> DirectionalTable:
         """g at a height scale."""
-        exponents = mean_exponents(self._energy.table, self._exact, self._energy.wavelength_range)
+        exact = partial(self._indices, FILM_STEP)
+        exponents = mean_exponents(self._table, exact, self._energy.wavelength_range)
         values = limited(exponents.values * height_scale**2).astype(np.float32)
         return DirectionalTable(exponents.wavelengths, values)
 
     def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
-        index = self._indices(albedo.wavelengths)
+        index = self._indices(INDEX_STEP, albedo.wavelengths)
         assert index is not None  # without an index no light goes beneath
         flat = fresnel.reflectance(np.cos(albedo.grid.theta), index[:, None])
         # of an index of 1 there is neither

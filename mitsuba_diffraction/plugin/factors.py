@@ -142,6 +142,21 @@ class LateralScale:
             return self.varying.at(si, active) * (1.0 / self.of_table)
         return self._number.value * (1.0 / self.of_table) if self._number is not None else 1.0
 
+    def range_over_table(self) -> tuple[float, float]:
+        """Return the least and the largest factor over that of the table, as far as known."""
+        if self.varying is not None:
+            low, high = self.varying.range()
+            return low / self.of_table, min(high, self.varying.high) / self.of_table
+        if self._number is None:
+            return 1.0, 1.0
+        factor = float(dr.slice(dr.detach(self._number.value))) / self.of_table
+        return factor, factor
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether derivatives with respect to the number are wanted."""
+        return self._number is not None and dr.grad_enabled(self._number.value)
+
     def traverse(self, callback: Callback) -> None:
         """Expose the number or the texture."""
         for part in (self._number, self.varying):

@@ -6,10 +6,8 @@ at both of a film.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -19,7 +17,14 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..optics import fresnel
-from ..optics.colour import metal_tint
+from ..optics.colour import LONGEST, SHORTEST, metal_tint
+from .conductors import (
+    extended_texture,
+    tabulated,
+    tabulated_range,
+    texture_at,
+    unknown_conductor,
+)
 from .parameter_changes import Bounded, Changeable, ObjectValues, children
 from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
@@ -130,6 +135,9 @@ INDEX_PARTS = {"eta": INDICES, "k": (0.0, INDICES[1])}
 Array = NDArray[Any]
 #: Wavelengths of a metal's spectrum that its colour is made of, nm.
 _VISIBLE = np.arange(380.0, 780.0)
+#: Wavelengths that a table of optical constants has to cover, nm. Daylight beyond is 0.3 % of what
+#: eyes see; there the index is that of the nearest end of the table.
+_REQUIRED = (400.0, 700.0)
 
 
 class Perfect:
@@ -241,14 +249,26 @@ class Conductor:
         """Return one of Mitsuba's tabulated conductors, by the names that `roughconductor` accepts.
 
         wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
+
+        Raises a DiffractionError if the material is unknown, or its table is too short.
         """
         objects = children(_load("conductor", material=material))
+        first, last = tabulated_range(material) or (SHORTEST, LONGEST)
+        needed = (wavelength, wavelength) if mi.is_monochromatic else _REQUIRED
+        if not first <= needed[0] <= needed[1] <= last:
+            raise DiffractionError(
+                f"material={material!r} is tabulated from {first:.4g} to {last:.4g} nm, and light "
+                f"from {needed[0]:g} to {needed[1]:g} nm needs it; choose another material, or "
+                "give spectra of eta and k"
+            )
         if mi.is_monochromatic:
-            objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
+            objects = {name: texture_at(material, name, wavelength) for name in INDEX_PARTS}
+        elif mi.is_spectral and not first <= SHORTEST < LONGEST <= last:
+            objects = {name: extended_texture(material, name) for name in INDEX_PARTS}
         eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
         conductor = cls(eta, k, material)
         if mi.is_rgb:
-            index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
+            index = tabulated(material, "eta", _VISIBLE) + 1j * tabulated(material, "k", _VISIBLE)
             conductor._spectrum = index, conductor._channels()
         return conductor
 
@@ -317,52 +337,8 @@ def _load(plugin: str, **parameters: float | str) -> BSDF:
         arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
         if plugin == "conductor":
-            raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
+            raise DiffractionError(unknown_conductor(str(parameters["material"]))) from error
         raise DiffractionError(
             f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
             "name from Mitsuba's table of materials, or eta and k"
         ) from error
-
-
-def _unknown_conductor(material: str) -> str:
-    """Return the message on an unknown conductor, with the names of known ones."""
-    names = _conductors()
-    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
-    listed = [name for name in names if name.lower() in close] or names
-    hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
-    return (
-        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
-        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
-    )
-
-
-def _conductors() -> list[str]:
-    """Return names of tabulated conductors, without second entries from Palik's table."""
-    folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
-    return sorted(
-        (name for name in names if name.removesuffix("_palik") not in names - {name}),
-        key=str.lower,
-    )
-
-
-def tabulated_range(material: str) -> tuple[float, float] | None:
-    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
-    if not file.is_file():
-        return None
-    nodes = np.loadtxt(file)[:, 0]
-    return float(nodes[0]), float(nodes[-1])
-
-
-def _at(material: str, name: str, wavelength: float) -> Texture:
-    """Part of a material's index at one wavelength, as a texture."""
-    value = float(_tabulated(material, name, wavelength))
-    return mi.load_dict({"type": "uniform", "value": value})
-
-
-def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
-    """Part of a material's index, as Mitsuba has it tabulated."""
-    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
-    nodes, values = np.loadtxt(file).T
-    return np.asarray(np.interp(wavelengths, nodes, values))

@@ -1,6 +1,6 @@
-"""Reading a table inside a Dr.Jit kernel: a few gathers, no Fourier transform.
+"""Look-up of a table inside a Dr.Jit kernel: a few gathers, no Fourier transform.
 
-The twin of `tables.lookup`, which says what is summed. All terms of one bin are contiguous and
+Twin of `tables.lookup`, which has the sums. All terms of one bin are contiguous and
 aligned, so that one packet load fetches them: this alignment alone is worth a factor of two. They
 are multiplied with the weights of a series in κ (`plugin.series`).
 """
@@ -72,8 +72,8 @@ class DeviceTable:
     ) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
 
-        qx, qy, kappa : mi.Float, rad/µm. What light cannot probe is NaN, never a guess; beyond
-            the `frequency_limit` of a table it is 0.
+        qx, qy, kappa : mi.Float, rad/µm. Frequencies that light cannot probe give NaN; those
+            beyond the `frequency_limit` of a table give 0.
         windows : positions of windows; empty for the table's own.
         """
         grid, expansion = self.grid, self.expansion
@@ -285,7 +285,7 @@ def _turned(value: Rotation, angle: Rotation, total: Rotation) -> Rotation:
 
 
 def _summed(first: Rotation, second: Rotation) -> Rotation:
-    """(cos, sin) of the sum of two angles, times what weights they have."""
+    """(cos, sin) of the sum of two angles, times their weights."""
     (x, y), (cos, sin) = first, second
     return dr.fma(x, cos, -y * sin), dr.fma(x, sin, y * cos)
 
@@ -306,7 +306,7 @@ def _log2(exponent: float) -> float:
 
 
 def device_table(table: DiffractionTable) -> DeviceTable:
-    """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
+    """Return the table in the current variant's memory, uploaded once for all BSDFs."""
     variants = _uploaded.setdefault(table, {})
     if mi.variant() not in variants:
         variants[mi.variant()] = DeviceTable(table)

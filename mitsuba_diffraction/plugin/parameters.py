@@ -152,8 +152,6 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.PLACED if coherence_of(props) == SURFACE else support.PATCH
     if isinstance(dict(props.objects()).get("height_scale"), mi.Texture):
         yield support.VARYING
-    if "lateral_scale" in props:
-        yield support.STRETCHED
     if mi.is_rgb:
         yield support.COLOURS
 

@@ -21,6 +21,7 @@ from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.exr import is_table
+from ..tables.orders.file import is_order_table
 from ..tables.store import cached_table, key_of, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
@@ -94,6 +95,11 @@ def table_of_file(
     factors : the factors that are asked for.
     provider : gets the tables of heights.
     """
+    if is_order_table(path):
+        raise DiffractionError(
+            f"'{path}' is a table of orders, which the BSDF 'diffraction_orders' has as its table; "
+            "change the type of the BSDF, or give heights"
+        )
     if must_be_table or is_table(path):
         table = loaded_table(path)
         _check_agreement(path, table, options, asked)

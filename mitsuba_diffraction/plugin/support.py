@@ -57,7 +57,6 @@ PATCH = Support("coherence='patch'", second_order=False)
 PLACED = Support("coherence='surface'", second_order=False, shaders=False)
 COLOURS = Support("an RGB variant, whose light has no wavelengths to tell speckle by", placed=False)
 VARYING = Support("a height_scale that varies", shaders=False)
-STRETCHED = Support("lateral_scale", shaders=False)
 TRANSMISSION = Support(
     "the plugin diffraction_dielectric, through which light goes",
     nested=False, placed=False,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from .boundary import Boundary
 from .directions import Pair, PatchFrame
+from .energy_factors import ScaleRange
 from .factors import LEAST_SCALE, VaryingFactor
 from .fresnel import Reflectance, tinted
 from .layers import CoatedPair, UnderCoat, UnderFilm
@@ -19,21 +20,6 @@ from .parameter_changes import Bounded, Changeable, arrays_within, marks, take_c
 from .power import power_model
 from .surface_parameters import SurfaceParameters
 from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
-
-#: Component of a context that asks for all of them.
-ALL_COMPONENTS = 0xFFFFFFFF
-
-
-class ScaleRange(NamedTuple):
-    """Height scales that energy is conserved for.
-
-    largest : of the surface; lowest : where they vary, else None.
-    differentiable : whether derivatives with respect to the height scale are wanted.
-    """
-
-    largest: float
-    differentiable: bool
-    lowest: float | None
 
 
 class DiffractingSurface(mi.BSDF):
@@ -90,6 +76,16 @@ class DiffractingSurface(mi.BSDF):
         bounded = Bounded("height_scale", factor, LEAST_SCALE, most, partial(_scale_refusal, most))
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
         self._scale_changeable = (bounded,)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return self.table.sigma
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Shortest wavelength that the table serves, nm."""
+        return self.table.wavelength_range[0]
 
     # ------------------------------------------------------------------ the model
 
@@ -179,10 +175,13 @@ class DiffractingSurface(mi.BSDF):
         )
 
     def scale_range(self) -> ScaleRange:
-        """Return the height scales that energy is to be conserved for."""
+        """Return the factors that energy is to be conserved for."""
         largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-        lowest = self._varying.range()[0] if self._varying else None
-        return ScaleRange(largest, dr.grad_enabled(self.height_scale), lowest)
+        lowest = self._varying.range()[0] if self._varying else largest
+        stretch = self.lateral_scale.range_over_table()
+        differentiable = dr.grad_enabled(self.height_scale) or self.lateral_scale.differentiable
+        varies = bool(self._varying or self.lateral_scale.varying)
+        return ScaleRange((lowest, largest), stretch, varies, differentiable)
 
     def freeze(self, holders: Iterable[Any], *constants: object) -> None:
         """Tell `dr.freeze` all arrays, and constants for which kernels are others.

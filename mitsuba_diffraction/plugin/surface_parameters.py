@@ -17,7 +17,7 @@ from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
-from .dictionary import PLUGINS
+from .dictionary import ORDERS, PLUGINS
 from .factors import HEIGHT, LATERAL, LateralScale, VaryingFactor, largest_of, read_factor
 from .llvm import require_loaded_llvm
 from .properties import choice, flag, kind_of, number
@@ -67,6 +67,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
         *_COMMON, *PLACING, "second_order", "material", "eta", "k", *_LAYERS, "shadowing",
     ),
     TRANSMITTING: (*_COMMON, "thin"),
+    ORDERS: ("table", "data", "coherence_width", "orientation", "wavelength"),
 }  # fmt: skip
 
 

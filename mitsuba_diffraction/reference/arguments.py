@@ -69,7 +69,7 @@ def model_of(
     index: NDArray[np.complex128] | Filmed | None,
     models: Iterable[str] = MODELS,
 ) -> str:
-    """Name of the model, one of `models`: by default "small_slope" where there is an index."""
+    """Return the name of the model, one of `models`; with an index the default is "small_slope"."""
     if model is None:
         return "kirchhoff" if index is None else "small_slope"
     if checked_model(model, models) != "kirchhoff" and index is None:
@@ -86,7 +86,7 @@ def index_of(
     wavelength: NDArray[np.float64],
     film: tuple[complex, float] | None,
 ) -> NDArray[np.complex128] | Filmed | None:
-    """Index eta + ik, (n,), under a film where there is one; None for a perfect reflector."""
+    """Return the index eta + ik (n,), with the film if any; None for a perfect reflector."""
     if eta is None:
         if film is not None:
             raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")

@@ -10,6 +10,7 @@ denoise      pictures without noise, by Open Image Denoise
 frames       frames of an animation, and a film of them
 additions    meshes and materials put into a scene before Mitsuba makes its objects
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor
+hologram     textures of dot-matrix holograms from pictures
 stage        the studio for meshes without a scene
 planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh

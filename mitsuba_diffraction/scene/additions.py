@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..tables.orders.file import is_order_table
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
 
@@ -76,7 +77,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     """Put surfaces on the BSDFs or shapes of these ids.
 
     A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor
-    replaces it.
+    or a table of orders replaces it.
 
     state : `mi.parser.ParserState`.
     materials : `FILE[,parameter=value…]` by id.
@@ -136,7 +137,7 @@ def _put_on_shape(state: Any, number: int, text: str) -> None:
         if target >= 0 and state.nodes[target].type == mi.ObjectType.BSDF:
             beneath = target
             replaced.append(key)
-    surface = _surface(text, None if beneath is None else _inside(state, beneath))
+    surface = _surface(state, text, None if beneath is None else _inside(state, beneath))
     changed = _copy(shape, shape.plugin_name(), leave=replaced)
     changed.set_id(shape.id())
     changed["bsdf"] = mi.Properties.ResolvedReference(_append(state, _two_sided(state, surface)))
@@ -149,7 +150,7 @@ def _put_on_bsdf(state: Any, number: int, text: str) -> None:
     name, inside = props.id(), _inside(state, number)
     if inside == number:  # the node is replaced, so what lies beneath needs one of its own
         inside = _append(state, _copy(props, props.plugin_name()))
-    surface = _surface(text, inside)
+    surface = _surface(state, text, inside)
     nested = any(
         node.type == mi.ObjectType.BSDF and number in _targets(node) for node in state.nodes
     )
@@ -175,18 +176,27 @@ def _targets(node: Any) -> list[int]:
     return [int(props[name].index()) for name in names]
 
 
-def _surface(text: str, beneath: int | None) -> Any:
-    """Return the properties of the BSDF `diffraction` for `FILE[,parameter=value…]`."""
+def _surface(state: Any, text: str, beneath: int | None) -> Any:
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`.
+
+    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders. In place of another
+    diffracting surface it keeps the orientation of that one.
+    """
     file, *parameters = _COMMA.split(text)
-    props = mi.Properties("diffraction")
-    props["heightfield"] = str(Path(file).absolute())
+    solved = is_order_table(file)
+    props = mi.Properties("diffraction_orders" if solved else "diffraction")
+    props["table" if solved else "heightfield"] = str(Path(file).absolute())
     names = []
     for parameter in parameters:
         name, _, value = parameter.partition("=")
         name = name.strip()
         names.append(name)
         props[name] = _value(value.strip())
-    if beneath is not None and not set(names) & set(_CONDUCTORS):
+    if beneath is not None and "orientation" not in names:
+        old = state.nodes[beneath].props
+        if old.plugin_name().startswith("diffraction") and "orientation" in old:
+            props["orientation"] = old["orientation"]
+    if beneath is not None and not solved and not set(names) & set(_CONDUCTORS):
         props["beneath"] = mi.Properties.ResolvedReference(beneath)
     return props
 

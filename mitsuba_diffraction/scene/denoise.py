@@ -11,25 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError
+from ..extras import optional
 from ..optics.colour import linear_srgb
 from .pictures import colours_of
 
 # samples per pixel of albedo and normals, which noise only at outlines and in depth of field
 _SAMPLES = 64
-
-
-def require_denoiser() -> Any:
-    """Import pyoidn.
-
-    Raises a DiffractionError if it is not installed.
-    """
-    try:
-        import pyoidn
-    except ImportError as error:
-        raise DiffractionError(
-            "--denoise needs pyoidn: pip install 'mitsuba-diffraction[denoise]'"
-        ) from error
-    return pyoidn
 
 
 def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
@@ -44,7 +31,7 @@ def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
     """
     import mitsuba as mi
 
-    denoiser = require_denoiser()
+    denoiser = optional("pyoidn")
     colours = colours_of(picture)
     if colours is None:
         raise DiffractionError("--denoise: the film holds no colours; give it the format rgb")

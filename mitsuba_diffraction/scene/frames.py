@@ -12,6 +12,7 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, warn
+from ..extras import optional
 from ..files import refuse_pipe
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
@@ -154,29 +155,14 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
 def check_film(film: Path) -> None:
     """Raise a DiffractionError if what writes films of this format is not installed."""
     if film.suffix.lower() == ".mp4":
-        _require_ffmpeg()
-
-
-def _require_ffmpeg() -> Any:
-    """Import imageio-ffmpeg.
-
-    Raises a DiffractionError if it is not installed.
-    """
-    try:
-        import imageio_ffmpeg
-    except ImportError as error:
-        raise DiffractionError(
-            "films ending in .mp4 need imageio-ffmpeg: pip install 'mitsuba-diffraction[film]'; "
-            "or name a film ending in .webp or .gif"
-        ) from error
-    return imageio_ffmpeg
+        optional("imageio_ffmpeg")
 
 
 def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
     """Join PNG files to an MP4; pictures of odd size lose a row or a column, as H.264 requires."""
     from PIL import Image
 
-    ffmpeg = _require_ffmpeg()
+    ffmpeg = optional("imageio_ffmpeg")
     with Image.open(frames[0]) as first:
         width, height = (max(2, length - length % 2) for length in first.size)
     # matrix and tags of sRGB's primaries, without which players guess by the size of the picture

@@ -13,6 +13,7 @@ layout             where a table's numbers lie: for NumPy, the plugin and the sh
 powers             powers of the orders as series in κ, whatever the table stores
 height_scales      height scales at which functions of it are tabulated
 film               the mean of the second order under a film
+directional        functions of direction on a grid, and of wavelength
 energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others

@@ -24,19 +24,19 @@ from .expansion import KINDS, Expansion
 from .layout import Grid
 from .table import DiffractionTable
 
-#: Largest table, bytes: beyond it no renderer would want it.
+#: Largest table, bytes: a larger one fits no renderer's memory.
 MAX_BYTES = 4 << 30
 
 _REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
 _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
-_OWN = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
+_TABLE_FIELDS = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
 _RATIOS = "slope_ratios"
 _COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
 _MOST_NODES = 1 << 12
-_ROUNDED = 1e-6  # relative: of what follows from other fields
-#: Most of the light in one order: 1, but for the error of a table of a large tolerance.
+_ROUNDED = 1e-6  # relative tolerance of fields that follow from others
+#: Largest share of the light in an order: 1 and the error of a table of a large tolerance.
 _LARGEST_POWER = 2.0
 _LARGEST_RATIO, _MOST_CELLS = 128.0, 1 << 12  # r, and cells along an axis
 _BLOCK = 1 << 22  # coefficients at a time
@@ -51,8 +51,8 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "error": dict(table.error),
         "roughness": {"first": table.roughness.first, "nodes": table.roughness.nodes.tolist()},
         "source": dict(table.source),
-        "expansion": _given(table.expansion),
-        "grid": _given(table.grid),
+        "expansion": _present(table.expansion),
+        "grid": _present(table.grid),
         "order_0": table.order_0.tolist(),
         **({} if table.slope_ratios is None else {_RATIOS: _ratios_of(table.slope_ratios)}),
     }
@@ -76,7 +76,7 @@ def plain(value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else value.tolist()
 
 
-def _given(record: Expansion | Grid) -> dict[str, Any]:
+def _present(record: Expansion | Grid) -> dict[str, Any]:
     """Return the fields of a record that are not None."""
     fields = dataclasses.asdict(record)
     return {name: value for name, value in fields.items() if value is not None}
@@ -123,7 +123,7 @@ def parse_document(document: Any) -> TableDescription:
     fields = _mapping(document, "the description")
     settings = _settings(fields)
     wants = (_RATIOS,) if settings.second_order else ()
-    _names(fields, (*_OWN, *_SETTINGS, *wants), (*_OWN, *wants))
+    _names(fields, (*_TABLE_FIELDS, *_SETTINGS, *wants), (*_TABLE_FIELDS, *wants))
     expansion = _expansion(_mapping(fields["expansion"], "expansion"))
     spacing = _pair(fields["spacing"], "spacing", 1e-9, 1e9)
     grid = _grid(_mapping(fields["grid"], "grid"))
@@ -287,9 +287,9 @@ def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float)
     rows = max(1, _BLOCK // (nx * components * terms))
     for interval, start in itertools.product(range(len(coefficients)), range(0, ny, rows)):
         weights = expansion.weights(expansion.length * (interval + shares)).T / scale
-        mine = coefficients[interval, start : start + rows].astype(np.float32)
+        part = coefficients[interval, start : start + rows].astype(np.float32)
         with np.errstate(all="ignore"):
-            values = mine @ weights.astype(np.float32)
+            values = part @ weights.astype(np.float32)
             powers = values[..., 0, :] if expansion.kind == "power" else (values**2).sum(axis=2)
         largest = float(np.abs(powers).max())
         _require(largest <= _LARGEST_POWER, f"an order with {largest:.3g} of the light")

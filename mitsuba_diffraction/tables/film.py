@@ -11,11 +11,11 @@ from ..optics import mean_second_order
 from ..optics.blend import RoughnessTable
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
-from .energy.conservation import Index
-from .energy.grid import FINE, DirectionalTable, DirectionGrid
+from .directional import FINE, DirectionalTable, DirectionGrid
+from .energy.materials import PROBES, Index, rounded
 from .energy.scaling import parallel
 from .energy.settings import energy_settings
-from .energy.store import PROBES, cached_directions, rounded
+from .store import DirectionalTables, cached_directions
 from .table import DiffractionTable
 
 _FEWEST = 8
@@ -26,7 +26,7 @@ def exponents(
 ) -> DirectionalTable:
     """Tabulate ln g of `optics.mean_second_order`, of the angle alone: a second or two.
 
-    Arguments as of `tables.energy.store.Energy`.
+    Arguments as of `tables.energy.conservation.Energy`.
     """
     low, high = wavelength_range
     film = index(np.array([low]))
@@ -57,8 +57,10 @@ def mean_exponents(
 ) -> DirectionalTable:
     """Return `exponents` of a table, from memory, from disk, or computed."""
 
-    def make() -> list[DirectionalTable]:
-        return [exponents(table.roughness, index, wavelength_range)]
+    def make() -> DirectionalTables:
+        return {"exponents": exponents(table.roughness, index, wavelength_range)}
 
     probes = rounded(index(np.geomspace(*wavelength_range, PROBES)))
-    return cached_directions("film", table, [probes, *wavelength_range], make)[0]
+    settings = energy_settings()
+    made_of = mean_second_order.VERSION, settings.fringe_step, settings.fringes, probes
+    return cached_directions("film", table, [*made_of, *wavelength_range], make)["exponents"]

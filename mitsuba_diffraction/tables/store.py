@@ -1,8 +1,8 @@
 """Cache of tables and all that is computed from them, in files found by what they are made of.
 
 A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
-lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables
-and their colours, `tables.energy.store` the scales that conserve energy.
+lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables,
+their colours, and functions of direction, such as the scales that conserve energy.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
+from .directional import DirectionalTable
 from .document import document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
@@ -246,6 +247,11 @@ _tables: weakref.WeakValueDictionary[str, DiffractionTable] = weakref.WeakValueD
 _colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = (
     weakref.WeakKeyDictionary()
 )
+#: Functions of direction by name.
+DirectionalTables = dict[str, DirectionalTable]
+_directions: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DirectionalTables]] = (
+    weakref.WeakKeyDictionary()
+)
 _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 
@@ -321,3 +327,36 @@ def colours_of(record: Record) -> ColourTable:
         order_0=order_0,
         **{name: document[name] for name in _COLOUR_NUMBERS},
     )
+
+
+def cached_directions(
+    kind: str,
+    table: DiffractionTable,
+    made_of: Sequence[Any],
+    make: Callable[[], DirectionalTables],
+) -> DirectionalTables:
+    """Return functions of direction of a table, from memory, from disk, or computed and stored.
+
+    made_of : versions, settings and all else that they depend on beside the table.
+    """
+    key, memory = key_of(kind, table.digest(), made_of), _directions.setdefault(table, {})
+    return cached(kind, key, memory, make, directions_record, directions_of)
+
+
+def directions_record(functions: DirectionalTables) -> Record:
+    """Return the record of functions of direction for the cache."""
+    wavelengths = {name: function.wavelengths.tolist() for name, function in functions.items()}
+    return Record(wavelengths, [function.values for function in functions.values()])
+
+
+def directions_of(record: Record) -> DirectionalTables:
+    """Return the functions of direction of such a record, checked."""
+    functions = {}
+    for (name, wavelengths), values in zip(record.document.items(), record.arrays, strict=True):
+        if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
+            raise ValueError(
+                f"directional table of shape {values.shape}; expected (wavelengths, polar, "
+                "azimuthal), finite"
+            )
+        functions[name] = DirectionalTable(np.array(wavelengths, float), values)
+    return functions

@@ -30,6 +30,7 @@ from .options import add_options_of, chosen
 from .piece import piece
 from .scales import Scales
 from .snake import Snake, build
+from .sticker import sticker
 
 UNITS = "lengths in cm, z up"
 #: Of the compact disc in `scenes/cd.xml`: name, inner and outer radius.
@@ -65,6 +66,7 @@ def write_scenes(folder: Path) -> None:
         _write_png(textures / f"{name}_eye.png", pigment.eye(iris[name]))
     _write_png(textures / "stone.png", pigment.stone())
     _write_png(textures / "back.png", pigment.back())
+    sticker().write(textures)
     close = piece(scales=CLOSE_SCALES, columns=CLOSE_COLUMNS, rows=CLOSE_ROWS)
     _write_scene_mesh(meshes / "scales.ply", close)
     painted = pigment.corn_snake_piece(CLOSE_SCALES, CLOSE_COLUMNS, CLOSE_ROWS)

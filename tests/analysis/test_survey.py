@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 import re
 import signal
 import time
@@ -22,6 +21,7 @@ from mitsuba_diffraction.analysis.survey import (
 )
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.tables.store import VARIABLE
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
@@ -91,8 +91,28 @@ def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path)
     own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
     options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
     (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, common=own, resolution=8)
-    assert row["reason"].startswith("cannot map it: ")
     assert "starts at 500 nm" in row["reason"]
+
+
+def test_a_survey_and_a_spectrum_of_a_scan_share_its_table(run, scans, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
+    how = ("--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance", 0.05)
+    assert run("survey", scans[0], "-o", tmp_path / "out", "--resolution", 8, *how).code == 0
+    (table,) = (tmp_path / "cache").glob("table-*")
+    ran = run(
+        "spectrum",
+        scans[0],
+        "-o",
+        tmp_path / "light.csv",
+        "--step",
+        200,
+        "--wavelength-range",
+        400,
+        700,
+        *how,
+    )
+    assert ran.code == 0, ran.err
+    assert list((tmp_path / "cache").glob("table-*")) == [table]
 
 
 def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
@@ -218,7 +238,7 @@ def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
 
 def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
     def measure(job):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         time.sleep(60)
 
     monkeypatch.setattr(module, "measure", measure)

@@ -142,7 +142,7 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     from mitsuba_diffraction.cli.main import main
 
     np.save(tmp_path / "heights.npy", PATCH.heights)
-    monkeypatch.setattr(command, "_QUICK", (48, 16, 256, 1, 1))
+    monkeypatch.setattr(command, "QUICK", command.Effort(48, 16, 256, 1, 1))
     few = (Setting("default", "the defaults"), Setting("tolerance", "1e-2", {"tolerance": 1e-2}))
     monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
     heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]

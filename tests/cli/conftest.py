@@ -24,9 +24,10 @@ def child(tmp_path: Path) -> Callable[..., Ran]:
     """
 
     def call(arguments: Sequence[object], prelude: str = "", limit: int | None = None) -> Ran:
-        lines = ["import os, resource, signal, sys", "from mitsuba_diffraction.cli import main"]
+        lines = ["import os, signal, sys", "from mitsuba_diffraction.cli import main"]
         if limit is not None:
-            lines.append(f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))")
+            lines.append("from resource import RLIMIT_FSIZE, setrlimit")
+            lines.append(f"setrlimit(RLIMIT_FSIZE, ({limit}, {limit}))")
         lines += [prelude, "sys.exit(main(sys.argv[1:]))"]
         result = subprocess.run(
             [sys.executable, "-c", "\n".join(lines), *map(str, arguments)],

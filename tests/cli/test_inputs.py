@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.systems import posix
+
 SCENE = """<scene version="3.0.0">
   <default name="width" value="8"/>
   <integrator type="path"/>
@@ -33,6 +35,7 @@ def alarm():
     signal.signal(signal.SIGALRM, before)
 
 
+@posix
 @pytest.mark.parametrize(
     ("suffix", "arguments"),  # {} is the pipe
     [
@@ -62,6 +65,7 @@ def test_a_pipe_is_refused_at_once(run, here, alarm, suffix, arguments):
     assert "pipe or a device" in ran.failed_in_one_line()
 
 
+@posix
 @pytest.mark.parametrize(
     "element",
     [
@@ -79,6 +83,7 @@ def test_a_pipe_that_a_scene_names_is_refused_at_once(run, here, alarm, element)
     assert "pipe or a device" in ran.failed_in_one_line()
 
 
+@posix
 def test_a_pipe_for_a_frame_or_a_table_of_treatments_is_refused_at_once(run, here, alarm, heights):
     Path("a.xml").write_text(SCENE.format(""))
     Path("frames").mkdir()
@@ -99,10 +104,10 @@ def test_a_long_value_in_a_scene_is_not_taken_for_a_file(run, here):
 
 
 @pytest.mark.parametrize("command", ["render", "info", "precompute", "brdf-map", "survey"])
-def test_a_name_that_is_no_utf_8_is_refused_in_one_line(child, tmp_path, command):
+def test_a_name_that_is_no_utf_8_is_refused_in_one_line(run, here, command):
     name = os.fsdecode(b"caf\xe9.xml")
-    (tmp_path / name).write_text(SCENE.format(""))
-    line = child([command, name]).failed_in_one_line()
+    Path(name).write_text(SCENE.format(""))
+    line = run(command, name).failed_in_one_line()
     assert "caf" in line
     assert "UTF-8" in line
 

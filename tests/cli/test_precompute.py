@@ -12,6 +12,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.cli.console import Bar
 from tests.support.room import SCENE
+from tests.support.systems import posix
 
 # A table of 6 µm heights with these takes a tenth of a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
@@ -262,6 +263,7 @@ def test_several_files_need_the_name_of_their_table(run, heights, here):
     assert "--output" in ran.err
 
 
+@posix
 def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
     ran = child(["precompute", heights, *QUICK, "-o", "out.exr"], limit=500)
     assert "cannot write 'out.exr'" in ran.failed_in_one_line()
@@ -273,14 +275,14 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
     [
         (
             "import mitsuba_diffraction.cli.console as p\n"
-            "p.Bar.__call__ = lambda *_: os.kill(os.getpid(), signal.SIGINT)",
+            "p.Bar.__call__ = lambda *_: signal.raise_signal(signal.SIGINT)",
             False,
         ),
         (
             "import OpenEXR\n"
             "def write(self, path):\n"
             "    open(path, 'wb').write(b'half of it')\n"
-            "    os.kill(os.getpid(), signal.SIGINT)\n"
+            "    signal.raise_signal(signal.SIGINT)\n"
             "OpenEXR.File = type('File', (), {'__init__': lambda *_: None, 'write': write})",
             True,
         ),

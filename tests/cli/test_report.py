@@ -13,7 +13,7 @@ from mitsuba_diffraction.cli.report import lines_of, plain
 
 leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text()
 data = st.recursive(
-    leaves, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=20
+    leaves, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=8
 )
 
 

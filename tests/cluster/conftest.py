@@ -13,7 +13,7 @@ from mitsuba_diffraction.cluster import groups, tasks
 from mitsuba_diffraction.scene import passes
 from mitsuba_diffraction.scene.load import load_scene, set_variant
 from tests.support.clusters import SPP, VARIANT, silent
-from tests.support.coarse import vectors_of
+from tests.support.kernels import vectors_of
 from tests.support.room import SCENE
 
 

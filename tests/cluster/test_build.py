@@ -52,7 +52,7 @@ def test_two_workers_of_which_one_is_killed_build_the_same_table(client, scan, a
 
 
 def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):
-    monkeypatch.setattr(windows_module, "_BATCH", 1)
+    monkeypatch.setattr(windows_module, "BATCH_POINTS", 1)
     whole = Windows([scan], 12.0)
     batches = whole.batches()
     assert len(batches) == len(whole) == 16
@@ -64,7 +64,9 @@ def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, m
 
 def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch):
     ny, nx = Windows([scan], 12.0).shape
-    monkeypatch.setattr(windows_module, "_BATCH", 2 * ny * nx)  # 3 windows that overlap by half
+    monkeypatch.setattr(
+        windows_module, "BATCH_POINTS", 2 * ny * nx
+    )  # 3 windows that overlap by half
     whole = Windows([scan, scan], 12.0)
     batches = whole.batches()
     assert [len(batch) for batch in batches] == [3, 1] * 8

@@ -15,8 +15,7 @@ import numpy as np
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables import store
-from mitsuba_diffraction.tables.energy import store as energy
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.store import VARIABLE, Record, cached
 from tests.fuzz.damage import damaged
 from tests.support.directions import rough_patch
@@ -42,15 +41,15 @@ def _colours() -> Any:
     return store.ColourTable.build(_table())
 
 
-def _conservation() -> list[DirectionalTable]:
+def _conservation() -> dict[str, DirectionalTable]:
     values = np.random.default_rng(3).random((2, 5, 4)).astype(np.float32)
-    return [DirectionalTable(np.array([400.0, 700.0]), values)]
+    return {"albedo": DirectionalTable(np.array([400.0, 700.0]), values)}
 
 
 KINDS = {
     "table": Kind(_table, store._table_record, store._table_of),
     "colours": Kind(_colours, store.colour_record, store.colours_of),
-    "energy": Kind(_conservation, energy.record, energy.tables),
+    "energy": Kind(_conservation, store.directions_record, store.directions_of),
 }
 
 

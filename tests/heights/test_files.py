@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField
+from tests.support.systems import posix
 
 
 def test_loading_in_threads_leaves_the_streams_of_the_process_alone(tmp_path):
@@ -38,6 +39,7 @@ def test_loading_in_threads_leaves_the_streams_of_the_process_alone(tmp_path):
     assert os.fstat(2).st_ino == number
 
 
+@posix
 @pytest.mark.parametrize("name", ["pipe.npy", "pipe.toml", "pipe"])
 def test_a_pipe_is_refused_at_once(tmp_path, name):
     os.mkfifo(tmp_path / name)

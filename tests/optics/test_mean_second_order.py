@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import mean_second_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
-from mitsuba_diffraction.optics.mean_second_order import coherent, exponents, limited, mean_gain
+from mitsuba_diffraction.optics.mean_second_order import (
+    LIMIT,
+    coherent,
+    exponents,
+    limited,
+    mean_gain,
+    mean_of_waves,
+)
 from mitsuba_diffraction.optics.second_order import Perturbation
 
 COSINES = np.cos(np.radians([0.0, 25.0, 50.0, 75.0]))
@@ -33,7 +39,7 @@ def test_its_logarithm_goes_with_the_square_of_the_heights_up_to_its_limit():
     once, twice = (np.log(mean_gain(COSINES, LACQUER, ROUGH, WAVENUMBER, s)) for s in (0.1, 0.2))
     assert np.abs(once).max() > 1e-4
     assert twice == pytest.approx(4.0 * once, rel=1e-4)  # (x/LIMIT)⁴ of x = 1e-3
-    assert np.abs(np.log(limited(np.linspace(-50.0, 50.0, 999)))).max() < mean_second_order.LIMIT
+    assert np.abs(np.log(limited(np.linspace(-50.0, 50.0, 999)))).max() < LIMIT
     assert limited(-50.0) == pytest.approx(1.0, abs=1e-3)  # and fades beyond it
 
 
@@ -54,9 +60,8 @@ def test_thin_films_count_by_the_square_of_their_fringes():
     assert found[1] == pytest.approx(found[0] / 8.0, rel=0.02)  # and they differ from none by d
 
 
-def test_without_a_film_it_is_that_of_the_bare_surface(monkeypatch):
+def test_without_a_film_it_is_that_of_the_bare_surface():
     """In all azimuths, by B₂ of the second order of perturbation."""
-    monkeypatch.setattr(mean_second_order, "_WIDTH", 0.0)
     index, cosine, step, power = 1.56, 0.6, 0.4, 1e-3
     azimuth = np.pi * (np.arange(12) + 0.5) / 12
     k = np.array([-0.8, 0.0])
@@ -68,7 +73,7 @@ def test_without_a_film_it_is_that_of_the_bare_surface(monkeypatch):
     weights = np.abs(r) ** 2
     expected = np.sum(weights * added.real) / weights.sum()
     bare = Filmed(index, 1.3, 0.0)
-    found = mean_second_order._of_waves(
-        np.array([cosine]), bare, np.array([step]), np.array([power])
+    found = mean_of_waves(
+        np.array([cosine]), bare, np.array([step]), np.array([power]), mode_width=0.0
     )
     assert found == pytest.approx(expected, rel=1e-9)

@@ -8,8 +8,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import fresnel
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
-from mitsuba_diffraction.tables.energy.store import Energy
+from mitsuba_diffraction.tables.directional import DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Energy
+from mitsuba_diffraction.tables.energy.materials import Reflector
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import evaluated, interaction, lanes, spectra, vectors
@@ -22,10 +23,8 @@ def test_what_is_not_reflected_reaches_the_nested_bsdf(variant):
     context, si = mi.BSDFContext(), interaction(wi, lam[:, None])
     eta = 1.5 / 1.000277
     table = bare.table
-    model = Energy(
-        table, "small_slope", lambda w: np.full(len(w), 1.5 + 0j), table.wavelength_range
-    )
-    albedo = model.at(1.0).albedo
+    glass = Reflector("small_slope", lambda w: np.full(len(w), 1.5 + 0j))
+    albedo = Energy(table, glass, table.wavelength_range).at(1.0).albedo
     flat = fresnel.reflectance(np.cos(albedo.grid.theta), 1.5)[:, None]
     ratio = DirectionalTable(albedo.wavelengths, (albedo.values / flat).astype(np.float32))
 

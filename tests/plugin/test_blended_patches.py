@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.realtime.glsl.scene import read_scene
 from tests.support.directions import rough_patch
 from tests.support.gentle import PATCH, WIDTH, pairs
 from tests.support.lanes import interaction, refusal, spectra, vectors
@@ -155,13 +154,6 @@ def test_weights_that_mean_nothing_are_refused(some_variant, parameters, said):
     made = {k: v() if callable(v) else v for k, v in (surfaces() | parameters).items()}
     given = {k: v for k, v in made.items() if v is not None}
     assert said in refusal(lambda: mi.load_dict({"type": "diffraction_mix", **given}))
-
-
-def test_shaders_refuse_it(some_variant):
-    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
-    scene = {"type": "scene", "disk": {"type": "disk", "bsdf": mix(weight_back=0.5)}, "s": sensor}
-    with pytest.raises(md.DiffractionError, match="a mix of surfaces"):
-        read_scene(mi.load_dict(scene))
 
 
 @pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_spectral_polarized"])

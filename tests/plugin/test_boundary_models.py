@@ -9,8 +9,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics import boundary, through
 from mitsuba_diffraction.optics.blend import RoughnessTable
-from mitsuba_diffraction.tables.energy.gain import Boundary, Gain
-from mitsuba_diffraction.tables.energy.transmission import Medium
+from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.materials import Dielectric
 from tests.support.directions import polar
 
 FLAT = md.HeightField(np.zeros((4, 4)), 0.2)
@@ -22,10 +23,10 @@ CALLS = {
     ),
     "btdf": lambda name: reference.btdf(FLAT, UP, DOWN, 520.0, eta=1.5, model=name),
     "matrices": lambda name: boundary.matrices_of(name),
-    "gain": lambda name: Gain(
-        Boundary(1.5, name), RoughnessTable(0.0, np.zeros(2)), 12.0, 1.0
-    ).ratio(np.array(0.5), np.array(0.5), 0.0),
-    "medium": lambda name: Medium(1.5, name, thin=False).ways(0.1),
+    "gain": lambda name: Gain(Path(1.5, name), RoughnessTable(0.0, np.zeros(2)), 12.0, 1.0).exact(
+        np.array(0.5), np.array(0.5), 0.0
+    ),
+    "dielectric": lambda name: Dielectric(1.5, name, thin=False).paths(0.1),
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import as_single, polar, uniform_directions
-from tests.support.lanes import evaluated, interaction, spectra
+from tests.support.lanes import evaluated, interaction, refusal, spectra
 
 FLAT = md.HeightField(np.zeros((30, 30)), 0.08)
 WIDTH = 2.4
@@ -108,3 +108,27 @@ def test_reflectance_is_applied_once(some_variant):
 
 def test_an_index_of_one_reflects_nothing(some_variant):
     assert ratios(polar(30), [polar(30, 180)], 550.0, int_ior=1.0, ext_ior=1.0)[0, 0] < 1e-6
+
+
+@pytest.mark.parametrize(("material", "last"), [("MgO", 767.0), ("TiN", 826.0)])
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_beyond_its_table_a_material_has_the_index_of_the_table_s_end(
+    some_variant, model, material, last
+):
+    """Mitsuba's own conductors have the index 0 there: R = 1, and NaN in ours."""
+    wi, wo = polar(40.0), polar(40.0, 180.0)
+    bare = load(material=material, model=model)
+    mirror = load(material="none")
+    shares = [
+        evaluated(bsdf, wi[None], wo[None], np.array([[360.5, 500.0, last, 829.5]]))[0]
+        for bsdf in (bare, mirror)
+    ]
+    share = shares[0] / shares[1]
+    assert share[3] == pytest.approx(share[2], rel=2e-3)  # nodes lie up to 0.7 nm further
+    assert np.all((share > 0.01) & (share < 0.9))
+
+
+def test_a_material_whose_table_ends_amid_the_spectrum_is_refused_in_one_line(some_variant):
+    line = refusal(lambda: load(material="AlSb"))
+    for word in ("AlSb", "302.4", "590.4", "eta and k"):
+        assert word in line

@@ -15,6 +15,7 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.plugin.textures import check_attributes
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import as_single, lit_pairs
+from tests.support.furnace import furnace, sinusoid
 from tests.support.gentle import PATCH, WIDTH, load, pairs
 from tests.support.lanes import brdf_values, evaluated, interaction, lanes, refusal, vectors
 from tests.support.transmitting import BELOW, OneSide
@@ -83,6 +84,30 @@ def test_values_at_each_place_are_the_reference_s_of_its_factor(mono):
         values = np.array(varying.eval(mi.BSDFContext(), si, vectors(wo))[0])
         exact = reference.brdf(heights, wi, wo, 550.0, coherence_width=width) * wo[:, 2]
         assert np.abs(values - exact).sum() < 1e-3 * exact.sum()
+
+
+@pytest.mark.usefixtures("coarse")
+def test_energy_is_conserved_at_each_factor_as_by_stretched_heights(mono):
+    """A deep mirror grating, whose albedo is 1.43 by the scales of the unstretched patch."""
+    factors = np.array([[0.8, 1.0]], np.float32)
+    heights = sinusoid()
+    surfaces = [
+        mi.load_dict(md.bsdf_dict(field, material="none", coherence_width=width, **parameters))
+        for field, width, parameters in (
+            (heights, 65.0, {"lateral_scale": 0.8}),
+            (heights, 65.0, {"lateral_scale": bitmap(factors)}),
+            (heights.stretched(0.8), 52.0, {}),
+        )
+    ]
+    # the texture's uv is (0, 0), where the factor is 0.8
+    constant, varying, expected = (
+        furnace(surface, (20.0, 50.0, 75.0, 84.0))[0] for surface in surfaces
+    )
+    for albedo in (constant, varying):
+        assert albedo.max() < 1.03
+        # both scales are linear between wavelengths, of other nodes, on a coarse grid: 0.021; with
+        # the scale of the unstretched patch it is 0.12
+        assert np.abs(albedo - expected).mean() < 0.03
 
 
 @pytest.mark.parametrize("texture", [False, True])

@@ -10,6 +10,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
+from tests.support.orders import thin_grating
 
 EXPORTED = """<scene version="2.1.0">
 	<bsdf type="twosided" id="mat-Skin" name="mat-Skin">
@@ -58,3 +59,19 @@ def test_a_metal_replaces_what_is_there(surface):
 def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
     with pytest.raises(DiffractionError, match="mat-Skin, mat-Ground, elm__0, elm__4"):
         bsdfs(surface, {"mat-Scales": SETTINGS})
+
+
+def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
+    thin_grating(0.6, counts=(2, 2, 1)).save(surface / "orders.nc")
+    old = f"""<bsdf type="diffraction" id="tracks">
+        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
+        <boolean name="energy_conserving" value="false"/><float name="orientation" value="30"/>
+    </bsdf>"""
+    scene = f'<scene version="3.0.0">{old}<shape type="disk"><ref id="tracks"/></shape></scene>'
+    (surface / "scene.xml").write_text(scene)
+    loaded = load_scene(surface / "scene.xml", {"material:tracks": str(surface / "orders.nc")})
+    text = str(loaded.shapes()[0].bsdf())
+    assert "DiffractionOrders[" in text
+    assert "orientation = 30" in text
+    assert "Diffraction[" not in text

@@ -144,7 +144,7 @@ def test_asked_to_stop_it_keeps_the_passes_so_far(scene):
 def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
     def interrupt(self, done, total, text):
         if done == 2:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-s", "50", "-o", "a.exr")
@@ -159,7 +159,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
 def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
     monkeypatch.setattr(
         "mitsuba_diffraction.cli.console.Bar.__call__",
-        lambda *_: os.kill(os.getpid(), signal.SIGINT),
+        lambda *_: signal.raise_signal(signal.SIGINT),
     )
     assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
     assert os.listdir() == ["room.xml"]
@@ -168,7 +168,7 @@ def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
 def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
     def interrupt(self, done, total, text):
         if text == "compiling":
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-o", "a.exr")

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-PACKAGE = Path(__file__).parents[2] / "mitsuba_diffraction"
+import mitsuba_diffraction
+
+PACKAGE = Path(mitsuba_diffraction.__file__).parent
 
 # A docstring that begins with one of these words has no subject of its own.
 VAGUE = {"What", "Of", "Those", "That", "As", "By", "Its", "It", "One", "Such"}

@@ -114,8 +114,9 @@ def smaller(path: Path, folder: Path) -> Path:
             cell.source = cell.source.replace(old, new)
     first = next(cell for cell in notebook.cells if cell.cell_type == "code")
     first.source = (
-        "from tests.support.coarse import coarse_energy, vectors_of\n"
-        f"coarse_energy()\nvectors_of(8)\n{first.source}"
+        "from tests.support.coarse import coarse_energy\n"
+        "from tests.support.kernels import compile_quickly\n"
+        f"coarse_energy()\ncompile_quickly()\n{first.source}"
     )
     nbformat.write(notebook, folder / path.name)
     return folder / path.name

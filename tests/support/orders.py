@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import mitsuba as mi
 import numpy as np
 from scipy.special import jv
 
+import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.table import Counts
+from tests.support.directions import Array, as_single, uniform_directions
+
+PERIOD = 1.6  # µm
 
 
 def thin_grating(
-    period: float = 1.6,
+    period: float = PERIOD,
     depth: float = 0.12,
     reflectance: float = 0.75,
     wavelengths: tuple[float, float] = (380.0, 780.0),
@@ -46,3 +53,24 @@ def thin_grating(
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
     return OrderTable(period, wavelengths, bands, superstrate, {"profile": "thin sinusoid"})
+
+
+def load(table: Any, **parameters: Any) -> Any:
+    """A table or heights as a BSDF of the current variant."""
+    return mi.load_dict(md.bsdf_dict(table, **parameters))
+
+
+def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
+    """Directions in lobes of orders of the first of four wavelengths, and random numbers."""
+    rng = np.random.default_rng(seed)
+    wi = uniform_directions(n, rng, 0.15)
+    wavelength = as_single(rng.uniform(400.0, 700.0, (n, 4)))
+    wo = np.empty((n, 3))
+    for row in range(n):
+        squared = 2.0
+        while squared > 0.98:
+            shift = [rng.integers(-4, 5) * wavelength[row, 0] / (1e3 * PERIOD), 0.0]
+            tangential = shift - wi[row, :2] + rng.normal(0.0, 0.003, 2)
+            squared = (tangential**2).sum()
+        wo[row] = [*tangential, np.sqrt(1.0 - squared)]
+    return wi, as_single(wo), rng.random((n, 3)), wavelength

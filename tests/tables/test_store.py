@@ -13,6 +13,7 @@ import pytest
 from mitsuba_diffraction import DiffractionWarning
 from mitsuba_diffraction.tables import store
 from mitsuba_diffraction.tables.store import Record, cache_folder, cached
+from tests.support.systems import posix
 
 VALUES = np.linspace(0.0, 1.0, 37, dtype=np.float32).reshape(1, 37)
 KEY = "3" * 64
@@ -95,6 +96,7 @@ def test_a_file_under_another_s_name_is_made_again(folder):
     assert made == ["4" * 64]
 
 
+@posix
 def test_without_a_home_there_is_no_cache_and_no_error(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for name in (store.VARIABLE, "HOME", "XDG_CACHE_HOME"):
@@ -157,12 +159,14 @@ def child(*arguments):
     subprocess.run([sys.executable, "-c", *arguments], env=environment, timeout=120, check=True)
 
 
+@posix
 def test_of_eight_processes_one_makes_it(tmp_path, folder):
     child(MANY, str(tmp_path / "log"))
     assert (tmp_path / "log").read_text() == "made "
     assert [path.suffix for path in folder.iterdir()] == [".cache"]
 
 
+@posix
 def test_what_a_killed_process_left_is_removed(folder):
     get([])
     (file,) = folder.iterdir()

@@ -7,6 +7,7 @@ figures      sizes of a run; rows with goals; two runs side by side
 build        tables, each built in a process of its own, whose memory is measured
 contenders   BSDFs to compare, the bare gathers and the thesis' look-up among them
 evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
+orders       `diffraction_orders`: times of the calls, noise of a sample
 scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
 """
 
@@ -56,6 +57,7 @@ def sections(
 
     from .contenders import build_tables
     from .evaluation import measure_colours, measure_eval, measure_sampling
+    from .orders import measure_orders
     from .scenes import measure_efficiency, measure_noise, measure_snake
 
     tables = build_tables(plan, folder, progress, patch)
@@ -67,6 +69,7 @@ def sections(
             "eval": lambda: [measure_eval(plan, tables, progress)],
             "sample": lambda: measure_sampling(plan, tables, progress),
             "snake": lambda: [measure_snake(plan, tables, scenes, progress)],
+            "orders": lambda: measure_orders(plan, scenes, progress),
             "noise": lambda: [measure_noise(plan, tables, progress)],
             "efficiency": lambda: [measure_efficiency(plan, tables, scenes, progress)],
             "colours": partial(measure_colours, plan, tables, scenes, backend, progress),

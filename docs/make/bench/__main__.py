@@ -25,7 +25,7 @@ from mitsuba_diffraction.errors import DiffractionError
 from ..figures.pages import add_measured, exit_code, measured_patch
 from . import figures, sections
 
-PARTS = ("build", "eval", "sample", "snake", "noise", "efficiency", "colours")
+PARTS = ("build", "eval", "sample", "snake", "orders", "noise", "efficiency", "colours")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,7 +60,7 @@ def _bench(args: argparse.Namespace) -> None:
         check_writable(args.json)
     earlier = figures.read_run(args.against) if args.against is not None else None
     parts = (args.only,) if args.only else PARTS
-    if not {"snake", "efficiency", "colours"}.isdisjoint(parts):
+    if not {"snake", "orders", "efficiency", "colours"}.isdisjoint(parts):
         _check_scenes(args.scenes)
     patch = measured_patch(args)
     plan = figures.QUICK if args.quick else figures.FULL

@@ -26,10 +26,12 @@ from .figures import Goal, Plan, Row, Section
 
 #: Of noise: angle of incidence in degrees, relative standard deviation that one sample may have.
 _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
-_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
-_WAVELENGTHS = (450.0, 550.0, 650.0)
+#: Azimuths of the light, degrees.
+AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+#: Wavelengths of the light whose noise is measured, nm.
+WAVELENGTHS = (450.0, 550.0, 650.0)
 #: Samples a pixel of the rendering in which bright pixels are looked for.
-_FIREFLY_SPP = 64
+FIREFLY_SPP = 64
 # Of the snake's scene.
 _COLUMNS = ("ms", "ns/sample", "× roughconductor")
 _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
@@ -174,9 +176,9 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     for n, (theta, goal) in enumerate(_GOALS.items()):
         progress(n, len(_GOALS), "noise")
         samples = [
-            _deviation(orders, theta, phi, wavelength, plan.lanes)
-            for phi in _AZIMUTHS
-            for wavelength in _WAVELENGTHS
+            deviation_of(orders, theta, phi, wavelength, plan.lanes)
+            for phi in AZIMUTHS
+            for wavelength in WAVELENGTHS
         ]
         deviations = [deviation for deviation, _ in samples]
         values = (
@@ -184,7 +186,7 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
             float(np.median(deviations)),
             max(deviations),
             max(weight for _, weight in samples),
-            _deviation(cosine, theta, 0.0, 550.0, plan.lanes)[0],
+            deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0],
         )
         rows.append(
             Row(
@@ -197,8 +199,8 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     progress(len(_GOALS), len(_GOALS), "noise")
     title = (
         "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
-        f"{len(_AZIMUTHS)} azimuths of the light and {len(_WAVELENGTHS)} wavelengths from "
-        f"{_WAVELENGTHS[0]:g} to {_WAVELENGTHS[-1]:g} nm"
+        f"{len(AZIMUTHS)} azimuths of the light and {len(WAVELENGTHS)} wavelengths from "
+        f"{WAVELENGTHS[0]:g} to {WAVELENGTHS[-1]:g} nm"
     )
     return Section(title, columns, rows)
 
@@ -232,7 +234,7 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
     progress(len(cases), len(cases), "efficiency")
     title = (
         "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
-        f"of the body's pixels; their brightest at {_FIREFLY_SPP} samples a pixel over that at "
+        f"of the body's pixels; their brightest at {FIREFLY_SPP} samples a pixel over that at "
         f"{plan.reference_spp}"
     )
     return Section(title, columns, rows)
@@ -245,7 +247,7 @@ def draws_by_cosine(bsdf: Any) -> Any:
         even = mi.warp.square_to_uniform_hemisphere(sample2)
         return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
 
-    bsdf._draw, bsdf.power = draw, _ByCosine(bsdf.power)
+    bsdf.draw, bsdf.power = draw, _ByCosine(bsdf.power)
     return bsdf
 
 
@@ -262,7 +264,7 @@ class _ByCosine:
         return self.power(pair, height_scale, si), self.density(pair, drawing_scale, si)
 
 
-def _deviation(
+def deviation_of(
     bsdf: Any, theta: float, phi: float, wavelength: float, lanes: int
 ) -> tuple[float, float]:
     """Relative standard deviation of the weights, and the largest of them."""
@@ -300,7 +302,7 @@ def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
 
     passes = max(1, plan.reference_spp // 256)
     converged = brightest(plan.reference_spp // passes, range(1000, 1000 + passes))
-    return brightest(_FIREFLY_SPP, [SEED]) / converged
+    return brightest(FIREFLY_SPP, [SEED]) / converged
 
 
 def _luminance(picture: Any) -> Any:

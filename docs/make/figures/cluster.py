@@ -27,8 +27,9 @@ import numpy as np
 from mitsuba_diffraction.cluster.frames import Film, FrameRequest
 from mitsuba_diffraction.cluster.kept import Kept
 from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task, add_sums
-from mitsuba_diffraction.cluster.workers import connect, require_dask
+from mitsuba_diffraction.cluster.workers import connect
 from mitsuba_diffraction.errors import warn
+from mitsuba_diffraction.extras import optional
 from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene.load import load_scene, set_variant
 from mitsuba_diffraction.scene.passes import (
@@ -159,7 +160,7 @@ def costs_of_sums(count: int = 20) -> tuple[float, float]:
 
 def scheduler_seconds(count: int = 1000) -> float:
     """Seconds of client and scheduler, in one process, for an empty task among many."""
-    distributed = require_dask()
+    distributed = optional("distributed")
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None

@@ -116,6 +116,11 @@ PICTURES = (
         "The spectra of the panes overlap; colours are pure beside the mullion and the frame only.",
     ),
     _scene(
+        "hologram", "A hologram on a box",
+        "Each area of the foil is a grating of its own direction and period; lamp and window light "
+        "different ones. See [holograms](holograms.md).",
+    ),
+    _scene(
         "film", "A diffraction film before lamps",
         "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
         "between its spectra.",

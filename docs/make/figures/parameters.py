@@ -14,17 +14,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import mitsuba_diffraction
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
 from .pages import exit_code
 
-_FOLDER = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin"
+_FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
 PLUGINS = {
     "diffraction": _FOLDER / "bsdf.py",
     "diffraction_dielectric": _FOLDER / "transmission/bsdf.py",
+    "diffraction_orders": _FOLDER / "orders/bsdf.py",
 }
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
@@ -79,21 +81,21 @@ def _entries(body: str) -> list[Parameter]:
 
 
 def page() -> str:
-    """Return the reference of both plugins in Markdown."""
-    reflecting, transmitting = (docstring(plugin) for plugin in PLUGINS)
-    introduction = _GROUP.split(transmitting)[0].partition("\n\n")[2]
+    """Return the reference of all plugins in Markdown."""
+    reflecting, *others = map(docstring, PLUGINS)
     sections = [
         "# Parameters of `diffraction`",
         "Made by `make parameters` of the texts at the top of the plugins' modules. ∂: "
         "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths in nm. In an "
         "image file the top row is the largest y. Surfaces that light goes through have the plugin "
-        "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric).",
+        "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric), gratings whose orders "
+        "were solved the plugin [`diffraction_orders`](#parameters-of-diffraction_orders).",
         *_parts(reflecting),
         "[theory.md](theory.md) has all of the model, symbol by symbol.",
-        "# Parameters of `diffraction_dielectric`",
-        _prose(introduction),
-        *_parts(transmitting),
     ]
+    for plugin, text in zip(list(PLUGINS)[1:], others, strict=True):
+        introduction = _GROUP.split(text)[0].partition("\n\n")[2]
+        sections += [f"# Parameters of `{plugin}`", _prose(introduction), *_parts(text)]
     return "\n\n".join(sections) + "\n"
 
 

@@ -19,8 +19,8 @@ from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .result import Bands, BrdfMap, Light
 
-# Pixels per kernel launch: enough for a GPU, with sums of some tens of megabytes.
-_PIXELS = 1 << 20
+#: Pixels of a kernel launch: enough for a GPU, with sums of some tens of megabytes.
+LAUNCH_PIXELS = 1 << 20
 #: Largest number of values in a spectral map, 4 GB.
 _MOST_NUMBERS = 1 << 30
 
@@ -75,14 +75,15 @@ def brdf_map(
     check_map(bands, resolution, samples, spectral)
     _check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
-    table = getattr(bsdf, "table", None)
-    if table is not None and bands.low < table.wavelength_range[0]:
+    shortest = getattr(bsdf, "shortest_wavelength", 0.0)
+    if bands.low < shortest:
         raise DiffractionError(
-            f"{bands}: below the table's shortest wavelength, {table.wavelength_range[0]:g} "
-            "nm; build a wider table with 'mitsuba-diffraction precompute --wavelength-range'"
+            f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a wider table "
+            "with 'mitsuba-diffraction precompute --wavelength-range'"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
-    narrowest = 0.5 if table is None else 1 / (2**0.5 * table.sigma * float(wavenumber(bands.low)))
+    sigma = getattr(bsdf, "sigma", None)
+    narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
     sums: _SpectralSums | _RgbSums
@@ -105,7 +106,7 @@ def brdf_map(
         cosine=cosine,
         illuminant=illuminant,
         samples=samples,
-        lobe=0.0 if table is None else NEAR / (table.sigma * float(wavenumber(bands.high))),
+        lobe=0.0 if sigma is None else NEAR / (sigma * float(wavenumber(bands.high))),
     )
 
 
@@ -221,9 +222,9 @@ def _over_pixels(
     coverage = np.zeros((resolution, resolution), np.float32)
     values = np.zeros((sums.count, resolution, resolution), np.float32)
     pattern = hemisphere.sub_samples(samples)
-    chunks = -(-rows.size // _PIXELS)
+    chunks = -(-rows.size // LAUNCH_PIXELS)
     for chunk in range(chunks):
-        part = slice(chunk * _PIXELS, (chunk + 1) * _PIXELS)
+        part = slice(chunk * LAUNCH_PIXELS, (chunk + 1) * LAUNCH_PIXELS)
         x0, y0 = (upload(mi.Float, low[index[part]]) for index in (columns, rows))
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(x0))
         si.n = mi.Normal3f(0.0, 0.0, 1.0)

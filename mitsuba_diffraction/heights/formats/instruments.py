@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import DiffractionError
+from ...extras import optional
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
@@ -51,19 +52,13 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         # Readers warn of unknown fields and missing optional packages; units and sizes are checked
         # below.
         warnings.simplefilter("ignore")
-        try:
-            from SurfaceTopography.Exceptions import CannotDetectFileFormat
-            from SurfaceTopography.IO import open_topography
-        except ImportError as error:
-            raise DiffractionError(
-                f"{shown} is read as an instrument file, which needs SurfaceTopography: "
-                "pip install 'mitsuba_diffraction[afm]'"
-            ) from error
+        unknown = optional("SurfaceTopography.Exceptions", shown).CannotDetectFileFormat
+        topography = optional("SurfaceTopography.IO", shown)
         # On damaged data, some forty readers of binary formats raise anything from struct.error to
         # AssertionError; each becomes one line with its cause attached.
         try:
-            reader = open_topography(str(path))
-        except CannotDetectFileFormat as error:
+            reader = topography.open_topography(str(path))
+        except unknown as error:
             raise DiffractionError(
                 f"{shown} is not a height field of a known kind; expected an image (PNG, BMP, "
                 "TIFF, EXR), an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument "

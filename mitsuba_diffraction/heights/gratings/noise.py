@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter1d
+import scipy
 
 FloatArray = npt.NDArray[np.float64]
 Rng = np.random.Generator
@@ -46,7 +46,7 @@ def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) 
     """Interpolate a periodic `field` (my, mx) over `extent` at points in µm, by cubic splines."""
     my, mx = field.shape
     indices = (y * (my / extent[1]), x * (mx / extent[0]))
-    return np.asarray(map_coordinates(field, indices, order=3, mode="grid-wrap"))
+    return np.asarray(scipy.ndimage.map_coordinates(field, indices, order=3, mode="grid-wrap"))
 
 
 def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
@@ -58,7 +58,7 @@ def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
 
 def _spline_rows(field: FloatArray, indices: FloatArray) -> FloatArray:
     """Interpolate rows of a periodic `field` (m, n) at fractional `indices` (k,): shape (k, n)."""
-    spline = spline_filter1d(field, order=3, axis=0, mode="grid-wrap")
+    spline = scipy.ndimage.spline_filter1d(field, order=3, axis=0, mode="grid-wrap")
     base = np.floor(indices).astype(np.intp)
     f = (indices - base)[:, None]
     weights = (  # uniform cubic B-spline
@@ -81,7 +81,9 @@ def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:
     """
     ny, nx = shape
     sigma = (size[1] * ny / extent[1], size[0] * nx / extent[0])
-    noise = gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap", truncate=3)
+    noise = scipy.ndimage.gaussian_filter(
+        rng.standard_normal(shape), sigma, mode="wrap", truncate=3
+    )
     variance = math.prod(_filtered_variance(s, n) for s, n in zip(sigma, shape, strict=True))
     return noise / math.sqrt(variance)
 
@@ -91,7 +93,7 @@ def _filtered_variance(sigma: float, n: int) -> float:
     impulse = np.zeros(n)
     impulse[0] = 1
     if sigma > 0:
-        impulse = gaussian_filter(impulse, sigma, mode="wrap", truncate=3)
+        impulse = scipy.ndimage.gaussian_filter(impulse, sigma, mode="wrap", truncate=3)
     return float((impulse**2).sum())
 
 

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
@@ -202,7 +202,9 @@ def _surface(
     # scan lines run along x, and the probe meets an edge a little earlier or later on each
     fray = roughness * species.fray * grain(rng, extent, shape, (0.08, 0.018))
     heights, gap = overlay(rows, extent, fray, species.blade)
-    heights = gaussian_filter1d(heights, 0.024 * shape[1] / extent[0], axis=1, mode="wrap")
+    heights = scipy.ndimage.gaussian_filter1d(
+        heights, 0.024 * shape[1] / extent[0], axis=1, mode="wrap"
+    )
     floor = ramp(0.0, 0.08, gap)
     heights -= 0.007 * floor * np.exp(-gap / 0.06)  # the floor dips towards the fingers' sides
     streaks = grain(rng, extent, shape, (0.05, 0.35))

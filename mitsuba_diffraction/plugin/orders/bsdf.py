@@ -1,32 +1,50 @@
 """The Mitsuba BSDF plugin `diffraction_orders`: gratings whose orders were solved.
 
 For steep grooves, most of all of metal, where the models of `diffraction` are far off: a CD, a
-blazed grating, an embossed hologram. `mitsuba-diffraction solve` makes the table (docs/orders.md).
+blazed grating, an embossed hologram. `mitsuba-diffraction solve` makes the table
+([orders.md](orders.md)). The profile repeats along x.
 
+The grating
+-----------
 table : string
-    File of `mitsuba-diffraction solve`, or of a table saved in Python.
+    File of `mitsuba-diffraction solve`, or of `OrderTable.save`.
 data : OrderTable
     Instead: a table, in dictionaries only, by `md.bsdf_dict`.
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm, which is the width over which light is coherent, at
-    least 2 periods. `auto` is 65 (sunlight). It sets the width of the orders' lobes.
+    4σ of the Gaussian amplitude window, µm, over which light is coherent, at least 2 periods. It
+    sets the width of the orders' lobes. `auto` is 65 (sunlight).
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the direction in which the profile repeats, as of
     `diffraction`.
 wavelength : float [550]
     Wavelength of mono variants, nm.
+(nested) : BSDF ∂
+    BSDF beneath, which receives the light that is in no order, by T(ωi) T(ωo) with T = 1 − Σ η_m:
+    for a dielectric grating over pigment, for example. A metal absorbs that light: nest nothing.
 
-The profile's clear layer, the table's superstrate, is a coat with a flat face: the face is a mirror
-of the same coherence width, and light that it sends back to the grating is summed as of powers.
+The model is a sum of lobes, one for each order m, of the efficiency η_m of the table:
 
     f = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²),   q = k (u, v),   q_m = (2πm/d, 0)
 
-RGB variants sum this over daylight. Polarised variants depolarise the light, of which they warn.
-Wavelengths outside the table have the efficiencies of the nearest that it has.
+The table's clear layer (superstrate) is a coat with a flat face: a mirror of the same coherence
+width. Light that the face sends back to the grating is summed over all orders and reflections, in
+powers. RGB variants sum f over daylight. Efficiencies are those of unpolarised light: polarised
+variants depolarise it, and warn once. Wavelengths outside the table have the efficiencies of the
+nearest in it. f is reciprocal as far as the table is, at the centres of lobes.
+
+XML and the same in Python:
 
     <bsdf type="diffraction_orders">
         <string name="table" value="grating.nc"/>
+        <float name="orientation" value="90"/>
     </bsdf>
+
+    import mitsuba_diffraction as md  # before Mitsuba: registers the plugin
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    md.OrderTable.mirror(period=1.6, reflectance=0.9).save("grating.nc")
+    bsdf = mi.load_dict({"type": "diffraction_orders", "table": "grating.nc", "orientation": 90})
 """
 
 from __future__ import annotations
@@ -39,17 +57,27 @@ import drjit as dr
 import mitsuba as mi
 
 from ...errors import warn
+from ...optics.geometry import sigma_of
+from .. import nesting
 from ..directions import Pair, PatchFrame
-from ..parameter_changes import arrays_within, check_parameters, marks, take_changes
+from ..parameter_changes import (
+    Changeable,
+    ObjectValues,
+    arrays_within,
+    check_parameters,
+    marks,
+    take_changes,
+)
 from ..sampling import direction_of
 from ..types import (
+    BSDF,
     Callback,
+    Colour,
     Context,
     Float,
     Interaction,
     Mask,
     Properties,
-    Sample,
     Spectrum,
     Vector2f,
     Vector3f,
@@ -78,68 +106,76 @@ class DiffractionOrders(mi.BSDF):
         self.table, self.orientation = read.table, read.orientation
         self.coherence_width, self._wavelength = read.coherence_width, read.wavelength
         self._lobes = lobes_of(self.table, self.coherence_width, self._wavelength)
-        self.parameters = [*self.orientation.changeable]
+        self.nested: BSDF = read.nested  # or None
+        self.parameters: list[Changeable] = [*self.orientation.changeable]
+        if self.nested is not None:
+            self.parameters.append(ObjectValues("nested", self.nested))
         self.mix: weakref.ref[Any] | None = None
-        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | mi.BSDFFlags.FrontSide
-        self.m_components = [glossy]
-        self.m_flags = glossy
+        components = nesting.components_of(self.nested)
+        self.m_components = components  # at once: reading it makes a copy
+        self.m_flags = nesting.flags_of(components)
         if mi.is_polarized:
             _warn_of_polarisation()
         check_parameters([self])
         self.derive()
 
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return sigma_of(self.coherence_width)
+
     # ------------------------------------------------------------------ Mitsuba's interface
 
-    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """Return f cosθo per wavelength."""
-        return self.eval_pdf(ctx, si, wo, active)[0]
+    eval, pdf, eval_pdf = nesting.evaluate, nesting.density, nesting.evaluate_both
+    sample = nesting.sample
+    eval_diffuse_reflectance = nesting.evaluate_diffuse_reflectance
 
-    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Return the density of `sample` per solid angle."""
-        return self.eval_pdf(ctx, si, wo, active)[1]
+    def diffracted_value(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+    ) -> Spectrum:
+        """See `Nesting.diffracted_value`."""
+        return self.diffracted_both(ctx, si, wo, active)[0]
 
-    def eval_pdf(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    def diffracted_density(self, si: Interaction, wo: Vector3f, active: Mask) -> Float:
+        """See `Nesting.diffracted_density`."""
+        return self.diffracted_both(mi.BSDFContext(), si, wo, active)[1]
+
+    def diffracted_both(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
-        """Return `eval` and `pdf` at once."""
-        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
-        active = mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
-        if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-            return mi.Spectrum(0.0), mi.Float(0.0)
-        pair = Pair(si, wo, self._frame(si, active), active)
-        light = self._lobes.reflected(pair, si)
-        value = mi.depolarizer(mi.UnpolarizedSpectrum(light.value))
-        return dr.select(active, mi.Spectrum(value), 0.0), dr.select(active, light.density, 0.0)
+        """See `Nesting.diffracted_both`."""
+        light = self._lobes.reflected(Pair(si, wo, self._frame(si, active), active), si)
+        return mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(light.value))), light.density
 
-    def sample(
-        self,
-        ctx: Context,
-        si: Interaction,
-        sample1: Float,
-        sample2: Vector2f,
-        active: Mask = True,
-    ) -> tuple[Sample, Spectrum]:
-        """Draw an order by its efficiency, and a direction in its lobe."""
-        cos_i = mi.Frame3f.cos_theta(si.wi)
-        active = mi.Mask(active) & (cos_i > 0.0)
+    def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
+        """Draw an order by its efficiency, and a direction in its lobe; see `Nesting.draw`."""
         frame = self._frame(si, active)
         incident = dr.detach(frame.turned(si.wi))
+        cos_i = mi.Frame3f.cos_theta(si.wi)
         drawn = self._lobes.draw(incident, cos_i, si, sample1, sample2)
-        result = dr.zeros(mi.BSDFSample3f)
-        result.eta = 1.0
-        result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        tangential = frame.from_table(drawn.uv) - mi.Vector2f(si.wi.x, si.wi.y)
-        result.wo = dr.detach(direction_of(tangential))
-        value, density = self.eval_pdf(ctx, si, result.wo, active & drawn.valid)
-        active &= density > 0.0
-        result.pdf = dr.select(active, density, 0.0)
-        weight = value * dr.rcp(dr.select(active, density, 1.0))
-        return result, dr.select(active, weight, 0.0)
+        direction = direction_of(frame.from_table(drawn.uv) - mi.Vector2f(si.wi.x, si.wi.y))
+        direction.z = dr.select(drawn.valid, direction.z, -1.0)
+        return dr.detach(direction)
 
-    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
-        """Return the albedo at normal incidence, for denoisers."""
-        albedo = self._lobes.albedo(mi.Vector2f(0.0), mi.Float(1.0), si)
-        return dr.select(active, dr.clip(mi.Spectrum(albedo), 0.0, 1.0), 0.0)
+    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
+        """See `Nesting.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
+        inwards, outwards = (
+            dr.maximum(1.0 - self._albedo(direction, si, active), 0.0) for direction in (si.wi, wo)
+        )
+        return inwards * outwards
+
+    def reflected_share(self, si: Interaction, active: Mask) -> Colour:
+        """See `Nesting.reflected_share`."""
+        return self._albedo(si.wi, si, active)
+
+    def normal_reflectance(self, si: Interaction, active: Mask) -> Spectrum:
+        """See `Nesting.normal_reflectance`."""
+        return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), si, active))
+
+    def _albedo(self, direction: Vector3f, si: Interaction, active: Mask) -> Colour:
+        """Return Σ η_m of light from a direction in the shading frame."""
+        tangential = self._frame(si, active).turned(direction)
+        return self._lobes.albedo(tangential, mi.Frame3f.cos_theta(direction), si)
 
     def _frame(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the axes of the profile at points of the surface."""
@@ -148,8 +184,10 @@ class DiffractionOrders(mi.BSDF):
     # ------------------------------------------------------------------ changes of parameters
 
     def traverse(self, callback: Callback) -> None:
-        """Expose the orientation."""
+        """Expose the orientation and the nested BSDF."""
         self.orientation.traverse(callback)
+        if self.nested is not None:
+            callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: list[str]) -> None:
         """Take all changes, or none of them.
@@ -173,11 +211,13 @@ class DiffractionOrders(mi.BSDF):
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""
-        shown = {
+        shown: dict[str, Any] = {
             "table": self.table,
             "coherence_width": f"{self.coherence_width:g} µm",
             "orientation": self.orientation,
         }
+        if self.nested is not None:
+            shown["nested"] = self.nested
         lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())
         return f"DiffractionOrders[\n{lines}]"
 

@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...optics.colour import RGB_WAVELENGTHS
+from ...optics.geometry import sigma_of
 from ...tables.orders import OrderTable
 from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..directions import Pair
@@ -80,7 +81,7 @@ class _Window:
     """
 
     def __init__(self, table: OrderTable, coherence_width: float) -> None:
-        self.sigma, self.period = 0.25 * coherence_width, table.period
+        self.sigma, self.period = sigma_of(coherence_width), table.period
         self.lookup: OrderLookup = order_lookup(table)
         self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
         # where an order's neighbour adds to its lobe

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import weakref
 from dataclasses import dataclass
@@ -16,13 +15,11 @@ from ...heights.lengths import is_auto
 from ...settings import checked
 from ...tables.orders import OrderTable
 from ..dictionary import ORDERS, OrderData
-from ..llvm import require_loaded_llvm
 from ..properties import number
-from ..surface_parameters import DEFAULT_WAVELENGTH, orientation_of, resolved_path
+from ..surface_parameters import DEFAULT_WAVELENGTH, nested_of, orientation_of, resolved_path
 from ..textures import Orientation
-from ..types import Properties
+from ..types import BSDF, Properties
 
-NAMES = ("table", "data", "coherence_width", "orientation", "wavelength")
 #: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
 LEAST_PERIODS = 2.0
 
@@ -39,12 +36,14 @@ class Parameters:
     coherence_width : 4σ of the amplitude window, µm.
     orientation : angle from the first tangent to the patch's x axis.
     wavelength : nm, of mono variants.
+    nested : the BSDF beneath, or None.
     """
 
     table: OrderTable
     coherence_width: float
     orientation: Orientation
     wavelength: float
+    nested: BSDF | None
 
 
 def read_parameters(props: Properties) -> Parameters:
@@ -55,17 +54,14 @@ def read_parameters(props: Properties) -> Parameters:
     DiffractionError
         With the parameter, its value and the choices.
     """
-    require_loaded_llvm()
-    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
-        if name not in (*NAMES, "id"):
-            near = difflib.get_close_matches(name, NAMES, 1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise DiffractionError(
-                f"unknown parameter '{name}' of {ORDERS}; {hint}Allowed: {', '.join(NAMES)}"
-            )
+    nested = nested_of(props, ORDERS)
     table = _table(props)
     return Parameters(
-        table, _coherence_width(props, table), orientation_of(props), _wavelength(props, table)
+        table=table,
+        coherence_width=_coherence_width(props, table),
+        orientation=orientation_of(props),
+        wavelength=_wavelength(props, table),
+        nested=nested,
     )
 
 

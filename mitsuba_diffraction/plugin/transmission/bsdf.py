@@ -19,7 +19,7 @@ model : string [small_slope]
 energy_conserving : boolean [true]
     Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
     directions of both sides. Where the other orders of a steep surface exceed 1 on their own, all
-    light is attenuated by t(ωi) t(ωo). It takes a few seconds the first time and is kept in the
+    light is attenuated by s(ωi) s(ωo). It takes a few seconds the first time and is kept in the
     cache, in steps of 0.01 of eta. `false` is the model as it is, for checks.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
@@ -94,7 +94,7 @@ from .crossing import (
     out_of_sheet,
     tangent_plane,
 )
-from .energy import SidesModel
+from .energy import DielectricEnergy
 from .parameters import read_parameters
 
 _LEAST_SHARE = 0.1
@@ -115,7 +115,6 @@ class DiffractionDielectric(DiffractingSurface):
     material : the dielectric.
     boundary, inner_boundary : models of light that is reflected above and below the surface.
     thin : whether the side below is beyond the flat side of a sheet.
-    balance : scales by which both sides add up to 1, or None.
     """
 
     #: Feature that shaders do not support.
@@ -130,9 +129,9 @@ class DiffractionDielectric(DiffractingSurface):
             self.boundary.of(inside) if isinstance(self.boundary, SmallSlope) else Kirchhoff(inside)
         )
         self.mirror = Kirchhoff(self.material)
-        self.balance = None
+        self._energy = None
         if read.surface.energy_conserving:
-            self.balance = SidesModel(
+            self._energy = DielectricEnergy(
                 self.table, self.material, str(self.boundary), self.thin, self.wavelength
             )
         sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
@@ -165,8 +164,8 @@ class DiffractionDielectric(DiffractingSurface):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
         change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
-        if self.balance is not None and self.balance.scales_order_0:
-            change = self.balance.order_0_scale((si.wi, wo), frame, *where)
+        if self._energy is not None and self._energy.scales_order_0:
+            change = self._energy.order_0_scale((si.wi, wo), frame, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
@@ -181,9 +180,9 @@ class DiffractionDielectric(DiffractingSurface):
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self.balance is not None and self.balance.attenuates:
-            # t(ωi) t(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self.balance.attenuation((si.wi, wo), frame, *where))
+        if self._energy is not None and self._energy.attenuates:
+            # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
+            value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), frame, *where))
         return value, density
 
     def sample(
@@ -414,21 +413,21 @@ class DiffractionDielectric(DiffractingSurface):
     def derive(self) -> None:
         """Compute what depends on the parameters: the index, and scales of both sides."""
         self.material.derive()
-        if self.balance is not None:
-            self.balance.update(*self.scale_range())
+        if self._energy is not None:
+            self._energy.update(self.scale_range())
         self.freeze(
-            (self.balance, self.boundary, self.inner_boundary, self.mirror),
+            (self._energy, self.boundary, self.inner_boundary, self.mirror),
             self.thin,
             str(self.boundary),
-            self.balance is not None and self.balance.scales_order_0,
-            self.balance is not None and self.balance.attenuates,
+            self._energy is not None and self._energy.scales_order_0,
+            self._energy is not None and self._energy.attenuates,
         )
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""
         more = {"thin": "true" if self.thin else "false"}
         return self.described(
-            "DiffractionDielectric", str(self.boundary), self.balance is not None, more
+            "DiffractionDielectric", str(self.boundary), self._energy is not None, more
         )
 
 

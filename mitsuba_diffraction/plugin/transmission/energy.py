@@ -1,6 +1,6 @@
 """Scales of directions by which both sides of a dielectric add up to 1 (Dr.Jit).
 
-The twin of `tables.energy.transmission` in a kernel.
+The twin of `tables.energy.conservation` of dielectrics in a kernel.
 """
 
 from __future__ import annotations
@@ -8,11 +8,12 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ...tables.energy.store import SidesEnergy
-from ...tables.energy.transmission import Medium
+from ...tables.energy import materials
+from ...tables.energy.conservation import Energy
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, scales_of
 from ..directions import PatchFrame
+from ..energy_factors import ScaleRange
 from ..fresnel import Dielectric
 from ..layers import plain
 from ..types import Colour, Float, Vector3f
@@ -21,8 +22,8 @@ from ..types import Colour, Float, Vector3f
 INDEX_STEP = 0.01
 
 
-class SidesModel:
-    """Scales c and t of directions on either side, at the height scale and index last given.
+class DielectricEnergy:
+    """Scales c and s of directions on either side, at the height scale and index last given.
 
     Parameters
     ----------
@@ -42,32 +43,33 @@ class SidesModel:
         self._table, self._material, self._model, self._thin = table, material, model, thin
         mono = wavelength, wavelength
         self._range = mono if mi.is_monochromatic else table.wavelength_range
-        #: c above and below, t above and below
-        self._lookups = [DirectionLookup() for _ in range(4)]
+        self._order_0, self._all_light = ([DirectionLookup(), DirectionLookup()] for _ in range(2))
 
-    def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
-        """Look up, or compute, c and t at another height scale or index: `EnergyModel.update`."""
+    def update(self, factors: ScaleRange) -> None:
+        """Look up, or compute, c and s at other factors or another index: `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
-        medium = Medium(index, self._model, self._thin)
-        energy = SidesEnergy(self._table, medium, self._range)
-        if lowest is None:
-            nodes = list(energy.nodes(height_scale, interval=differentiable))
-        else:
-            nodes = energy.between(lowest, height_scale)
-        scales = [energy.at(node) for node in nodes]
-        for n, lookup in enumerate(self._lookups):
-            tables = scales_of([scale[n] if n < len(scale) else None for scale in scales])
-            lookup.update(tables, nodes, height_scale, lowest is not None)
+        dielectric = materials.Dielectric(index, self._model, self._thin)
+        energy = Energy(self._table, dielectric, factors.wavelengths(self._range))
+        nodes = factors.nodes(energy)
+        conserved = [energy.at(node) for node in nodes]
+        scales = {
+            self._order_0[0]: [each.order_0 for each in conserved],
+            self._order_0[1]: [each.order_0_below for each in conserved],
+            self._all_light[0]: [each.scale for each in conserved],
+            self._all_light[1]: [each.scale_below for each in conserved],
+        }
+        for lookup, tables in scales.items():
+            lookup.update(scales_of(tables), nodes, factors)
 
     @property
     def scales_order_0(self) -> bool:
         """Whether order 0 is scaled by c."""
-        return self._lookups[0].present
+        return self._order_0[0].present
 
     @property
     def attenuates(self) -> bool:
-        """Whether all light is attenuated by t."""
-        return self._lookups[2].present
+        """Whether all light is scaled by s."""
+        return self._all_light[0].present
 
     def order_0_scale(
         self,
@@ -77,7 +79,7 @@ class SidesModel:
         height_scale: Float,
     ) -> Colour:
         """c(ωi) c(ωo) per channel, of directions in the shading frame."""
-        return self._product(self._lookups[:2], directions, frame, wavenumbers, height_scale)
+        return self._product(self._order_0, directions, frame, wavenumbers, height_scale)
 
     def attenuation(
         self,
@@ -86,8 +88,8 @@ class SidesModel:
         wavenumbers: list[Float],
         height_scale: Float,
     ) -> Colour:
-        """t(ωi) t(ωo) per channel, of directions in the shading frame."""
-        return self._product(self._lookups[2:], directions, frame, wavenumbers, height_scale)
+        """s(ωi) s(ωo) per channel, of directions in the shading frame."""
+        return self._product(self._all_light, directions, frame, wavenumbers, height_scale)
 
     def _product(
         self,
@@ -100,10 +102,10 @@ class SidesModel:
         """Product of a scale at both directions, each on its side."""
         product = mi.UnpolarizedSpectrum(1.0)
         for direction in directions:
-            tangential, cosine = frame.turned(direction), mi.Frame3f.cos_theta(direction)
+            cosine = mi.Frame3f.cos_theta(direction)
             sides = zip(
-                lookups[0].at(tangential, cosine, wavenumbers, height_scale),
-                lookups[1].at(tangential, -cosine, wavenumbers, height_scale),
+                lookups[0].at(direction, cosine, frame, wavenumbers, height_scale),
+                lookups[1].at(direction, -cosine, frame, wavenumbers, height_scale),
                 strict=True,
             )
             product *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *both) for both in sides])

@@ -68,7 +68,7 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
             f"{refused}: int_ior must be at least {LEAST_INDEX:g} times ext_ior; turn the surface "
             "round if the denser medium is above"
         )
-    thin, model = flag(props, "thin", False), choice(props, "model", through.MODELS)
+    thin, model = flag(props, "thin", False), choice(props, "model", tuple(through.MODELS))
     # Light below the surface has the wavelength λ/n
     surface = read_surface(props, provider, float(dr.slice(material.eta)), second_order=False)
     return Parameters(surface, material, boundary_of(model, material, surface.table), thin)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ...errors import DiffractionError
 from .lights import Light
@@ -188,4 +188,4 @@ def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
 
 def rotation_about(axis: Array, angle: float) -> Array:
     """Return the rotation matrix (3, 3) about a unit vector, counter-clockwise."""
-    return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix())
+    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(angle * axis).as_matrix())

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError
+from ...extras import optional
 from ...system import cores
 from .source import fragment_parts, plain_source, vertex_source
 from .texels import PAGE, Packed, Texture, Uniform
@@ -36,7 +37,7 @@ def headless_context() -> Any:
     Raises a DiffractionError if moderngl, EGL or a driver is missing, or the driver is older than
     OpenGL 3.3.
     """
-    moderngl = require_moderngl()
+    moderngl = optional("moderngl")
     try:
         backend = {"backend": "egl"} if sys.platform == "linux" else {}
         context = moderngl.create_standalone_context(**backend)
@@ -51,20 +52,6 @@ def headless_context() -> Any:
         context.release()
         raise
     return context
-
-
-def require_moderngl() -> Any:
-    """Import moderngl.
-
-    Raises a DiffractionError if it is not installed.
-    """
-    try:
-        import moderngl
-    except ImportError as error:
-        raise DiffractionError(
-            "the shaders need moderngl: pip install 'mitsuba-diffraction[gl]'"
-        ) from error
-    return moderngl
 
 
 def check_version(context: Any) -> None:
@@ -109,7 +96,7 @@ def compile_program(
 
     Raises a DiffractionError with file, line and the driver's message if it does not compile.
     """
-    moderngl = require_moderngl()
+    moderngl = optional("moderngl")
     stage = vertex_source(name=vertex)
     parts = fragment_parts(method, definitions, main=main)
     try:
@@ -164,7 +151,7 @@ def upload(context: Any, texture: Texture) -> Any:
 
     Raises a DiffractionError if it is larger than the driver supports.
     """
-    moderngl = require_moderngl()
+    moderngl = optional("moderngl")
     rows, columns, channels = texture.data.shape
     largest = context.info["GL_MAX_TEXTURE_SIZE"]
     if max(rows, columns) > largest:

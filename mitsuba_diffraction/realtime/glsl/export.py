@@ -17,7 +17,7 @@ import OpenEXR
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...tables.store import cached_colours
-from .maps import Map
+from .maps import Map, axis_map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
 from .source import global_names, pruned, renamed, resolved, shader_file
@@ -46,7 +46,7 @@ _ENTRY = """
 vec3 {name}(vec3 wi, vec3 wo)
 {{
     if (min(wi.z, wo.z) <= 0.0) return vec3(0.0);
-    return {prefix}diffraction(wi, wo, vec2(1.0, 0.0), 0);
+    return {prefix}diffraction(wi, wo, vec2({stretch:.9g}, 0.0), 0);
 }}
 """
 _BENEATH = f"""
@@ -115,20 +115,26 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     """
     from ...plugin.surface import DiffractingSurface  # which only a variant has
 
+    if lacking := getattr(bsdf, "not_in_shaders", None):
+        raise DiffractionError(
+            f"the surface has {lacking}, which the shaders do not support: export it without, or "
+            "render it with Mitsuba"
+        )
     if not isinstance(bsdf, DiffractingSurface):
         raise DiffractionError(
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
             "instance mi.load_dict(md.bsdf_dict(...))"
         )
-    if lacking := bsdf.not_in_shaders:
-        raise DiffractionError(
-            f"the surface has {lacking}, which the shaders do not support: export it without, or "
-            "render it with Mitsuba"
-        )
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
         )
+    if bsdf.lateral_scale.varying is not None:
+        raise DiffractionError(
+            "the surface has a lateral_scale that varies, which this export does not support: "
+            "export one with a number for each period"
+        )
+    stretch = float(axis_map(bsdf.orientation, bsdf.lateral_scale).value[2])
     material = Material(Map(np.zeros(3)), bsdf=bsdf)
     common = pack_surface(material) | pack_conservation(material)
     common |= Packed(
@@ -139,7 +145,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     tables = {method: _tables(method, bsdf) for method in methods}
     # equal for all methods, and read by shared functions
     common |= Packed(uniforms={"area_factor": tables[methods[0]].uniforms["area_factor"]})
-    return _joined(common, tables, _words(bsdf))
+    return _joined(common, tables, stretch, _words(bsdf))
 
 
 def export_shader(
@@ -184,7 +190,7 @@ def _tables(method: str, bsdf: Any) -> Packed:
     return pack_powers(bsdf.table) | pack_responses([daylight])
 
 
-def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
+def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: str) -> Shader:
     """Join the shared source with that of each method, under prefixed names."""
     definitions = dict(common.definitions)
     for packed in tables.values():
@@ -197,12 +203,12 @@ def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)
     for method, packed in tables.items():
-        prefix = f"{_PREFIX}{method[:4]}_"
+        prefix = f"{_PREFIX}{method}_"
         text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
         text = resolved(text, {**common.definitions, **packed.definitions})
         method_names = global_names(text)
         text = renamed(text, [(_PREFIX, names), (prefix, method_names)])
-        code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix))
+        code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix, stretch=stretch))
         declared |= _declared(packed, prefix, method_names) | _declared(packed, _PREFIX, names)
     functions = {method: EXPORTED[method] for method in tables}
     head = _HEAD.format(

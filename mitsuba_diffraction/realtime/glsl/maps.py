@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import DiffractionError
 from ...optics.colour import linear_srgb, response
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
@@ -34,6 +35,7 @@ class Map:
     to_uv: Array = field(default_factory=lambda: np.eye(3))  # from texture coordinates to it
     attribute: str | None = None  # name of a mesh attribute
     clamped: bool = False  # whether the picture is clamped at its edges; else it repeats
+    nearest: bool = False  # whether each texel has one value; else texels are interpolated
     spectra: NDArray[np.floating] | None = None  # reflectances of some texels over `_LAM`, (n, 36)
     # colours of these texels under the light of the picture, (n, 3)
     colours: NDArray[np.floating] | None = None
@@ -113,24 +115,92 @@ def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
     return total
 
 
-def axis_map(orientation: Any) -> Map:
-    """Return the direction of the patch's x axis, (cos, sin) in the tangent frame."""
-    if not hasattr(orientation, "texture"):
+def axis_map(orientation: Any, lateral: Any) -> Map:
+    """Return the patch's frame: (cos, sin) of its x axis in the tangent frame, and its stretch.
+
+    lateral : `LateralScale` of the BSDF; its factor is relative to the table's patch.
+
+    Raises a DiffractionError for textures that do not fit one picture.
+    """
+    import mitsuba as mi
+
+    turning = getattr(orientation, "texture", None)
+    stretching = None if lateral.varying is None else lateral.varying.texture
+    stretch = 1.0
+    if stretching is None:
+        stretch = float(
+            np.array(lateral.over_table(_interaction(np.zeros((1, 2))), True)).ravel()[0]
+        )
+    if turning is None and stretching is None:
         angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
-        return Map(np.array([np.cos(angle), np.sin(angle)]))
-    texture = orientation.texture
-    attribute = _attribute(texture)
-    if attribute is not None:
-        return Map(np.array([1.0, 0.0]), attribute=attribute)
-    width, height = (int(n) for n in texture.resolution())
-    uv, to_uv = _centres(texture, width, height)
+        return Map(np.array([np.cos(angle), np.sin(angle), stretch]))
+    attribute = None if turning is None else _attribute(turning)
+    if attribute is not None and stretching is None:
+        return Map(np.array([1.0, 0.0, stretch]), attribute=attribute)
 
-    def turned(uv: Array) -> Array:
-        """Evaluate the texture of directions."""
-        return np.array(texture.eval_3(_interaction(uv)), np.float64).T
+    def frame(uv: Array) -> Array:
+        """Evaluate both textures."""
+        si = _interaction(uv)
+        values = [*orientation.rotation(si, mi.Mask(True)), lateral.over_table(si, True)]
+        return np.stack([np.broadcast_to(np.array(x, float).ravel(), len(uv)) for x in values], 1)
 
-    value = turned(uv).reshape(height, width, 3)[..., :2]
-    return Map(np.array([1.0, 0.0]), value, to_uv, clamped=_clamps(turned, to_uv))
+    textures = [texture for texture in (turning, stretching) if texture is not None]
+    return _picture(textures, frame, "orientation and lateral_scale")
+
+
+def interval_maps(mix: Any) -> list[Map]:
+    """Return the interval of [0, 1) that each surface of a `diffraction_mix` takes, two channels.
+
+    Raises a DiffractionError for textures that do not fit one picture.
+    """
+    import mitsuba as mi
+
+    count = len(mix.bsdfs)
+    textures = [weight for weight in mix.weights.values() if isinstance(weight, mi.Texture)]
+
+    def edges(uv: Array) -> Array:
+        """Evaluate the cumulative weights; the outer ones lie beyond 0 and 1."""
+        weights = mix.weights_at(_interaction(uv), mi.Mask(True))
+        values = [np.broadcast_to(np.array(weight, float).ravel(), len(uv)) for weight in weights]
+        inner = np.cumsum(values, axis=0)[:-1]
+        return np.stack([np.full(len(uv), -1.0), *inner, np.full(len(uv), 2.0)], axis=1)
+
+    if textures:
+        whole = _picture(textures, edges, "the weights of a mix")
+    else:
+        whole = Map(np.zeros(2), edges(np.zeros((1, 2))).reshape(1, 1, -1))
+    assert whole.picture is not None
+    return [replace(whole, picture=whole.picture[..., n : n + 2]) for n in range(count)]
+
+
+def _picture(textures: list[Any], look_up: Callable[[Array], Array], name: str) -> Map:
+    """Evaluate a function of textures at the texels of the largest one."""
+    sizes, transforms = [], []
+    for texture in textures:
+        if _attribute(texture) is not None:
+            raise DiffractionError(
+                f"{name}: a mesh attribute is not supported by the shaders; use textures, or "
+                "render the scene with Mitsuba"
+            )
+        width, height = (int(n) for n in texture.resolution())
+        if texture.class_name() == "Checkerboard":
+            width = height = _CHEQUERS
+        sizes.append((width, height))
+        transforms.append(_centres(texture, 1, 1)[1])
+    (width, height), to_uv = max(zip(sizes, transforms, strict=True), key=lambda pair: pair[0])
+    if any(size != (1, 1) and not np.allclose(other, to_uv)
+           for size, other in zip(sizes, transforms, strict=True)):  # fmt: skip
+        raise DiffractionError(
+            f"{name}: the textures differ in to_uv, which the shaders do not support; scale them "
+            "alike, or render the scene with Mitsuba"
+        )
+    uv, _ = _centres(textures[sizes.index((width, height))], width, height)
+    values = look_up(uv)
+    aside = np.linalg.inv(to_uv)[:2, :2] @ np.array([0.3 / width, 0.3 / height])
+    return Map(
+        values[0], values.reshape(height, width, -1), to_uv, clamped=_clamps(look_up, to_uv),
+        nearest=bool(np.allclose(look_up(uv + aside), values)),
+    )  # fmt: skip
 
 
 def _clamps(look_up: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,9 +13,9 @@ from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...plugin.parameter_changes import children
-from ...tables.energy.grid import FINE
+from ...tables.directional import FINE
 from ...tables.table import DiffractionTable
-from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
+from .maps import Map, Spectrum, axis_map, colour_map, evaluated, interval_maps, raw_picture
 from .packing import (
     pack_beneath,
     pack_conductor,
@@ -146,11 +146,12 @@ class Material:
     pigment: Map  # diffuse reflectance, linear sRGB
     two_sided: bool = False  # whether the back reflects like the front
     bsdf: Any = None  # the diffraction BSDF, or None
-    # (cos, sin) from the tangent to the patch's x axis
-    axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0])))
+    # (cos, sin) from the tangent to the patch's x axis, and the factor by which it is stretched
+    axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0, 1.0])))
     gloss: Gloss | None = None  # specular reflection of a BSDF that does not diffract
     bumps: Map | None = None  # heights (rows, columns, 1) in the scene's unit, or None
     normals: Map | None = None  # (rows, columns, 3) in the shading frame, or None
+    mask: Map | None = None  # interval of [0, 1) that the surface takes in a mix, or None
 
     @property
     def black(self) -> bool:
@@ -166,14 +167,17 @@ class Material:
         return table
 
 
-def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Material:
-    """Read the material of a shape, and append its unsupported features to `omissions`.
+def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> list[Material]:
+    """Read the material of a shape, or those of a mix.
+
+    Unsupported features are appended to `omissions`.
 
     light : wavelengths and spectrum relative to D65, under which pigments get their colours.
     """
     import mitsuba as mi
 
-    from ...plugin.bsdf import Diffraction  # which only a variant has
+    from ...plugin.blended_patches import DiffractionMix  # which only a variant has
+    from ...plugin.bsdf import Diffraction
 
     two_sided, bumps, normals = False, None, None
     while bsdf.class_name() in _WRAPPERS:
@@ -194,21 +198,32 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             f"{name} has {only}, which the shaders do not support; leave it out, or render the "
             "scene with Mitsuba"
         )
+    if isinstance(bsdf, DiffractionMix):
+        parts = []
+        for (part, inner), mask in zip(bsdf.bsdfs.items(), interval_maps(bsdf), strict=True):
+            materials = read_materials(inner, omissions, f"{part} of {name}", light)
+            if len(materials) > 1 or materials[0].bumps or materials[0].normals:
+                raise DiffractionError(
+                    f"{part} of {name}: a mix, bumps or a normal map within a mix are not "
+                    "supported by the shaders; put them around it, or render with Mitsuba"
+                )
+            both = two_sided or materials[0].two_sided
+            parts.append(
+                replace(materials[0], two_sided=both, bumps=bumps, normals=normals, mask=mask)
+            )
+        return parts
     if isinstance(bsdf, Diffraction):
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"the base beneath {name}", light)
-        return Material(
-            pigment, two_sided, bsdf, axis_map(bsdf.orientation), bumps=bumps, normals=normals
-        )
-    gloss = Gloss.read(bsdf)
-    if gloss is None:
-        return Material(
-            _diffuse(bsdf, omissions, name, light), two_sided, bumps=bumps, normals=normals
-        )
-    omissions += [f"{part} of {name}" for part in gloss.omissions]
-    pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
-    return Material(pigment, two_sided, gloss=gloss, bumps=bumps, normals=normals)
+        material = Material(pigment, bsdf=bsdf, axis=axis_map(bsdf.orientation, bsdf.lateral_scale))
+    elif (gloss := Gloss.read(bsdf)) is not None:
+        omissions += [f"{part} of {name}" for part in gloss.omissions]
+        pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
+        material = Material(pigment, gloss=gloss)
+    else:
+        material = Material(_diffuse(bsdf, omissions, name, light))
+    return [replace(material, two_sided=two_sided, bumps=bumps, normals=normals)]
 
 
 def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
@@ -238,12 +253,17 @@ def pack_surface(material: Material) -> Packed:
     }
     definitions: dict[str, str] = {}
     textures = []
-    for name, value in (("colour", material.pigment), ("axis", material.axis)):
-        if value.picture is not None:
+    if material.mask is not None:
+        uniforms["mask_uv"] = tuple(material.mask.to_uv.T.ravel().tolist())
+    pictures = {"colour": material.pigment, "axis": material.axis, "mask": material.mask}
+    for name, value in pictures.items():
+        if value is not None and value.picture is not None:
             textures.append(Texture(f"{name}_map", as_half(_four(value.picture)), smooth=True))
             definitions[f"{name.upper()}_MAPPED"] = ""
             if value.clamped:
                 definitions[f"{name.upper()}_CLAMPED"] = ""
+            if value.nearest:
+                definitions[f"{name.upper()}_NEAREST"] = ""
     packed = Packed(tuple(textures), uniforms, definitions)
     bsdf, gloss = material.bsdf, material.gloss
     if bsdf is None:

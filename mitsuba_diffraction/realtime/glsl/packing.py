@@ -17,7 +17,7 @@ from ...optics.second_order import LIMIT, NODES, coefficient_table
 from ...optics.slope_ratios import SlopeRatios
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
-from ...tables.energy.grid import FINE, SHARE, DirectionalTable
+from ...tables.directional import FINE, SHARE, DirectionalTable
 from ...tables.layout import Record, cells_of, functions_at
 from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable

@@ -17,9 +17,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...extras import optional
 from ...tables.store import cached_colours
 from .camera import Camera
-from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms
+from .context import Bindings, Target, compile_plain, set_uniforms
 from .emitters import Emitters
 from .lights import Light, light_definitions
 from .materials import coat_index, height_scale
@@ -124,7 +125,7 @@ class Stage:
 
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
         """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         matrix = camera.view_projection(self._scene.low, self._scene.high)
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
@@ -293,7 +294,7 @@ class ProgressiveLight:
 
     def _accumulate(self, target: Target) -> None:
         """Add the frame to a sum."""
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         context: Any = self._renderer.context
         target.frame.use()
         context.enable_only(moderngl.BLEND)
@@ -305,7 +306,7 @@ class ProgressiveLight:
 
     def show(self, frame: Any, exposure: float) -> None:
         """Draw the picture so far into a framebuffer of the same size, exposed, for a screen."""
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         context: Any = self._renderer.context
         frame.use()
         context.enable_only(moderngl.NOTHING)

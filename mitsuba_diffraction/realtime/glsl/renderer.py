@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import warn
+from ...extras import optional
 from ...optics.display import check_view
-from ...tables.energy.grid import FINE
+from ...tables.directional import FINE
 from .camera import Camera
 from .context import (
     Bindings,
@@ -18,7 +19,6 @@ from .context import (
     check_version,
     clock_of,
     headless_context,
-    require_moderngl,
     set_uniforms,
 )
 from .lights import Light, light_definitions
@@ -243,7 +243,7 @@ class Renderer:
         definitions, uniforms : definitions and uniforms of the light.
         extras : further bindings of each surface; without them the frame is cleared first.
         """
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         parts = self.prepared(method).parts(
             definitions, [extra.definitions for extra in extras or ()]
         )

@@ -19,7 +19,7 @@ from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .materials import Material, diffracts, read_material
+from .materials import Material, diffracts, read_materials
 from .source import LIGHTS
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ _RINGS, _SEGMENTS = 192, 384  # triangles of a sphere lie within 3e-5 of its rad
 
 #: Attributes of a vertex and their number of components.
 VERTEX = (
-    ("position", 3), ("normal", 3), ("tangent", 3), ("texcoord", 2), ("colour", 3), ("axis", 2)
+    ("position", 3), ("normal", 3), ("tangent", 3), ("texcoord", 2), ("colour", 3), ("axis", 3)
 )  # fmt: skip
 
 
@@ -159,7 +159,7 @@ class Surface:
     """A shape that reflects light: triangles and material."""
 
     name: str  # name in messages
-    # (n, 16) attributes of `VERTEX`; three consecutive vertices are a triangle
+    # (n, 17) attributes of `VERTEX`; three consecutive vertices are a triangle
     vertices: NDArray[np.float32]
     material: Material
     shape: Any  # shape of Mitsuba
@@ -171,7 +171,7 @@ class Surface:
 class Glow:
     """A shape that emits light and reflects none."""
 
-    vertices: NDArray[np.float32]  # (n, 16) attributes of `VERTEX`
+    vertices: NDArray[np.float32]  # (n, 17) attributes of `VERTEX`
     radiance: Array  # (3,) linear sRGB, mean emitted radiance
 
 
@@ -266,14 +266,16 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     surfaces, emitting = [], []
     for name, shape, triangles in supported:
         before = len(omissions)
-        material = read_material(shape.bsdf(), omissions, name, lighting.mean_spectrum)
-        vertices = _vertices(triangles, material, shape)
-        radiance = emitted_radiance(shape) if shape.is_emitter() else None
-        if radiance is not None and material.black:
-            emitting.append(Glow(vertices, radiance))
-            continue
+        materials = read_materials(shape.bsdf(), omissions, name, lighting.mean_spectrum)
         exact = len(omissions) == before
-        surfaces.append(Surface(name, vertices, material, shape, exact, radiance))
+        radiance = emitted_radiance(shape) if shape.is_emitter() else None
+        if radiance is not None and all(material.black for material in materials):
+            emitting.append(Glow(_vertices(triangles, materials[0], shape), radiance))
+            continue
+        # the surfaces of a mix share the triangles, and each is drawn where it has a weight
+        for material in materials:
+            vertices = _vertices(triangles, material, shape)
+            surfaces.append(Surface(name, vertices, material, shape, exact, radiance))
     low, high = box_of([s.vertices[:, :3] for s in surfaces])
     lens = ("the lens (shown as a pinhole)",) if camera.lens > 0.0 else ()
     of_light = (*lens, *lighting.omissions)
@@ -311,7 +313,7 @@ def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:
 
 
 def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[np.float32]:
-    """Return the attributes of all vertices, (n, 16), in the order of `VERTEX`."""
+    """Return the attributes of all vertices, (n, 17), in the order of `VERTEX`."""
     count = len(triangles.positions)
     normals, tangents = triangles.normals, triangles.tangents
     # tangents along the normal are replaced: shaders normalise the part across the normal
@@ -322,6 +324,7 @@ def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[n
     parts += [
         _attribute(material.pigment, triangles, shape, 3),
         _attribute(material.axis, triangles, shape, 2),
+        material.axis.value[2:],
     ]
     return np.concatenate([np.broadcast_to(p, (count, p.shape[-1])) for p in parts], axis=1).astype(
         np.float32

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
+from ...extras import optional
 from .camera import Camera, box_corners
-from .context import Target, compile_plain, require_moderngl, set_uniforms
+from .context import Target, compile_plain, set_uniforms
 from .lights import Light
 from .methods import vertex_array
 from .scene import Surface
@@ -120,7 +121,7 @@ class Casters:
 
     def draw(self, matrix: Array) -> None:
         """Draw all surfaces with a matrix (4, 4) from the scene to clip space."""
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         self.context.enable_only(moderngl.DEPTH_TEST)
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         for array in self._arrays:
@@ -131,7 +132,7 @@ class Casters:
 
         Returns the depth bias of each surface in texels.
         """
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         parts = [
             "none" if shape == light.shape else _needed(solid, light, outside)
@@ -177,8 +178,8 @@ class Casters:
 def outline(places: Array) -> Array:
     """Return the corners of the convex hull of points (n, 3), or all points of a flat set."""
     try:
-        return np.asarray(places[ConvexHull(places).vertices])
-    except (QhullError, ValueError):
+        return np.asarray(places[scipy.spatial.ConvexHull(places).vertices])
+    except (scipy.spatial.QhullError, ValueError):
         return np.unique(places, axis=0)
 
 
@@ -239,7 +240,7 @@ class ShadowMap:
     def __init__(self, casters: Casters, size: int = SIZE) -> None:
         self.casters, self.size = casters, size
         context = casters.context
-        moderngl = require_moderngl()
+        moderngl = optional("moderngl")
         self.texture = context.depth_texture((size, size))
         self.texture.compare_func = ""
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)

@@ -87,7 +87,7 @@ def fragment_parts(
     known = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl", "boundary.glsl"]
+    shared = ["library.glsl", "frame.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
     if "SHADOWED" in known:

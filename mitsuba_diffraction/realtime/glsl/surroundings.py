@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import distance_transform_edt
 
 from ...errors import DiffractionError
 from ...plugin.properties import name_of
@@ -96,7 +95,7 @@ def _power(
     radii = np.linspace(0.0, table.radius_end, len(table.order_0))
     places = np.rint(zs / table.z_max * (table.order_0.shape[1] - 1)).astype(int)
     profile = np.maximum(table.order_0[:, places, :3] @ np.array(IMPORTANCE), 0.0).mean(axis=1)
-    within = cumulative_trapezoid(2.0 * np.pi * radii * profile, radii, initial=0.0)
+    within = scipy.integrate.cumulative_trapezoid(2.0 * np.pi * radii * profile, radii, initial=0.0)
     return cells + np.diff(np.interp(edges, radii, within))[:, None] / _AZIMUTHS
 
 
@@ -125,7 +124,7 @@ def pack_obstacles(triangles: Array) -> Packed:
     for places in _places((triangles - low) / cell):
         x, y, z = places.astype(np.int32).T
         empty[z, y, x] = False
-    distances = distance_transform_edt(empty)
+    distances = scipy.ndimage.distance_transform_edt(empty)
     steps = np.minimum(np.floor(_PER_CELL * distances), 255.0).astype(np.uint8)
     return Packed(
         (listed("obstacles", steps.reshape(-1, 1)),),

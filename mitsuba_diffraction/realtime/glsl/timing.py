@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .context import Bindings, clock_of, compile_program, require_moderngl, set_uniforms
+from ...extras import optional
+from .context import Bindings, clock_of, compile_program, set_uniforms
 from .lights import light_definitions
 from .methods import vertex_array
 from .renderer import Renderer
@@ -63,7 +64,7 @@ def _seconds(renderer: Renderer, triangle: _Triangle) -> float:
     """Return the seconds of one picture; a small picture before it compiles the program."""
     target = renderer.target(SIDE, SIDE)
     target.frame.use()
-    renderer.context.enable_only(require_moderngl().NOTHING)  # no depth test
+    renderer.context.enable_only(optional("moderngl").NOTHING)  # no depth test
     triangle.bind()
     if not triangle.compiled:
         target.frame.viewport = (0, 0, 8, 8)

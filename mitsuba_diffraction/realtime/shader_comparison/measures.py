@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from ...errors import DiffractionError
+from ...extras import optional
 from ...optics.colour import delta_e, encode_srgb
 
 Image = NDArray[np.floating]
@@ -59,12 +59,7 @@ def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.floa
     DiffractionError
         If flip-evaluator is not installed.
     """
-    try:
-        import flip_evaluator
-    except ImportError as error:
-        raise DiffractionError(
-            "FLIP needs flip-evaluator: pip install 'mitsuba-diffraction[gl]'"
-        ) from error
+    flip_evaluator = optional("flip_evaluator")
     encoded = [
         encode_srgb(exposure * np.asarray(a, float)).astype(np.float32) for a in (reference, other)
     ]

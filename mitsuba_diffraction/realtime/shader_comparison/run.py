@@ -72,11 +72,13 @@ class SameLights:
         self.renderer.sky = np.zeros((4, 3))
         self.scene = with_lights(scene, self.renderer.camera, self.renderer.lights)
         self._visibility = visibility(self.scene, self.renderer.lights)
-        by_address = {surface.shape.ptr: surface for surface in self.renderer.scene.surfaces}
-        surfaces = [by_address.get(shape.ptr) for shape in self.scene.shapes()]
-        self._exact = np.array([s is not None and s.exact for s in surfaces])
+        surfaces = [
+            [surface for surface in self.renderer.scene.surfaces if surface.shape.ptr == shape.ptr]
+            for shape in self.scene.shapes()
+        ]
+        self._exact = np.array([bool(s) and all(one.exact for one in s) for s in surfaces])
         self._diffracting = np.array(
-            [s is not None and s.material.bsdf is not None for s in surfaces]
+            [any(one.material.bsdf is not None for one in s) for s in surfaces]
         )
 
     def regions(self, picture: NDArray[np.floating]) -> dict[str, NDArray[np.bool_]]:

@@ -40,7 +40,7 @@ from ..glsl.source import (
 )
 from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
-from .sections import Sections, packed_mesh, packed_parts, sections_of
+from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
 #: Largest size of a page, bytes.
@@ -49,7 +49,8 @@ MAX_BYTES = 25_000_000
 #: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
-_HEADER = 200_000  # upper bound of shaders, script and style, bytes
+#: Upper bound of a page's shaders, scripts and styles, bytes.
+CODE_BYTES = 200_000
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
@@ -206,7 +207,7 @@ def _packed(
     light = packed_light(scene, emitters, sections)
     around, definitions = packed_surroundings(loaded, scene, emitters, materials, sections)
 
-    room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
+    room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
     header: dict[str, Any] = {
         "title": title,
@@ -234,7 +235,7 @@ def _packed(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
-    _add_programs(header, surfaces, shown, packed, definitions, view)
+    _add_programs(header, sections, surfaces, shown, packed, definitions, view)
     header["loss"] = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
@@ -273,6 +274,7 @@ def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def _add_programs(
     header: dict[str, Any],
+    sections: Sections,
     surfaces: Sequence[tuple[dict[str, Any], Packed]],
     methods: Sequence[str],
     packed: Any,
@@ -298,7 +300,8 @@ def _add_programs(
             if source not in sources:
                 sources.append(source)
             entry["programs"][method] = sources.index(source)
-    header["programs"] = sources
+    text = np.frombuffer(json.dumps(sources).encode(), np.uint8)
+    header["programs"] = sections.add(packed_array(text[:, None]))
     header["mains"] = {
         main: shader_file(f"{file}.frag")
         for main, file in (("surface", "surface"), ("picked", "picked"), ("map", "map"))

@@ -63,6 +63,30 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
     return Section(data, layout)
 
 
+def packed_series(rows: NDArray[np.float16 | np.uint32]) -> Section:
+    """Compress rows of numbers as integers, and the binary exponent of each row's step.
+
+    rows : (n, m) half floats, or words of two upper halves of floats each (`texels.paired`). Few
+        binary digits in a row make small integers.
+    """
+    words = rows.dtype == np.uint32
+    if words:
+        pairs = np.stack([rows << 16, rows & np.uint32(0xFFFF0000)], axis=-1)
+        values = pairs.reshape(len(rows), -1).view(np.float32)
+    else:
+        values = rows.astype(np.float32)
+    # frexp: |x| = m 2^e with 24-bit m; the step is the lowest bit that any number of a row has
+    mantissas, exponents = np.frexp(values)
+    digits = np.round(np.abs(mantissas) * 2.0**24).astype(np.int64)
+    lowest = np.log2(np.where(digits > 0, digits & -digits, 1)).astype(np.int32) + exponents - 24
+    steps = np.where(digits > 0, lowest, 127).min(axis=1, keepdims=True)
+    integers = np.ldexp(values, -steps).astype(np.int32)
+    # sign in the lowest bit: the upper bytes of small integers are zeros
+    unsigned = (integers << 1) ^ (integers >> 31)
+    section = packed_array(np.concatenate([unsigned, steps + 128], axis=1).astype(np.uint16))
+    return Section(section.data, {**section.layout, "series": "words" if words else "half"})
+
+
 def packed_file(data: bytes) -> Section:
     """Return a file of a format that browsers read as a section."""
     return Section(data, {"kind": "file"})
@@ -209,24 +233,24 @@ def _texture(texture: Texture, sections: Sections, section: Section | None) -> d
     }  # fmt: skip
     if texture.name == "colour_map":
         entry["kind"] = "picture"
-        entry["section"] = sections.add(packed_file(_png(texture.data)))
+        entry["section"] = sections.add(packed_file(_picture(texture.data)))
         return entry
     data = texture.data
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
     if data.dtype == np.uint32:
         entry["kind"] = "words"
     if section is None:
-        section = packed_array(as_columns(data, channels), differences=entry["kind"] == "bytes")
+        section = packed_array(as_columns(data, channels))
     entry["section"] = sections.add(section)
     return entry
 
 
-def _png(data: NDArray[np.generic]) -> bytes:
-    """Encode a picture of reflectances in 8-bit sRGB, the format of nearly all source files."""
+def _picture(data: NDArray[np.generic]) -> bytes:
+    """Encode a picture of reflectances as WebP in 8-bit sRGB, as nearly all source files have."""
     from PIL import Image
 
     linear = np.asarray(data, np.float64)[..., :3]
     pixels = np.round(255.0 * encode_srgb(linear)).astype(np.uint8)
     file = io.BytesIO()
-    Image.fromarray(pixels, "RGB").save(file, "PNG", optimize=True)
+    Image.fromarray(pixels, "RGB").save(file, "WEBP", lossless=True)
     return file.getvalue()

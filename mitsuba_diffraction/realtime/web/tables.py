@@ -16,13 +16,17 @@ from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
-from .sections import Section, as_columns, packed_array
+from .sections import Section, as_columns, packed_array, packed_series
 
 #: Methods that a page supports.
 WEB_METHODS = ("fast", "exact")
 
-#: Numbers of binary digits, from the largest page to the smallest.
-DIGITS = (9, 8, 7, 6)
+#: Binary digits of a series' largest number; with these the mean ΔE2000 stays below 0.1.
+DIGITS = {"fast": 9, "exact": 8}
+#: Smallest rounding step relative to a table's largest number: more digits are not visible.
+FLOOR = 2.0**-19
+
+_FEWER = range(4)  # digits that may be left out of tables that are too large for a page
 
 _ORDERS = 5  # largest number of orders that the page names
 _LARGE = 1 << 20  # least number of entries of rounded textures
@@ -50,7 +54,7 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
     if method == "fast":
         colours = cached_colours(table)
         # rounded twice, so that the upper halves of floats, which the shader reads, are exact
-        coefficients = shortened(rounded(colours.coefficients, digits)).astype(np.float16)
+        coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
         fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
         packed, loss = pack_colours(fewer), colour_difference(colours, fewer)
         width = fewer.coefficients.shape[-1] // 2  # a word has two numbers
@@ -60,43 +64,48 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
             table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
             expansion=expansion,
         )  # fmt: skip
-        less = replace(powers, coefficients=rounded(powers.coefficients, digits))
+        less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
         packed, loss = pack_powers(less), power_colour_difference(powers, less)
         width = 4 * int(packed.definitions["TEXELS"])
     sections = {}
     for texture in packed.textures:
-        channels = texture.data.shape[2]
-        sections[texture.name] = packed_array(
-            as_columns(texture.data, width if texture.data.size > _LARGE else channels)
+        data, channels = texture.data, texture.data.shape[2]
+        sections[texture.name] = (
+            packed_series(as_columns(data, width))
+            if data.size > _LARGE
+            else packed_array(as_columns(data, channels))
         )
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 
-def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
+def rounded(values: NDArray[np.floating], bits: int, floor: float = 0.0) -> NDArray[np.float16]:
     """Round each row (…, n) to multiples of 2^-bits of its largest number's power of two.
 
-    A row is one series, whose terms are added up, so they get one absolute error. The half floats
-    end in zeros, which compress well.
+    A row is one series, whose terms are added up, so they get one absolute error.
+
+    floor : smallest step relative to the power of two of all rows' largest number.
     """
     exact = values.astype(np.float32)
-    largest = np.abs(exact).max(axis=-1, keepdims=True)
-    step = np.exp2(np.ceil(np.log2(np.maximum(largest, 2.0**-24))) - bits)
+    largest = np.maximum(np.abs(exact).max(axis=-1, keepdims=True), 2.0**-24)
+    powers = np.exp2(np.ceil(np.log2(largest)))
+    step = np.maximum(powers * 2.0**-bits, powers.max() * floor)
     return (np.round(exact / step) * step).astype(np.float16)
 
 
 def fitting_tables(
     methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
 ) -> dict[tuple[str, int], WebTable] | int:
-    """Round tables for all methods to as many digits as fit into `room` bytes.
+    """Round tables for all methods to `DIGITS`, or to fewer if they exceed `room` bytes.
 
     Returns the tables by method and number, or the number of bytes that is needed if none fit.
     """
     needed = 0
-    for digits in DIGITS:
+    for fewer in _FEWER:
         rounded_tables: dict[tuple[str, int], WebTable] = {}
         for method in methods:
             for number, table in enumerate(tables):
                 done = len(rounded_tables)
+                digits = DIGITS[method] - fewer
                 progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
                 rounded_tables[method, number] = web_table(method, table, digits)
         needed = sum(web.nbytes for web in rounded_tables.values())

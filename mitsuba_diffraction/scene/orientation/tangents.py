@@ -29,15 +29,15 @@ Bools = NDArray[np.bool_]
 
 #: Degrees: a field that turns by more within a triangle, or from one to the next, breaks there.
 BREAK = 60.0
-# Around a singular point a field turns by over 60° within a triangle or two, and has to. What is
-# longer than this many of its own edges, or than this share of the mesh, is a line.
+# Around a singular point a field has to turn by over 60° within a triangle or two. A line is longer
+# than this many of its edges, or than this share of the mesh.
 _EDGES, _SHARE = 4.0, 0.2
 
 MOST_TURNING = 0.05  # share of the surface on which the direction may turn too fast
 LONG = 0.05  # share of the mesh's size: longer breaks, all together, are visible
 TURN = 30.0  # degrees between neighbours from which on a seam shows
 
-FLAT = 1e-3  # share of the typical ratio of texture area to surface area: taken for none
+FLAT = 1e-3  # a smaller share of the median ratio of texture area to surface area counts as 0
 
 
 def _turning(orientation: Floats) -> Bools:
@@ -59,7 +59,7 @@ def _length_of_breaks(places: Floats, faces: Ints, crossed: Bools, jumps: Ints) 
     Parameters
     ----------
     places, faces : (n, 3) positions, each once; (m, 3) indices of them.
-    crossed : (m, 3) along which edges the field turns, as of `_turning`.
+    crossed : (m, 3) edges along which the field turns, from `_turning`.
     jumps : (e, 2) pairs of places: edges across which the field jumps by over 60 degrees.
     """
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)  # (m, 3, 2)
@@ -96,11 +96,11 @@ def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
     """Length of the line in a triangle that falls to each of its crossed edges."""
     owner = np.nonzero(crossed)[0]
     meeting = corners.mean(axis=1)
-    both = crossed.sum(axis=1) == 2
+    paired = crossed.sum(axis=1) == 2
     total = np.zeros_like(meeting)
     np.add.at(total, owner, middles)
     # from both middles half-way to each other
-    meeting[both] = total[both] / 2
+    meeting[paired] = total[paired] / 2
     return np.asarray(np.linalg.norm(middles - meeting[owner], axis=1))
 
 
@@ -139,14 +139,14 @@ class TangentReport:
         return self.turning >= MOST_TURNING
 
     def breaking(self) -> str:
-        """How long the lines are along which the direction breaks, in words."""
+        """Say how long the lines are along which the direction breaks."""
         return (
             f"breaks (turns by over {BREAK:g} degrees) along lines of {self.broken:.3g} in all, "
             f"{self.broken / self.size:.2g} times the mesh's size of {self.size:.3g}"
         )
 
     def problems(self) -> list[str]:
-        """Reasons against this mesh, a line each, with what to do."""
+        """List reasons against this mesh, a line each, with the remedy."""
         if not self.has_uv:
             return [
                 "no texture coordinates, so the patch has no direction: give the mesh one with "
@@ -231,8 +231,8 @@ def check_tangents(
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]  # (m, 2, 3)
     across = np.cross(sides[:, 0], sides[:, 1])
     area = np.linalg.norm(across, axis=1) / 2
-    real = area > 0
-    faces, sides, across, area = faces[real], sides[real], across[real], area[real]
+    solid = area > 0
+    faces, sides, across, area = faces[solid], sides[solid], across[solid], area[solid]
     total = area.sum()
     if uv is None or not len(faces):
         return TangentReport(

@@ -1,16 +1,16 @@
-"""Paths from the camera, and what light passes the diffracting surfaces on them.
+"""Paths from the camera, and the light that diffracting surfaces reflect along them.
 
-An ordinary path tracer (emitter and BSDF sampling, combined by the power heuristic; Veach 1997,
-ch. 9), run one bounce after the other, so that each BSDF writes down what it is asked. Light that
-reaches the camera has passed every vertex of its path: it counts at each of them, to the share
-that diffraction has in what the vertex reflects.
+The path tracer combines emitter and BSDF sampling by the power heuristic (Veach 1997, ch. 9). It
+runs one bounce after the other, so that each BSDF records its look-ups. Light that reaches the
+camera has passed every vertex of its path: it counts at each of them, times the share of
+diffraction in the light that the vertex reflects.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -24,8 +24,8 @@ from .recording import Session
 
 #: Longest paths that are followed, vertices and camera included.
 MOST_BOUNCES = 12
-#: The brightest paths count no more than this percentile of those that carry light: next to
-#: mirror images of the sun all else would be nothing, though a display shows them as mere white.
+#: The brightest paths count no more than this percentile of those that carry light. A display
+#: shows mirror images of the sun as mere white, but their light would outweigh all other.
 BRIGHTEST = 99.0
 
 
@@ -52,7 +52,7 @@ class TracedPaths:
     lobe_turn: NDArray[np.float64]
 
     def of(self, bsdfs: list[int]) -> NDArray[np.void]:
-        """The look-ups of some BSDFs."""
+        """Return the look-ups of some BSDFs."""
         return self.lookups[np.isin(self.lookups["bsdf"], bsdfs)]
 
 
@@ -60,14 +60,14 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
     """Trace paths through a scene that was loaded in a recording session.
 
     scene, sensor : of the variant that is set, a spectral one.
-    paths : how many; two of them a pixel.
+    paths : number of paths; two of them share a pixel.
 
     Raises a DiffractionError if no path carries light.
     """
     paths += paths % 2
-    wavelengths, vertices, emitted, turns = _follow(scene, sensor, session, paths, seed)
+    wavelengths, vertices, emitted, directions = _follow(scene, sensor, session, paths, seed)
     colours = _response(sensor, wavelengths)  # (paths, wavelengths, 3)
-    reaching = [np.zeros_like(wavelengths)]  # at a vertex, by whatever comes after it
+    reaching = [np.zeros_like(wavelengths)]  # light at a vertex from all vertices after it
     for vertex, light in zip(vertices[::-1], emitted[::-1], strict=True):
         reaching.append(reaching[-1] + light + vertex.direct)
     # emitted[d] is what the ray to vertex d finds there, so it counts before that vertex
@@ -106,7 +106,7 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
         lookups=np.concatenate(parts),
         total=met @ (weight * whole),
         paths=paths,
-        lobe_turn=_turns(turns, vertices[0], len(session.bsdfs)) if vertices else np.zeros(0),
+        lobe_turn=_turns(directions, vertices[0], len(session.bsdfs)) if vertices else np.zeros(0),
     )
 
 
@@ -121,10 +121,25 @@ class _Vertex:
     sampled_value: NDArray[np.float64]
 
 
-def _follow(
-    scene: Any, sensor: Any, session: Session, paths: int, seed: int
-) -> tuple[NDArray[np.float64], list[_Vertex], list[NDArray[np.float64]], NDArray[np.float64]]:
-    """Wavelengths, vertices, light that rays find at emitters, and ωi at the first vertex."""
+class _Followed(NamedTuple):
+    """Paths from the camera to their last vertices."""
+
+    wavelengths: NDArray[np.float64]  # (paths, wavelengths), nm
+    vertices: list[_Vertex]
+    emitted: list[NDArray[np.float64]]  # light that the ray to each vertex meets at an emitter
+    directions: NDArray[np.float64]  # (paths, 2) x and y of ωi at the first vertex
+
+
+class _Answer(NamedTuple):
+    """Value and density of a BSDF, and the look-ups that it recorded."""
+
+    value: Any
+    density: Any
+    records: list[Any]
+
+
+def _follow(scene: Any, sensor: Any, session: Session, paths: int, seed: int) -> _Followed:
+    """Trace all paths, one bounce after the other."""
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(dr.opaque(mi.UInt32, seed), paths)  # as a literal it would be part of kernels
     film = sensor.film()
@@ -150,7 +165,7 @@ def _follow(
     dr.eval(ray, throughput)
     vertices: list[_Vertex] = []
     emitted = []
-    turns = np.zeros((paths, 2))
+    directions = np.zeros((paths, 2))
     for number in range(_bounces(scene.integrator())):
         si = scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, True, active)
         emitter = si.emitter(scene, active)
@@ -161,7 +176,7 @@ def _follow(
         emitted.append(_lanes(dr.select(active, radiance, 0.0), paths))
         active &= si.is_valid()
         if number == 0:
-            turns = np.stack([_lane(si.wi.x, paths), _lane(si.wi.y, paths)], axis=1)
+            directions = np.stack([_lane(si.wi.x, paths), _lane(si.wi.y, paths)], axis=1)
         dr.eval(si, active, throughput)
         if not dr.any(active):
             break
@@ -170,16 +185,16 @@ def _follow(
         asked.time = mi.Float(lane)  # no BSDF looks at the time: it tells which lane a call is of
         sample, radiance = scene.sample_emitter_direction(si, sampler.next_2d(), True, active)
         lit = active & (sample.pdf > 0.0) & dr.any(radiance > 0.0)
-        value, by_bsdf, heard = _recorded(session, bsdf, context, asked, si.to_local(sample.d), lit)
-        share = dr.select(sample.delta, 1.0, _heuristic(sample.pdf, by_bsdf))
-        direct = dr.select(lit, throughput * radiance * value * share, 0.0)
+        answer = _recorded(session, bsdf, context, asked, si.to_local(sample.d), lit)
+        share = dr.select(sample.delta, 1.0, _heuristic(sample.pdf, answer.density))
+        direct = dr.select(lit, throughput * radiance * answer.value * share, 0.0)
         drawn, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), active)
         delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
-        onward, _, heard_on = _recorded(session, bsdf, context, asked, drawn.wo, active & ~delta)
+        onward = _recorded(session, bsdf, context, asked, drawn.wo, active & ~delta)
         vertices.append(
             _Vertex(
-                _lanes(direct, paths), heard, _lanes(value, paths),
-                heard_on, _lanes(onward, paths),
+                _lanes(direct, paths), answer.records, _lanes(answer.value, paths),
+                onward.records, _lanes(onward.value, paths),
             )
         )  # fmt: skip
         throughput = throughput * mi.unpolarized_spectrum(weight)
@@ -188,22 +203,20 @@ def _follow(
         ray = si.spawn_ray(si.to_world(drawn.wo))
         sampler.schedule_state()
         dr.eval(ray, throughput, active, density, delta, before)
-    # What the last ray finds is seen from the vertex before it
+    # Emitters that the last ray meets are seen from the vertex before it
     vertices += [_nothing(paths, wavelengths.shape[1])] * (len(emitted) - len(vertices))
-    return wavelengths, vertices, emitted, turns
+    return _Followed(wavelengths, vertices, emitted, directions)
 
 
-def _recorded(
-    session: Session, bsdf: Any, context: Any, si: Any, wo: Any, active: Any
-) -> tuple[Any, Any, list[Any]]:
-    """eval and pdf, and what BSDFs of ours were asked."""
+def _recorded(session: Session, bsdf: Any, context: Any, si: Any, wo: Any, active: Any) -> _Answer:
+    """Evaluate a BSDF, and record the look-ups of diffracting ones."""
     session.start(dr.width(si))
     try:
         value, pdf = bsdf.eval_pdf(context, si, wo, active)
         dr.eval(value, pdf)
     finally:
-        heard = session.records()
-    return mi.unpolarized_spectrum(value), pdf, heard
+        records = session.records()
+    return _Answer(mi.unpolarized_spectrum(value), pdf, records)
 
 
 def _heuristic(a: Any, b: Any) -> Any:
@@ -221,13 +234,13 @@ def _lane(value: Any, count: int) -> NDArray[np.float64]:
 
 
 def _lanes(spectrum: Any, count: int) -> NDArray[np.float64]:
-    """(count, wavelengths) of a spectrum; what is not finite carries no light."""
+    """Spectrum (count, wavelengths); values that are not finite carry no light."""
     values = np.stack([_lane(spectrum[n], count) for n in range(len(spectrum))], axis=1)
     return np.where(np.isfinite(values), values, 0.0)
 
 
 def _bounces(integrator: Any) -> int:
-    """Rays of a path: what the integrator's description says, at most MOST_BOUNCES."""
+    """Return the rays of a path by the integrator's description, at most MOST_BOUNCES."""
     match = re.search(r"max_depth = (-?\d+)", str(integrator))
     depth = int(match[1]) if match else -1
     return MOST_BOUNCES if depth < 0 else min(max(depth, 1), MOST_BOUNCES)

@@ -18,7 +18,7 @@ from .checks import slow_warning
 from .spectrum import Spectrum
 from .windows import Windows
 
-# A large patch has the roughness of windows with so many points a side.
+# Points along a side of the windows whose roughness stands for that of a large patch.
 _PART = 2048
 _GREEN = 550.0  # nm, where the variation between patches is stated
 
@@ -26,16 +26,16 @@ _GREEN = 550.0  # nm, where the variation between patches is stated
 def describe(
     patches: Sequence[HeightField], settings: TableSettings, taps: tuple[int, int]
 ) -> dict[str, Any]:
-    """Statistics, digest and warnings of the patches, as plain data.
+    """Return statistics, digest and warnings of the patches, as plain data.
 
-    Of windows, it is that of their scans, with the standard error of the mean over them. With
+    Windows are described by their scans and the standard error of the mean over windows. With
     several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
     between patches, over its mean, at 550 nm and normal incidence and reflection.
     """
     windows = patches if isinstance(patches, Windows) else None
     scans = windows.scans if windows else patches
     first, coherence_width = scans[0], settings.width
-    if windows:  # which are levelled and fade: the scans' own tilt and edges are nowhere
+    if windows:  # levelled and tapered: tilt and edges of the scans do not show
         scans = [
             HeightField(
                 s.heights, s.pixel_size, name=s.name, history=s.history, periodic=s.periodic
@@ -68,16 +68,16 @@ def describe(
 
 
 def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable:
-    """Height variance by spatial frequency up to q_max (rad/µm), the mean of all patches'."""
+    """Return the height variance by spatial frequency up to q_max, rad/µm; a mean over patches."""
     if isinstance(patches, Windows):
         return ScaleRoughness.mean(_parts(patches).roughness()).table(q_max)
-    each = []
+    roughness = []
     for patch in patches:
         if patch.heights.size <= LARGE:
-            each.append(ScaleRoughness.from_heights(patch.heights, patch.pixel_size))
+            roughness.append(ScaleRoughness.from_heights(patch.heights, patch.pixel_size))
         else:
-            each.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
-    return ScaleRoughness.mean(each).table(q_max)
+            roughness.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
+    return ScaleRoughness.mean(roughness).table(q_max)
 
 
 def sections(

@@ -19,9 +19,8 @@ from itertools import groupby
 from typing import Any, overload
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
@@ -39,7 +38,7 @@ _WIDE = 1.5
 _ROUGHNESS_OF = 16
 _GREEN = 550.0  # nm, where the standard error is stated
 #: Points of a scan that a batch of windows lies in, at most, unless one window is larger.
-_BATCH = 2**24
+BATCH_POINTS = 2**24
 
 Reals = NDArray[np.float64]
 #: As `map`: calls of a function, here or on workers, results in the order of the arguments.
@@ -156,7 +155,7 @@ class Windows(Sequence[HeightField]):
     def batches(self) -> list[Windows]:
         """All windows, some neighbours at a time; the same whoever does their work."""
         ny, nx = self.shape
-        most = 1 + max(0, int((_BATCH / ny - nx) / (0.5 * nx)))
+        most = 1 + max(0, int((BATCH_POINTS / ny - nx) / (0.5 * nx)))
         batches = []
         for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
             places = list(row)
@@ -237,7 +236,7 @@ def _scatter(
     mean, squares = np.zeros(1), np.zeros(1)
     for n in range(len(windows)):
         power = np.abs(windows.spectrum(n, last).of_phase(kappa)) ** 2
-        power = gaussian_filter(power.astype(np.float64), lobe, mode="constant")
+        power = scipy.ndimage.gaussian_filter(power.astype(np.float64), lobe, mode="constant")
         change = power - mean
         mean = mean + change / (n + 1)
         squares = squares + change * (power - mean)

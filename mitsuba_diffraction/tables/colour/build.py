@@ -21,8 +21,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import sparse
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion
@@ -352,7 +353,7 @@ def _smoothed(
     for axis, exponent in ((0, exponents[1]), (1, exponents[0])):
         reach = math.ceil(4.2 / math.sqrt(exponent))
         kernel = np.exp(-exponent * np.arange(-reach, reach + 1) ** 2).astype(np.float32)
-        image = ndimage.convolve1d(image, kernel, axis, mode="constant")
+        image = scipy.ndimage.convolve1d(image, kernel, axis, mode="constant")
     return image.reshape(bins.shape)
 
 

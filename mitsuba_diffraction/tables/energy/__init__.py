@@ -2,12 +2,10 @@
 
 Contents
 --------
-settings       resolution and limits, all of them part of the cache's key
-grid           the grid of directions, and functions on it
-gain           factor of |a_j|² in the albedo, by model and material
+conservation   scales by which no more light is sent on than comes in, computed and cached
+materials      reflectors, and dielectrics that let light through: the paths of their light
 transport      sums over the orders for directions of incidence
+gain           factor of |a_j|² in the power of an order, by path, model and material
 scaling        the scale of a symmetric kernel with given sums
-conservation   the scale by which no more is reflected than comes in
-transmission   the scale of order 0 by which reflected and transmitted light add up to 1
-store          all of it in the cache
+settings       resolution and limits, all of them part of the cache's key
 """

@@ -1,141 +1,238 @@
-"""Energy conservation: a scale of directions by which no more is reflected than comes in.
+"""Energy conservation: scales of directions by which no more light is sent on than comes in.
 
-The model f gains energy on some surfaces at some angles. With the albedo a(ω) of f at one
-wavelength, e is sought such that
+A reflector gains energy at some angles. With the albedo a(ω) of the model f at one wavelength, s is
+sought such that
 
-    f'(ωi, ωo) = f(ωi, ωo) e(ωi) e(ωo)   reflects   e(ωi) ∫ f e cosθo dωo = min(a(ωi), 1):
+    f'(ωi, ωo) = f(ωi, ωo) s(ωi) s(ωo)   reflects   s(ωi) ∫ f s cosθo dωo = min(a(ωi), 1):
 
-reciprocal, since e e is symmetric, and with nothing taken from directions that gain nothing, since
-their e is a little above 1 where that of their partners is below. That is the scaling of a
+reciprocal, since s s is symmetric, and with nothing taken from directions that gain nothing, since
+their s is a little above 1 where that of their partners is below. That is the scaling of a
 symmetric kernel to given sums (`scaling`). What is left to do:
 
 - Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
-  So the albedo is looked at between them too, and e lowered around where it is above 1.
+  So the albedo is looked at between them too, and s lowered around where it is above 1.
 - No scaling exists where a direction's partners all gain and it does not: the light between two
-  groups of directions, as a blazed grating has them, is one sum for both. There e ends up between.
+  groups of directions, as a blazed grating has them, is one sum for both. There s ends up between.
+
+A lossless dielectric that lets light through sends all light on. What the first order in the
+heights gains or lacks is order 0's: other orders are right to second order in the heights, and
+order 0, ∝ |a_0|² alone, is not. So c is sought, on the directions of both sides stacked, such that
+with f = f_0 + f_others
+
+    f'(ωi, ωo) = f_others + f_0 c(ωi) c(ωo)   sends on   R + T = 1.
+
+A sheet loses the light beyond its critical angle; c puts that back likewise. Where order 0 has too
+little light to make up for what is missing, that stays missing. Where the other orders of a steep
+surface exceed 1 on their own, all light is scaled by s(ωi) s(ωo) with s at most 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
-from ...optics.fresnel import Filmed
-from .gain import Boundary
-from .grid import Array, DirectionalTable, DirectionGrid, Real
+from ...optics import mean_second_order
+from ...optics.paths import Path
+from ..directional import Array, DirectionalTable, DirectionGrid, Real
+from ..height_scales import HeightScales
+from ..order_mixture import MOST_STRONG, STRONG
+from ..store import DirectionalTables, cached_directions
+from ..table import DiffractionTable
+from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled
-from .transport import Orders, Transport
+from .settings import VERSION, energy_settings
+from .transport import Light, Orders, Transport
 
-#: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
-Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
+#: Where order 0 has less of the light, it is not scaled.
+FAINT = 1e-4
 
 
 @dataclass(frozen=True)
 class Conservation:
-    """Albedo of the model as it is, and the scale e; None where the albedo is at most 1."""
-
-    albedo: DirectionalTable
-    scale: DirectionalTable | None
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Orders of a table at one height scale, made of a material.
+    """Albedo of a model, and scales of directions that conserve energy, None where they are 1.
 
     Attributes
     ----------
-    orders : of the table.
-    model : one of `optics.boundary.MODELS`.
-    index : of the material over that of the medium above it.
+    albedo : of a reflector as it is, a.
+    scale, scale_below : of all light, s, of directions above and below the surface.
+    order_0, order_0_below : of order 0 of a dielectric, c, likewise.
     """
 
-    orders: Orders
-    model: str
-    index: Index
+    albedo: DirectionalTable | None = None
+    scale: DirectionalTable | None = None
+    scale_below: DirectionalTable | None = None
+    order_0: DirectionalTable | None = None
+    order_0_below: DirectionalTable | None = None
+
+
+class Surface:
+    """A table's surface of a material at one height scale."""
+
+    def __init__(
+        self,
+        table: DiffractionTable,
+        material: Reflector | Dielectric,
+        height_scale: float = 1.0,
+    ) -> None:
+        self.material, self.orders = material, Orders(table, height_scale, material.densest)
+        self._paths = material.paths(self.orders.least_width)
+        self._settings = settings = energy_settings()
+        self._both_sides = material.transmits
+        polar = settings.side_polar if self._both_sides else settings.polar
+        self._grid = DirectionGrid(polar, settings.azimuthal)
+        self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
+        #: Light that is nowhere above needs no s.
+        self._limit = settings.tolerated if self._both_sides else settings.threshold
 
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
-        settings = self.orders.settings
-        coarse = self._grid.half
-        wavelengths = wavelengths_of(wavelength_range, max(4, settings.wavelengths // 4))
-        transports = self.transports(wavelengths, coarse.theta, coarse.phi, coarse)
-        values = np.stack([transport(coarse.ones) for transport in transports])
-        albedo = DirectionalTable(wavelengths, values)
-        if values.max() <= settings.threshold:
-            return Conservation(albedo, None)
-        scale = self._scale(wavelengths_of(wavelength_range, settings.wavelengths))
-        return Conservation(albedo, scale)
+        settings, grid = self._settings, self._grid
+        albedo = None if self._both_sides else self._albedo(wavelength_range)
+        if albedo is not None and albedo.values.max() <= self._limit:
+            return Conservation(albedo)
+        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        nodes = spread(wavelength_range, count)
+        lights = self._lights(nodes, grid.theta, grid.phi)
+        solved = parallel(lambda light: self._solved(light()), lights)
+        c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
+        if self._both_sides and np.all(c == 1.0):
+            return Conservation()
+        few = self.orders.strong <= settings.few_orders and not self._both_sides
+        between = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
+        lights = self._lights(between, *grid.middles(settings.few_parts if few else 1))
+
+        def lower(n: int) -> None:
+            pair = slice(n, n + 2)
+            c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair])
+
+        for first in (0, 1):  # neighbouring pairs share a wavelength
+            parallel(lower, range(first, len(between), 2))
+
+        def table(scale: Array, side: int) -> DirectionalTable | None:
+            missing = side >= scale.shape[1] or np.all(scale == 1.0)
+            return None if missing else DirectionalTable(nodes, scale[:, side])
+
+        return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
     def albedos(
-        self, scale: DirectionalTable | None, theta: Real, phi: Real, wavelength: float
+        self, conservation: Conservation, theta: Real, phi: Real, wavelength: float
     ) -> tuple[Array, Array]:
-        """Return the albedo as it is and scaled, (t, p) each, at angles (rad).
+        """Return the light sent on as it is and conserved, (sides, t, p) each, at angles (rad).
 
-        Exact sums at these directions and a wavelength (nm), as a furnace finds them.
+        Exact sums at these directions and a wavelength (nm), not the grid's, as a furnace measures
+        them.
         """
-        grid = self._grid if scale is None else scale.grid
-        transport = self.transports(np.array([wavelength]), theta, phi, grid)[0]
-        raw = transport(grid.ones)
-        if scale is None:
-            return raw, raw
-        return raw, scale.at(theta[:, None], phi, wavelength) * transport(scale.page(wavelength))
+        (make_light,) = self._lights(np.array([wavelength]), theta, phi)
+        light = make_light()
 
-    def transports(
-        self, wavelengths: Real, theta: Real, phi: Real, grid: DirectionGrid
-    ) -> list[Transport]:
-        """Maps from weights on a grid to albedos at directions, for several wavelengths (nm)."""
-        indices = self.index(wavelengths)
+        def page(*sides: DirectionalTable | None) -> Array:
+            pages = [self._grid.ones if t is None else t.page(wavelength) for t in sides]
+            return np.stack(pages[: len(self._ones)])
 
-        def at_wavelength(n: int) -> Transport:
-            surface = Boundary(None if indices is None else indices[n], self.model)
-            gain = self.orders.gain(float(wavelengths[n]), surface)
-            return self.orders.transport(theta, phi, gain, grid)
+        c = page(conservation.order_0, conservation.order_0_below)
+        s = page(conservation.scale, conservation.scale_below)
+        return light.sent(self._ones, self._ones), light.sent(c, s)
 
-        return parallel(at_wavelength, range(len(wavelengths)))
+    def _lights(self, wavelengths: Real, theta: Real, phi: Real) -> list[Callable[[], Light]]:
+        """Makers of the light of wavelengths (nm) from polar angles (t,) and azimuths (p,), rad.
 
-    @property
-    def _grid(self) -> DirectionGrid:
-        return DirectionGrid(self.orders.settings.polar, self.orders.settings.azimuthal)
+        Light is made when it is needed: it takes up to 100 MB.
+        """
+        here = self._grid.interpolation(theta[:, None], phi)
 
-    def _scale(self, wavelengths: Real) -> DirectionalTable:
-        """Find s at its nodes, and lower it for what lies between."""
-        settings, grid = self.orders.settings, self._grid
+        def make(paths: list[Path], wavelength: float) -> Light:
+            directions = theta, phi, self._grid
+            sent = [Transport(self.orders, path, wavelength, *directions) for path in paths]
+            return Light(sent, here)
+
+        each = zip(self._paths(wavelengths), wavelengths.tolist(), strict=True)
+        return [partial(make, *both) for both in each]
+
+    def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
+        """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
+        coarse = self._grid.half
+        wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
+        lights = self._lights(wavelengths, coarse.theta, coarse.phi)
+        albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
+        return DirectionalTable(wavelengths, np.stack(albedos))
+
+    def _solved(self, light: Light) -> tuple[Array, Array]:
+        """Find c and s at the grid's directions."""
+        if self._both_sides:
+            return self._balanced(light), self._ones
+        return self._ones, self._limited(light)
+
+    def _limited(self, light: Light) -> Array:
+        """Find s of a reflector at the grid's directions."""
+        settings = self._settings
         # part of a lobe is below the horizon there, and would ask for any s
-        largest = np.interp(np.degrees(grid.theta), (70.0, 80.0), (settings.largest, 1.0))
+        largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, 1.0))
+        kernel = partial(light.balanced, self._ones)
+        aim = np.minimum(kernel(self._ones), np.float32(settings.target))
+        return scaled(kernel, aim, largest[:, None], settings.sweeps)
 
-        def at_nodes(transport: Transport) -> Array:
-            aim = np.minimum(transport(grid.ones), np.float32(settings.target))
-            return scaled(transport, aim, largest[:, None], settings.sweeps)
+    def _balanced(self, light: Light) -> Array:
+        """Find c at the grid's directions, such that R + T is 1."""
+        settings, most = self._settings, self._settings.largest**2
+        others, zeroth = light.others(self._ones), light.order_0(self._ones)
+        if np.abs(others + zeroth - 1.0).max() < settings.close:
+            return self._ones
+        aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
+        c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
+        c = np.where(zeroth > FAINT, c, np.float32(1.0))
+        # what lies within one row, as a lobe at the critical angle, is left to itself
+        return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
-        transports = self.transports(wavelengths, grid.theta, grid.phi, grid)
-        scale = np.stack(parallel(at_nodes, transports))
-        few = len(self.orders.mixture.frequency) <= settings.few_orders
-        parts = settings.few_parts if few else settings.parts
-        theta, phi = grid.middles(parts)
-        here = grid.interpolation(theta[:, None], phi)
+    def _lowered(self, light: Light, c: Array, s: Array) -> tuple[Array, Array]:
+        """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""
+        settings = self._settings
+        if self._both_sides:
+            room = np.maximum(np.float32(settings.ceiling) - light.others(self._ones), 1e-6)
 
-        def excess(transport: Transport) -> Callable[[Array], Array]:
-            def of_page(s: Array) -> Array:
-                albedo = here(s) * transport(s) / settings.ceiling
-                cells = albedo.reshape(grid.polar, parts, grid.azimuthal, parts)
-                return np.maximum(cells.max(axis=(1, 3)), np.float32(1.0))
+            def order_0_excess(c: Array) -> Array:
+                zeroth = light.at_directions(c) * light.order_0(c)
+                factor = np.minimum(zeroth / room, settings.largest**2)
+                return np.where(zeroth > FAINT, factor, np.float32(1.0))
 
-            return of_page
-
-        transports = self.transports(between(wavelengths), theta, phi, grid)
-        scale = lowered(scale, [excess(transport) for transport in transports], settings)
-        return DirectionalTable(wavelengths, scale)
+            c = lowered(c, order_0_excess, settings.passes)
+        middle = c.mean(axis=0)
+        if light.sent(middle, s.mean(axis=0)).max() > self._limit:
+            s = lowered(s, lambda s: light.sent(middle, s) / settings.ceiling, settings.passes)
+        return c, s
 
 
-def wavelengths_of(wavelength_range: tuple[float, float], count: int) -> Real:
+def spread(wavelength_range: tuple[float, float], count: int) -> Real:
     """Wavelengths (nm) evenly in their logarithm, or the only one."""
     low, high = wavelength_range
     return np.geomspace(low, high, count if high > low else 1)
 
 
-def between(wavelengths: Real) -> Real:
-    """Wavelengths amid each two, or the only one."""
-    return np.sqrt(wavelengths[1:] * wavelengths[:-1]) if len(wavelengths) > 1 else wavelengths
+@dataclass(frozen=True)
+class Energy(HeightScales):
+    """Conserved energy of a table of a material, at any height scale.
+
+    Attributes
+    ----------
+    material : a reflector, or a dielectric that lets light through.
+    wavelength_range : nm; its ends may be one.
+    """
+
+    material: Reflector | Dielectric
+    wavelength_range: tuple[float, float]
+
+    def at(self, height_scale: float) -> Conservation:
+        """Conserve energy at a height scale: from memory, from disk, or computed."""
+
+        def make() -> DirectionalTables:
+            surface = Surface(self.table, self.material, height_scale)
+            conservation = surface.conservation(self.wavelength_range)
+            return {name: table for name, table in vars(conservation).items() if table is not None}
+
+        versions = VERSION, mean_second_order.VERSION, STRONG, MOST_STRONG
+        limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
+        made_of = versions, limits, height_scale, material, self.wavelength_range
+        return Conservation(**cached_directions("energy", self.table, made_of, make))

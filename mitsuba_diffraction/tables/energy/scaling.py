@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import Array, Real
-from .settings import EnergySettings
+from ..directional import Array, Real
 
 Floats = NDArray[np.floating[Any]]
 
@@ -36,31 +35,27 @@ def scaled(
     return s
 
 
-def lowered(
-    scale: Array, excess: Sequence[Callable[[Array], Array]], settings: EnergySettings
-) -> Array:
-    """Return a scale (n, …, polar + 1, azimuthal) lowered until nothing is in excess between nodes.
+def lowered(pages: Array, excess: Callable[[Array], Array], passes: int) -> Array:
+    """Return pages (n, sides, polar + 1, azimuthal) lowered until no light between exceeds 1.
 
-    excess : between each two wavelengths, or of the only one: from a scale's page to the factors,
-        1 or more, by which an albedo in each cell (…, polar, azimuthal) is too large.
+    excess : from the mean page to the factors by which light is too much in the middles of parts
+        of all cells, (sides, polar · parts, azimuthal · parts).
     """
-    for turn in range(settings.passes):
-        pages = [0.5 * (scale[n] + scale[min(n + 1, len(scale) - 1)]) for n in range(len(excess))]
-        cells = parallel(lambda each: each[0](each[1]), list(zip(excess, pages, strict=True)))
-        between = np.stack([_largest_around(cell) for cell in cells])
-        if len(scale) > 1:
-            ends = between[:1], np.maximum(between[1:], between[:-1]), between[-1:]
-            between = np.concatenate(ends)
-        last = turn == settings.passes - 1
-        scale = (scale / (between if last else np.sqrt(between))).astype(np.float32)
-    return scale
+    for turn in range(passes):
+        factors = _largest_around(excess(pages.mean(axis=0)), pages.shape[-1])
+        last = turn == passes - 1
+        pages = (pages / (factors if last else np.sqrt(factors))).astype(np.float32)
+    return pages
 
 
-def _largest_around(cells: Array) -> Array:
-    """From cells (…, polar, azimuthal) to vertices, each the largest of the cells around it."""
-    first = np.broadcast_to(cells[..., :1, :].max(axis=-1, keepdims=True), cells[..., :1, :].shape)
-    around = np.maximum(cells[..., 1:, :], cells[..., :-1, :])
-    rows = np.concatenate([first, around, cells[..., -1:, :]], axis=-2)  # all meet at the normal
+def _largest_around(factors: Array, azimuthal: int) -> Array:
+    """Return at each vertex the largest factor, or 1, in the parts of the cells around it."""
+    parts = factors.shape[-1] // azimuthal
+    cells = factors.reshape(len(factors), -1, parts, azimuthal, parts).max(axis=(2, 4))
+    cells = np.maximum(cells, np.float32(1.0))
+    first = np.broadcast_to(cells[:, :1].max(axis=-1, keepdims=True), cells[:, :1].shape)
+    around = np.maximum(cells[:, 1:], cells[:, :-1])
+    rows = np.concatenate([first, around, cells[:, -1:]], axis=1)  # all meet at the normal
     return np.asarray(np.maximum(rows, np.roll(rows, 1, axis=-1)))
 
 

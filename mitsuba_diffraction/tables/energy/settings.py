@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 16
+VERSION = 17
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class EnergySettings:
         quickly towards the critical angle.
     wavelengths : of a scale; variants of one wavelength have one. The model's albedo, which tells
         whether a scale is needed, has a quarter of them and half the directions.
-    parts, few_parts : a cell is looked at in the middles of so many parts either way; on surfaces
-        of at most `few_orders` strong orders, whose albedos have kinks, in more.
+    few_parts, few_orders : between nodes, light is looked at in the middles of cells; on reflectors
+        of at most so many strong orders, whose albedos have kinks, of so many parts either way.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
     fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of the second order's
         mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
@@ -44,7 +44,6 @@ class EnergySettings:
     wavelengths: int = 16
     fringe_step: float = 0.1
     fringes: int = 64
-    parts: int = 1
     few_parts: int = 3
     few_orders: int = 32
     rings: int = 36

@@ -1,4 +1,4 @@
-"""Sums over the orders for directions of incidence, at one wavelength (NumPy only).
+"""Light that a table's orders send on: sums for directions of incidence, at one wavelength (NumPy).
 
 With q = k(ωi + ωo) in the tangent plane, dωo = d²q/(k² cosθo) turns ∫f s cosθo dωo, the albedo with
 the light along ωo weighted by s(ωo), into a sum over the orders' lobes,
@@ -7,7 +7,7 @@ the light along ωo weighted by s(ωo), into a sum over the orders' lobes,
 
 over the frequencies that are visible, with κ = k w times the height scale and G as in `gain`:
 
-- order 0, the mirror direction, by quadrature over its lobe;
+- order 0, the mirrored or refracted direction, by quadrature over its lobe;
 - the few *strong* orders, one by one, with means over the lobe tabulated against its place, since
   an order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
 - the many *weak* ones as a smooth density, by quadrature over directions.
@@ -16,22 +16,22 @@ over the frequencies that are visible, with κ = k w times the height scale and 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import i0e
 
 from ...optics.geometry import wavenumber
+from ...optics.paths import Path
+from ..directional import Array, DirectionGrid, LinearMap, Real
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, Boundary, Gain
-from .grid import Array, DirectionGrid, LinearMap, Real
-from .settings import EnergySettings, energy_settings
+from .gain import LEAST_COSINE, Gain
+from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between directions, at least.
 SMOOTHING = 0.6
@@ -44,190 +44,206 @@ _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
 class Orders:
-    """Orders of a table at one height scale, sorted into strong and weak ones.
+    """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
-    apart : whether order 0 is summed apart from others however wide its lobe is.
+    densest : largest index of the media that light travels in; order 0 of a dielectric is summed
+        apart from the others however wide its lobe is.
+    """
+
+    def __init__(
+        self, table: DiffractionTable, height_scale: float = 1.0, densest: float = 1.0
+    ) -> None:
+        self.sigma, self.roughness, self.height_scale = table.sigma, table.roughness, height_scale
+        self.densest, settings = densest, energy_settings()
+        longest = float(wavenumber(table.wavelength_range[0]))
+        smoothing = SMOOTHING * longest * 0.5 * math.pi / settings.rings
+        # κ of light that stays within a dielectric is larger by the index
+        scale = height_scale * densest
+        self.mixture = order_mixture(table, scale, smoothing, apart=densest > 1.0)
+        total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
+        self.has_weak = bool(total > LEAST_WEAK)
+        self.strong = len(self.mixture.frequency)
+        self.nodes = _directions(settings.rings, settings.steps)
+        count = len(self.mixture.central)
+        self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
+        # nothing of it is left where it is among the weak ones
+        powers = order_0_power(table, self._kappas * scale)
+        self._powers = powers * (self.mixture.central.max() > 0.0)
+        #: Least w of light let through
+        self.least_width = densest * self.mixture.kappa_step
+        self.least_width /= float(wavenumber(table.wavelength_range[1]))
+
+    def order_0(self, kappa: Real) -> Real:
+        """Return the power of order 0 at κ over the height scale and `densest`."""
+        return np.interp(kappa, self._kappas, self._powers)
+
+
+class Transport:
+    """Light of one wavelength on one path, from directions (t, p), for weights on a grid.
+
+    Parameters
+    ----------
+    orders, path : of the surface and the light.
+    wavelength : nm.
+    theta, phi : polar angles (t,) and azimuths (p,) of incidence, rad.
+    grid : of the weights on the side that light goes to.
     """
 
     def __init__(
         self,
-        table: DiffractionTable,
-        height_scale: float = 1.0,
-        settings: EnergySettings | None = None,
-        *,
-        apart: bool = False,
+        orders: Orders,
+        path: Path,
+        wavelength: float,
+        theta: Real,
+        phi: Real,
+        grid: DirectionGrid,
     ) -> None:
-        self.sigma, self.roughness, self.height_scale = table.sigma, table.roughness, height_scale
-        self.settings = settings or energy_settings()
-        longest = float(wavenumber(table.wavelength_range[0]))
-        smoothing = SMOOTHING * longest * 0.5 * math.pi / self.settings.rings
-        self.mixture = order_mixture(table, height_scale, smoothing, apart=apart)
-        total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
-        self.has_weak = bool(total > LEAST_WEAK)
-        self.has_strong = len(self.mixture.frequency) > 0
-        self.nodes = _directions(self.settings.rings, self.settings.steps)
-        count = len(self.mixture.central)
-        self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
-        # nothing of it is left where it is among the weak ones
-        powers = order_0_power(table, self._kappas * height_scale)
-        self._powers = powers * (self.mixture.central.max() > 0.0)
-
-    def order_0(self, kappa: Real) -> Real:
-        """Power of order 0 at κ over the height scale."""
-        return np.interp(kappa, self._kappas, self._powers)
-
-    def gain(
-        self, wavelength: float, boundary: Boundary, height_scale: float | None = None
-    ) -> Gain:
-        """G of a boundary at a wavelength (nm), of heights at another scale if given."""
-        k = float(wavenumber(wavelength))
-        return Gain(boundary, self.roughness, k, height_scale or self.height_scale)
-
-    def transport(self, theta: Real, phi: Real, gain: Gain, grid: DirectionGrid) -> Transport:
-        """Return the map from weights on a grid to albedos (t, p) at angles and azimuths, rad."""
-        ways = [Way(self, gain, angle) for angle in theta.tolist()]
-        weak, strong = None, None
-        if self.has_weak:
-            half = grid.half
-            turned = half.phi[:, None] + self.nodes.azimuth
-            parts = [Way(self, gain, at).weak(half.phi) for at in half.theta.tolist()]
-            to_nodes = grid.interpolation(self.nodes.theta, turned)
-            weak = Weak(np.stack(parts), to_nodes, half.interpolation(theta[:, None], phi))
-        if self.has_strong:
-            shares, polar, azimuth = (
-                np.stack(part) for part in zip(*(way.strong(phi) for way in ways), strict=True)
-            )
-            strong = grid.interpolation(polar, azimuth).summed(shares.astype(np.float32))
-        return Transport(Mirrored.of([way.mirrored(grid) for way in ways], phi, grid), weak, strong)
-
-
-@dataclass(frozen=True)
-class Mirrored:
-    """Shares (t, rows) of order 0 that go to polar angles of a grid; azimuths (columns, p)."""
-
-    shares: Real
-    azimuths: Real
-
-    @classmethod
-    def of(cls, shares: Sequence[Real], phi: Real, grid: DirectionGrid) -> Mirrored:
-        """Collect the shares of polar angles of incidence; phi : azimuths of incidence, rad."""
-        column = np.mod(phi + math.pi, 2.0 * math.pi) * (grid.azimuthal / (2.0 * math.pi))
-        lower, each = column.astype(int), np.arange(len(phi))
-        azimuths = np.zeros((grid.azimuthal, len(phi)))
-        azimuths[lower % grid.azimuthal, each] = 1.0 - (column - lower)
-        azimuths[(lower + 1) % grid.azimuthal, each] += column - lower
-        return cls(np.stack(shares), azimuths)
-
-    def __call__(self, s: NDArray[np.floating]) -> Real:
-        return np.asarray(self.shares @ s @ self.azimuths)
-
-
-@dataclass(frozen=True)
-class Weak:
-    """Shares (t', p', n) that go to `nodes` (p', n), interpolated to `directions` (t, p)."""
-
-    shares: Array
-    nodes: LinearMap
-    directions: LinearMap
-
-    def __call__(self, s: Array) -> Array:
-        return self.directions(np.einsum("tpn,pn->tp", self.shares, self.nodes(s)))
-
-
-@dataclass(frozen=True)
-class Transport:
-    """Map a = M s from weights on the grid of directions to albedos (t, p), by kind of order."""
-
-    mirrored: Mirrored
-    weak: Weak | None
-    strong: LinearMap | None
-
-    def __call__(self, s: Array) -> Array:
-        parts = [part(s) for part in (self.mirrored, self.weak, self.strong) if part is not None]
-        return np.asarray(sum(parts), np.float32)
-
-
-class Way:
-    """Light of one polar angle of incidence (rad) that a boundary sends on."""
-
-    def __init__(self, orders: Orders, gain: Gain, angle: float) -> None:
-        self._orders, self._gain, self._boundary = orders, gain, gain.boundary
-        self._cos = max(math.cos(angle), LEAST_COSINE)
-        # wavenumber where the light goes to, and sine of the mirrored or refracted direction there
-        self._k = gain.wavenumber * self._boundary.left
-        self._sine = math.sin(angle) * self._boundary.came / self._boundary.left
-        self._per_w = gain.wavenumber * gain.height_scale / orders.height_scale
+        self._orders, self._path = orders, path
+        self.came, self.left = path.came.number, path.left.number
+        self._gain = Gain(
+            path, orders.roughness, float(wavenumber(wavelength)), orders.height_scale
+        )
+        # wavenumber where the light goes to
+        self._k = self._gain.wavenumber * path.left.index
+        self._per_w = self._gain.wavenumber / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
+        self._shares = self._order_0_shares(theta, grid)
+        self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
+        self._others: list[Callable[[Array], Array]] = []
+        if orders.has_weak:
+            half, nodes = grid.half, orders.nodes
+            shares = self._weak_shares(half.theta, half.phi)
+            to_nodes = grid.interpolation(nodes.theta, half.phi[:, None] + nodes.azimuth)
+            here = half.interpolation(theta[:, None], phi)
+            self._others.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
+        if orders.strong:
+            strong, polar, azimuth = self._strong_shares(theta, phi)
+            self._others.append(grid.interpolation(polar, azimuth).summed(strong))
 
-    def _kappa(self, cos_o: Real) -> Real:
-        w = self._boundary.width(np.asarray(self._cos), cos_o)
-        return self._per_w * np.maximum(w, self._boundary.least)
+    def order_0(self, s: Array) -> Array:
+        """Return the light of order 0 for weights on the grid, (t, p)."""
+        return np.asarray(self._shares @ self._mirrored(s), np.float32)
 
-    def mirrored(self, grid: DirectionGrid) -> Real:
-        """Shares of order 0 that go to the polar angles of a grid, (rows,).
+    def others(self, s: Array) -> Array | float:
+        """Return the light of all other orders for weights on the grid, (t, p); 0 without any."""
+        return sum((part(s) for part in self._others), 0.0)
+
+    def _start(self, theta: Real) -> tuple[Real, Real]:
+        """Return cosines of incidence, and sines of the mirrored or refracted directions."""
+        sine = np.sin(theta) * (self._path.came.index / self._path.left.index)
+        return np.maximum(np.cos(theta), LEAST_COSINE), sine
+
+    def _kappa(self, cos_i: Real, cos_o: Real) -> Real:
+        """Return κ over the height scale and `Orders.densest`."""
+        return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
+
+    def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
+        """Return shares (t, rows) of order 0 that go to the polar angles of a grid.
 
         The distance of a Gaussian lobe's directions from the normal has Rice's distribution. In
         cosθo, since d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon.
         """
-        shares, width = np.zeros(grid.polar + 1), self._width
-        low, high = max(self._sine - _LOBE * width, 0.0), min(self._sine + _LOBE * width, 1.0)
-        if low >= 1.0:
-            return shares
-        ends = math.sqrt(1.0 - high**2), math.sqrt(1.0 - low**2)
-        step = (ends[1] - ends[0]) / _LOBE_NODES
-        cos_o: Real = ends[0] + step * (np.arange(_LOBE_NODES, dtype=np.float64) + 0.5)
+        cos_i, sine, width, path = *self._start(theta[:, None]), self._width, self._path
+        low = np.clip(sine - _LOBE * width, 0.0, 1.0)
+        high = np.minimum(sine + _LOBE * width, 1.0)
+        first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
+        step = (last - first) / _LOBE_NODES
+        # beyond the critical angle the step is 0, and so are the shares
+        cos_o = np.maximum(first + step * (np.arange(_LOBE_NODES) + 0.5), 1e-9)
         sin_o = np.sqrt(1.0 - cos_o**2)
-        parts = np.exp(-(((sin_o - self._sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
-        parts *= i0e(2.0 * sin_o * self._sine / width**2)
-        cos_i = np.asarray(self._cos)
-        parts *= self._boundary.order_0(self._gain, cos_i, cos_o)
-        if not self._boundary.flat:
-            parts *= self._orders.order_0(self._per_w * self._boundary.width(cos_i, cos_o))
-        row = grid.row(np.arccos(cos_o))
-        lower = np.minimum(row.astype(int), grid.polar - 1)
-        np.add.at(shares, lower, parts * (1.0 - (row - lower)))
-        np.add.at(shares, lower + 1, parts * (row - lower))
-        return shares
+        parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
+        parts *= i0e(2.0 * sin_o * sine / width**2)
 
-    def weak(self, phi: Real) -> Array:
-        """Shares (p, n) of the quadrature's directions, at azimuths of incidence (p,), rad."""
+        power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
+        parts *= self._gain.order_0(cos_i, cos_o, power)
+        to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
+        return to_rows.summed(parts).matrix.toarray()
+
+    def _weak_shares(self, theta: Real, phi: Real) -> Array:
+        """Return shares (t, p, n) of the quadrature's directions, at azimuths turned by phi."""
         mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
-        gain = self._gain(self._cos, nodes.cosine, nodes.azimuth)
+        cos_i, sine = self._start(theta[:, None])
+        gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
         factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
         position = np.minimum(
-            self._kappa(nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001
+            self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001
         )
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
-        scale = self._boundary.sign * k / mixture.pitch
-        bx, by = scale * (nodes.x + self._sine), scale * nodes.y
+        scale = self._path.sign * k / mixture.pitch
+        bx, by = scale * (nodes.x + sine)[:, None], scale * nodes.y
         sin, cos = np.sin(phi)[:, None], np.cos(phi)[:, None]
         rows, columns = mixture.density.shape[1:]
         column = np.clip((cos * bx - sin * by + 0.5 * columns).astype(np.int32), 0, columns - 1)
         row = np.clip((sin * bx + cos * by + 0.5 * rows).astype(np.int32), 0, rows - 1)
-        flat, index = mixture.density.ravel(), (lower * rows + row) * columns + column
-        result = flat.take(index) * (factor * (1.0 - upper_share))
-        result += flat.take(index + rows * columns) * (factor * upper_share)
-        return result
+        flat, index = mixture.density.ravel(), (lower[:, None] * rows + row) * columns + column
+        shares = flat.take(index) * (factor * (1.0 - upper_share))[:, None]
+        shares += flat.take(index + rows * columns) * (factor * upper_share)[:, None]
+        return shares
 
-    def strong(self, phi: Real) -> tuple[Real, Real, Real]:
-        """Shares (p, m) of the strong orders, and their θo and azimuths."""
-        mixture = self._orders.mixture
-        places = mixture.frequency * (self._boundary.sign / self._k)
-        x = places[:, 0] - self._sine * np.cos(phi)[:, None]
-        y = places[:, 1] - self._sine * np.sin(phi)[:, None]
+    def _strong_shares(self, theta: Real, phi: Real) -> tuple[Array, Real, Real]:
+        """Return shares (t, p, m) of the strong orders, and their θo and azimuths."""
+        mixture, width = self._orders.mixture, self._width
+        cos_i, sine = self._start(theta[:, None, None])
+        places = mixture.frequency * (self._path.sign / self._k)
+        x = places[:, 0] - sine * np.cos(phi)[:, None]
+        y = places[:, 1] - sine * np.sin(phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
-        share, cos_o, pole = _lobe_means(self._width, radius)
-        power = mixture.strong_at(self._kappa(np.sqrt(np.maximum(1.0 - radius**2, 0.0))))
+        share, cos_o, pole = _lobe_means(width, radius)
+        kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
         turn = azimuth - phi[:, None]
-        gain = self._gain(self._cos, cos_o, turn)
+        gain = self._gain(cos_i, cos_o, turn)
         # G cosθ is linear in cosθ across a lobe whose mean of 1/cosθ is `pole`
         near = cos_o * pole > 1.001
-        end = np.full(np.count_nonzero(near), LEAST_COSINE)
-        at_horizon = self._gain(self._cos, end, turn[near]) * LEAST_COSINE
+        at_horizon = LEAST_COSINE * self._gain(
+            np.broadcast_to(cos_i, near.shape)[near], np.asarray(LEAST_COSINE), turn[near]
+        )
         rising = np.clip(at_horizon / np.maximum(gain[near] * cos_o[near], 1e-30), 0.0, 1.0)
         gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
-        return power * gain * share, np.arccos(cos_o), azimuth
+        shares = mixture.strong_at(kappa) * gain * share
+        return shares.astype(np.float32), np.arccos(cos_o), azimuth
+
+
+@dataclass(frozen=True)
+class Light:
+    """Light of one wavelength that a surface sends on from directions (t, p) of each side.
+
+    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
+
+    Attributes
+    ----------
+    paths : of the light.
+    here : interpolation from the grid of the weights to the directions.
+    """
+
+    paths: list[Transport]
+    here: LinearMap
+
+    def order_0(self, weights: Array) -> Array:
+        """Return the sums of order 0."""
+        return self._sum(lambda path: path.order_0(weights[path.left]))
+
+    def others(self, weights: Array) -> Array:
+        """Return the sums of all other orders."""
+        return self._sum(lambda path: path.others(weights[path.left]))
+
+    def balanced(self, c: Array, weights: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c."""
+        return self.others(weights) + self.at_directions(c) * self.order_0(c * weights)
+
+    def sent(self, c: Array, s: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c and all light by s."""
+        return self.at_directions(s) * self.balanced(c, s)
+
+    def at_directions(self, scale: Array) -> Array:
+        """Interpolate a scale to the directions, (sides, t, p)."""
+        return np.stack([self.here(side) for side in scale])
+
+    def _sum(self, sent: Callable[[Transport], Array | float]) -> Array:
+        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
+        for path in self.paths:
+            sums[path.came] += sent(path)
+        return sums
 
 
 def _lobe_means(width: float, radius: Real) -> tuple[Real, Real, Real]:

@@ -22,7 +22,7 @@ from scipy.io import netcdf_file
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
-from ...files import read_bytes
+from ...files import read_bytes, readable_file
 from .table import MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever what the numbers mean changes; files of another version are refused.
@@ -34,6 +34,8 @@ BEGINS = b"CDF"
 MARK = "mitsuba_diffraction_orders"
 #: Step of the packed efficiencies: 16 bits reach 1.092.
 _STEP = 1.0 / 30_000.0
+#: Bytes at the beginning, among which the mark is: dimensions precede the attributes.
+_HEAD = 1 << 16
 _AGAIN = "solve it again with 'mitsuba-diffraction solve'"
 
 
@@ -112,10 +114,11 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
 def is_order_table(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a table of orders, of any version; False if it cannot be read."""
     try:
-        data = read_bytes(path)
-    except DiffractionError:
+        with readable_file(path).open("rb") as stream:
+            first = stream.read(_HEAD)
+    except (OSError, DiffractionError):
         return False  # whoever reads it says why it cannot be
-    return data.startswith(BEGINS) and MARK.encode() in data[:4096]
+    return first.startswith(BEGINS) and MARK.encode() in first
 
 
 def _table(file: Any) -> OrderTable:

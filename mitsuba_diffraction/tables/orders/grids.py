@@ -20,8 +20,9 @@ from .lookup import clamped
 from .table import Band, Counts, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
-#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4.
-CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(24, 16, 8), 96 << 20
+#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
+#: critical angles of orders lie along w.
+CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
 #: Share of the light that a totally reflecting face sends back: trapped light would never end.
 _TRAPPED = 1.0 - 1e-4
 #: Least transmittance in probabilities, so that no order that leaves has none.
@@ -91,7 +92,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = cells.interpolation(band.counts.w, at)
     summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
-    values = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
+    values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
@@ -148,8 +149,9 @@ def _channels(table: OrderTable) -> Iterator[int]:
 def _records(values: Array, counts: Counts) -> NDArray[np.float16]:
     """Return records (n, 8) of a grid (τ, ρ, w, j, q)."""
     whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+    whole = whole.astype(np.float16)
     eighths = [
-        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w].astype(np.float16)
+        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w]
         for i in (0, 1)
         for j in (0, 1)
         for n in (0, 1)

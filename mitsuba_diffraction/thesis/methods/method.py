@@ -24,8 +24,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import trapezoid
 
 from ...errors import DiffractionError
 from ...optics.colour import linear_srgb, response
@@ -206,7 +206,7 @@ class Method(ABC):
     def _white(self) -> Array:
         """Return X, Y, Z (3,) of a reflectance of 1 over the method's range."""
         lam = np.arange(self.wavelength_range[0], self.wavelength_range[1] + 0.5)
-        return np.asarray(trapezoid(response(lam), lam, axis=0))
+        return np.asarray(scipy.integrate.trapezoid(response(lam), lam, axis=0))
 
     def _value(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None

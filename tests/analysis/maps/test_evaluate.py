@@ -141,7 +141,7 @@ def test_chunks_of_pixels_make_no_difference(monkeypatch):
     asked = {"theta": 20.0, "step": 100.0, "resolution": 32, "samples": 4, "spectral": True}
     steps = []
     whole = brdf_map(bsdf, **asked)
-    monkeypatch.setattr(evaluate, "_PIXELS", 100)
+    monkeypatch.setattr(evaluate, "LAUNCH_PIXELS", 100)
     parts = brdf_map(bsdf, **asked, progress=lambda *s: steps.append(s[:2]))
     np.testing.assert_array_equal(whole.xyz, parts.xyz)
     np.testing.assert_array_equal(whole.spectrum, parts.spectrum)

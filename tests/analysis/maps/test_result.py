@@ -37,7 +37,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.Diffraction
 
 @pytest.mark.usefixtures("variant")
 def test_exposure_shows_what_lies_around_the_mirror_direction():
-    result = brdf_map(plugin(GRATING), 20.0, step=20, resolution=128)
+    result = brdf_map(plugin(GRATING), 20.0, step=47, resolution=128)
     stops = result.exposure()
     shown = np.sort((result.luminance * 2.0**stops)[result.away_from_mirror()].astype(float))
     below_white = shown[shown < 1.0].sum() / shown.sum()

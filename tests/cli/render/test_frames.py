@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli.options import change
+from mitsuba_diffraction.cli.scene_options import change
 from mitsuba_diffraction.scene.frames import Frame
 from mitsuba_diffraction.scene.parameters import values_of_frames
 
@@ -136,7 +136,7 @@ def test_ctrl_c_keeps_finished_frames_and_the_next_run_goes_on(render, monkeypat
     def interrupt(self, done, total, text):
         if text.startswith("frame 3") and not asked:
             asked.append(text)
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = render("--frames", "4", *LIGHT, "-s", "3", "-o", "out.webp")

@@ -9,6 +9,7 @@ import pytest
 
 from mitsuba_diffraction.cli.main import build_parser
 from tests.support.room import QUICK, SCENE
+from tests.support.systems import posix
 
 
 @pytest.mark.parametrize(
@@ -103,6 +104,7 @@ def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatc
     )
 
 
+@posix
 @pytest.mark.parametrize("output", ["a.exr", "a.png"])
 def test_a_full_disk_is_one_line_and_leaves_nothing(child, scene, output):
     scene.write_text(SCENE.replace('"24"', '"200"'))

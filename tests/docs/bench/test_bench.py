@@ -38,7 +38,7 @@ def tiny(coarse):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "QUICK", TINY)
         # as many as the other pictures have: another number is another kernel
-        patch.setattr(scenes, "_FIREFLY_SPP", TINY.spp)
+        patch.setattr(scenes, "FIREFLY_SPP", TINY.spp)
         patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
         yield
 

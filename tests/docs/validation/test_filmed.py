@@ -10,8 +10,8 @@ from docs.make.validation import filmed, rayleigh
 from docs.make.validation.cases import ALUMINIUM, Grating, order_sines
 from docs.make.validation.filmed import GRATINGS, STACKS, Stack
 from docs.make.validation.model import in_plane
-from mitsuba_diffraction.optics import mean_second_order
 from mitsuba_diffraction.optics.fresnel import Filmed
+from mitsuba_diffraction.optics.mean_second_order import mean_of_waves
 
 
 def test_a_film_of_air_is_the_bare_grating_of_the_reduced_expansion():
@@ -52,11 +52,8 @@ def test_of_thick_films_the_mean_of_the_second_order_is_most_of_it():
 
 
 @pytest.mark.parametrize("stack", STACKS, ids=lambda stack: stack.name)
-def test_the_mean_is_that_of_small_gratings(stack, monkeypatch):
+def test_the_mean_is_that_of_small_gratings(stack):
     """Of the field that order 0 is more than first order's, by Rayleigh's expansion."""
-    # ξ across the grooves alone, and no width of modes
-    monkeypatch.setattr(mean_second_order, "_WIDTH", 0.0)
-    monkeypatch.setattr(mean_second_order, "_azimuths", lambda: np.array([0.0, np.pi]))
     wavelength, grating, sine = 610.0, Grating("sinusoidal", 2.5, 2e-3), 0.7
     k, q = 2e3 * np.pi / wavelength, 2.0 * np.pi / grating.period
     few = 4
@@ -69,8 +66,13 @@ def test_the_mean_is_that_of_small_gratings(stack, monkeypatch):
     expected = np.sum(np.abs(flat) ** 2 * added.real) / np.sum(np.abs(flat) ** 2)
     film = Filmed(stack.index[wavelength], stack.film, k * stack.thickness * 1e-3)
     power = (k * grating.depth) ** 2 / 8.0  # of a sinusoid of this depth
-    found = mean_second_order._of_waves(
-        np.array([cosine]), film, np.array([q / k]), np.array([power])
+    found = mean_of_waves(
+        np.array([cosine]),
+        film,
+        np.array([q / k]),
+        np.array([power]),
+        azimuths=np.array([0.0, np.pi]),  # across the grooves alone
+        mode_width=0.0,
     )
     # of (kh)² h² beside h², which is 4e-5
     assert found == pytest.approx(expected, rel=2e-3)

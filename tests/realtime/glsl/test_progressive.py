@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.realtime.glsl.camera import Camera
-from mitsuba_diffraction.realtime.glsl.emitters import Emitters, emission
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     box_sensor,
@@ -223,89 +219,6 @@ def test_steep_bumps_shade_themselves_as_in_the_path_tracer(
     assert found == pytest.approx(expected, rel=0.01)
 
 
-def irradiance(lights: list[Any], normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over lights of what they bring to a plane at the origin, linear sRGB (3,)."""
-    total = np.zeros(3)
-    for light in lights:
-        direction = light.place[:3].copy()
-        share = 1.0
-        if light.place[3] == 1.0:
-            square = float(direction @ direction)
-            direction /= np.sqrt(square)
-            share = emission(light, -direction) / square
-        total += light.colour * share * max(float(direction @ normal), 0.0)
-    return total / len(lights)
-
-
-def test_a_few_lights_look_like_all_of_them(some_variant: str) -> None:
-    """A sky with its sun, a window and a lamp: eight lights of some hundreds."""
-    T = mi.ScalarTransform4f
-    pane = T().look_at([3, 0, 2], [0, 0, 0], [0, 0, 1])
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "sky": {"type": "sunsky", "sun_direction": [-0.4, 0.6, 0.7], "sun_scale": 10.0,
-                    "sky_scale": 10.0},
-            "window": {
-                "type": "rectangle", "to_world": pane,
-                "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 60.0}},
-            },
-            "lamp": {"type": "point", "position": [0.0, -3.0, 3.0], "intensity": 1000.0},
-        }
-    )  # fmt: skip
-    emitters = Emitters(scene, np.zeros(3))
-    assert emitters.probabilities.min() > 0.05
-    lights = list(itertools.islice(emitters.lights(), 256))
-    whole, few, more = (
-        np.array([irradiance(some, normal) for normal in np.eye(3)])
-        for some in (lights, lights[:8], lights[:32])
-    )
-    # one light more or less of an emitter that is chosen for a fifth of them: 1/8 and 1/32
-    assert np.abs(few - whole).max() < whole.max() / 8
-    assert np.abs(more - whole).max() < whole.max() / 32
-
-
-def test_lights_from_emitters_bring_what_the_emitters_bring(some_variant: str) -> None:
-    """The mean over lights on a plane is the irradiance that Mitsuba finds there."""
-    T = mi.ScalarTransform4f
-    picture = np.full((8, 16, 3), 0.2, np.float32)
-    picture[1:3, 3:6] = [20.0, 5.0, 1.0]
-    away = np.array([0.4, -0.3, 0.0])
-    for part in (
-        {"type": "envmap", "bitmap": mi.Bitmap(picture), "to_world": T().rotate([1, 0, 0], 90)},
-        {"type": "constant", "radiance": {"type": "rgb", "value": 0.7}},
-        {"type": "spot", "intensity": {"type": "rgb", "value": 9.0}, "cutoff_angle": 35,
-         "beam_width": 5, "to_world": T().look_at([0, 0, 3], [0.5, 0, 0], [0, 1, 0])},
-        {"type": "disk", "to_world": T().translate([0.5, 0, 1]).rotate([1, 0, 0], 160).scale(0.4),
-         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 5.0}}},
-    ):  # fmt: skip
-        white = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 1.0}}
-        plane = {"type": "rectangle", "to_world": T().translate(away.tolist()).scale(1e-3)}
-        scene = mi.load_dict({"type": "scene", "part": part, "plane": {**plane, "bsdf": white}})
-        # weighed where the light is drawn for, and seen beside it
-        lights = list(itertools.islice(Emitters(scene, np.zeros(3)).lights(), 512))
-        moved = [
-            dataclasses.replace(light, place=light.place - np.append(away, 0.0) * light.place[3])
-            for light in lights
-        ]
-        sensor = mi.load_dict(
-            {
-                "type": "perspective", "fov": 1e-3,
-                "to_world": T().look_at([0.4, -0.3, 0.1], [0.4, -0.3, 0.0], [0, 1, 0]),
-                "film": {
-                    "type": "hdrfilm", "width": 1, "height": 1, "pixel_format": "rgb",
-                    "component_format": "float32", "rfilter": {"type": "box"},
-                },
-            }
-        )  # fmt: skip
-        integrator = mi.load_dict({"type": "direct", "bsdf_samples": 0, "emitter_samples": 1})
-        seen = mi.render(scene, sensor=sensor, integrator=integrator, spp=1 << 16)
-        expected = np.pi * np.array(seen, float).ravel()
-        found = irradiance(moved, np.array([0.0, 0.0, 1.0]))
-        # noise of Mitsuba's samples, and the colours of its spectra
-        assert found == pytest.approx(expected, rel=0.02), part["type"]
-
-
 def test_pigments_have_another_colour_in_each_light(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
@@ -470,19 +383,3 @@ def test_what_is_in_focus_stays_where_it_is(some_variant: str) -> None:
         apart.append(np.abs(np.diff([clip[:2] / clip[3] for clip in clips], axis=0)).max())
     assert apart[0] < 1e-6  # Mitsuba's matrix is single
     assert apart[1] > 0.05
-
-
-def test_an_environment_that_is_not_finite_is_refused(some_variant: str) -> None:
-    picture = np.ones((8, 16, 3), np.float32)
-    picture[2, 3] = np.inf
-    scene = {"type": "scene", "sky": {"type": "envmap", "id": "sky", "bitmap": mi.Bitmap(picture)}}
-    with pytest.raises(DiffractionError, match="infinite or NaN"):
-        Emitters(mi.load_dict(scene), np.zeros(3))
-
-
-def test_a_scene_whose_emitters_are_dark_is_refused(some_variant: str) -> None:
-    dark = {"type": "point", "intensity": {"type": "uniform", "value": 0.0}}
-    for parts in ({}, {"dark": dark}):
-        scene = mi.load_dict({"type": "scene", **parts})
-        with pytest.raises(DiffractionError, match="no emitter of the scene lights"):
-            Emitters(scene, np.zeros(3))

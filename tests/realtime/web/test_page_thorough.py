@@ -176,7 +176,7 @@ def test_what_does_not_fit_is_left_out_from_the_last_on(
     from mitsuba_diffraction.realtime.web import export as packing
 
     # the pages of the triangles alone take 0.35 MB
-    monkeypatch.setattr(packing, "_HEADER", MAX_BYTES - 1000)
+    monkeypatch.setattr(packing, "CODE_BYTES", MAX_BYTES - 1000)
     monkeypatch.setattr(packing, "OCTAVES", (0.0,))
     with pytest.raises(DiffractionError, match=r"is too large for a page \(exact: .*; fast: "):
         make_page(scene)

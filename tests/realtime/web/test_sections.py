@@ -13,12 +13,14 @@ from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.realtime.glsl.scene import VERTEX
+from mitsuba_diffraction.realtime.glsl.texels import paired
 from mitsuba_diffraction.realtime.web.sections import (
     Sections,
     octahedral,
     packed_array,
     packed_file,
     packed_mesh,
+    packed_series,
 )
 from mitsuba_diffraction.realtime.web.tables import rounded
 
@@ -119,14 +121,25 @@ def test_triangles_come_back_within_sixteen_bits(flat: bool) -> None:
             assert (np.abs(found - expected) <= 0.51 * np.array(place["step"])).all()
 
 
-@given(st.integers(4, 10), st.integers(0, 2**32 - 1))
-def test_rounding_is_bounded_by_the_largest_number_of_a_row(bits: int, seed: int) -> None:
+@given(st.integers(4, 8), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 2.0**-12]))
+def test_rounding_is_bounded_by_the_largest_number_of_a_row(
+    bits: int, seed: int, floor: float
+) -> None:
     values = (
         np.random.default_rng(seed).normal(size=(20, 8))
         * 10.0 ** np.arange(-3.0, 2.0, 0.25)[:, None]
     )
-    found = rounded(values, bits).astype(float)
+    found = rounded(values, bits, floor).astype(float)
     largest = np.abs(values).max(axis=1, keepdims=True)
     # half a step of 2^(1 - bits) of the largest; half floats hold the result exactly to 10 bits
-    assert (np.abs(found - values) <= largest * 2.0**-bits * 1.001).all()
-    np.testing.assert_array_equal(rounded(found, bits), found)
+    bounds = np.maximum(largest * 2.0**-bits, largest.max() * floor)
+    assert (np.abs(found - values) <= bounds * 1.001).all()
+    np.testing.assert_array_equal(rounded(found, bits, floor), found)
+    # as integers with a step, and back
+    half, words = found.astype(np.float16), paired(found)
+    for rows in (half, words):
+        section = packed_series(rows)
+        array = undone(section.data, section.layout).astype(np.int64)
+        integers = (array[:, :-1] >> 1) ^ -(array[:, :-1] & 1)
+        np.testing.assert_array_equal(integers * 2.0 ** (array[:, -1:] - 128.0), found)
+        assert section.layout["series"] == ("half" if rows is half else "words")

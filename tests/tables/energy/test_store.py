@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.directional import DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, Surface
+from mitsuba_diffraction.tables.energy.materials import Reflector
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
-from mitsuba_diffraction.tables.energy.store import Energy
 from mitsuba_diffraction.tables.store import VARIABLE
 
 
@@ -21,7 +21,8 @@ def computed(monkeypatch, tmp_path):
 
     def instead(surface: Surface, wavelength_range: tuple[float, float]) -> Conservation:
         height_scale = surface.orders.height_scale
-        made.append((height_scale, complex(surface.index(np.array([500.0]))[0])))
+        assert isinstance(surface.material, Reflector)
+        made.append((height_scale, complex(surface.material.index(np.array([500.0]))[0])))
         values = np.full((2, 3, 4), 1.0 + height_scale, np.float32)
         found = DirectionalTable(np.array([400.0, 700.0]), values)
         return Conservation(found, found if height_scale > 0.5 else None)
@@ -33,7 +34,8 @@ def computed(monkeypatch, tmp_path):
 def energy(index: complex = 1.5, scale: float = 1.5) -> Energy:
     field = md.gratings.sinusoidal(2.0, 0.1, periods=2, pixels_per_period=24)
     table = md.DiffractionTable.build(field, coherence_width=4.0, height_scale_max=scale)
-    return Energy(table, "small_slope", lambda w: np.full(len(w), index), (400.0, 700.0))
+    material = Reflector("small_slope", lambda w: np.full(len(w), index))
+    return Energy(table, material, (400.0, 700.0))
 
 
 @pytest.mark.parametrize("most", [1.5, 1.43, 0.1])

@@ -4,6 +4,10 @@ uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window
 uniform float height_scale;
 uniform float diffuse_weight;     // weight of the base with layering `thesis`
 
+float patch_area = 1.0;           // square of the factor by which the patch is stretched
+
+// Tangential part along the patch's axes. rotation: (cos, sin) of its x axis times the factor by
+// which it is stretched, which multiplies (u, v) as the table has the patch without it.
 vec2 in_patch(vec3 direction, vec2 rotation)
 {
     return vec2(rotation.x * direction.x + rotation.y * direction.y,

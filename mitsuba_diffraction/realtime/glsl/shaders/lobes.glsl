@@ -14,14 +14,15 @@ float lobe_density(vec3 wi, vec3 wo, vec2 rotation)
     float ring = log(max(dot(uv, uv), 1e-20) / (lobe_smallest * lobe_smallest)) * (0.5 / lobe_step);
     ivec2 cell = ivec2(turn_of(uv) * float(cells.x), floor(ring) + 1.0);
     cell = clamp(cell, ivec2(0), cells - 1);
-    return texelFetch(lobe_densities, cell, 0).r * wo.z;
+    return texelFetch(lobe_densities, cell, 0).r * wo.z * dot(rotation, rotation);
 }
 
 vec3 lobe_direction(vec3 wi, vec2 rotation, vec2 drawn)
 {
     int number = min(int(drawn.x * float(LOBE_PLACES)), LOBE_PLACES - 1);
     vec2 uv = entry(lobe_places, number).xy;
-    vec2 along = rotation.x * uv + rotation.y * vec2(-uv.y, uv.x) - wi.xy;
+    vec2 sum = (rotation.x * uv + rotation.y * vec2(-uv.y, uv.x)) / dot(rotation, rotation);
+    vec2 along = sum - wi.xy;
     return vec3(along, sqrt(max(1.0 - dot(along, along), 0.0)));
 }
 

@@ -2,6 +2,7 @@
 
 uniform vec3 light_direction;  // in the patch's axes
 uniform float exposure;
+uniform float stretch;         // of the patch
 uniform float side;            // size of the map, pixels
 
 out vec4 fragment;
@@ -14,7 +15,7 @@ void main()
 #ifdef DIFFRACTING
     if (square < 0.999 && light_direction.z > 0.0) {
         vec3 wi = vec3(place, sqrt(1.0 - square));
-        found = diffraction(wi, light_direction, vec2(1.0, 0.0), 0);
+        found = diffraction(wi, light_direction, vec2(stretch, 0.0), 0);
     }
 #endif
     fragment = vec4(encode_srgb(found * exposure), 1.0);

@@ -4,15 +4,11 @@ in vec3 v_position;
 in vec3 v_normal;
 in vec3 v_tangent;
 in vec2 v_texcoord;
-in vec2 v_axis;
+in vec3 v_axis;
 
 uniform vec3 eye;
 uniform vec4 light_place[LIGHTS];
 uniform float surface_number;
-#ifdef AXIS_MAPPED
-uniform sampler2D axis_map;
-uniform mat3 axis_uv;
-#endif
 
 layout(location = 0) out vec4 picked_wi;
 layout(location = 1) out vec4 picked_wo;
@@ -22,16 +18,15 @@ void main()
     vec3 n = normalize(v_normal);
     vec3 s = normalize(v_tangent - n * dot(n, v_tangent));
     vec3 t = cross(n, s);
-    vec2 rotation = v_axis;
-#ifdef AXIS_MAPPED
-    rotation = texture(axis_map, (axis_uv * vec3(v_texcoord, 1.0)).xy).rg;
-#endif
-    rotation *= inversesqrt(max(dot(rotation, rotation), 1e-12));
+    if (masked(v_texcoord)) discard;
+    vec2 rotation = patch_frame(v_texcoord, v_axis);
+    float stretch = length(rotation);
+    rotation /= stretch;
     vec3 wi = normalize(eye - v_position);
     if (dot(wi, n) < 0.0) n = -n;
     vec3 wo = normalize(light_place[0].xyz - light_place[0].w * v_position);
     vec3 wi_local = vec3(dot(wi, s), dot(wi, t), dot(wi, n));
     vec3 wo_local = vec3(dot(wo, s), dot(wo, t), dot(wo, n));
     picked_wi = vec4(in_patch(wi_local, rotation), wi_local.z, surface_number + 1.0);
-    picked_wo = vec4(in_patch(wo_local, rotation), wo_local.z, 1.0);
+    picked_wo = vec4(in_patch(wo_local, rotation), wo_local.z, stretch);
 }

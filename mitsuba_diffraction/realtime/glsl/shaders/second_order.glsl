@@ -48,7 +48,7 @@ float second_order(vec2 uv, float r, float k, float z)
     vec3 place = k * vec3(uv, z) * ratio_steps + ratio_zero;
     place.xy = mix(place.xy, floor(place.xy + 0.5), ratio_orders);
     vec4 ratios = on_pages(slope_ratios, ratio_size, place);
-    vec4 c = pair_coefficients * gentle_share(OWN_INDEX, k, r, z) * height_scale * height_scale;
+    vec4 c = pair_coefficients * gentle_share(OWN_INDEX, k, r, z) * (height_scale * height_scale / patch_area);
     vec2 added = vec2(dot(c * vec4(1.0, -1.0, 1.0, -1.0), ratios), dot(c, ratios.yxwz));
     added *= min(1.0, SECOND_ORDER_LIMIT * inversesqrt(max(dot(added, added), 1e-20)));
     return dot(added, added) + 2.0 * added.x + 1.0;

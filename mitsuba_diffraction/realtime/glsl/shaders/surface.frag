@@ -6,7 +6,7 @@ in vec3 v_normal;
 in vec3 v_tangent;
 in vec2 v_texcoord;
 in vec3 v_colour;
-in vec2 v_axis;
+in vec3 v_axis;
 
 uniform vec3 eye;
 uniform vec3 view_axis;           // direction to an orthographic camera; zero otherwise
@@ -17,10 +17,6 @@ uniform bool two_sided;
 #ifdef COLOUR_MAPPED
 uniform sampler2D colour_map;
 uniform mat3 colour_uv;
-#endif
-#ifdef AXIS_MAPPED
-uniform sampler2D axis_map;
-uniform mat3 axis_uv;
 #endif
 
 #ifdef BUMPED
@@ -127,9 +123,6 @@ vec3 bumped(vec3 n)
 
 #endif
 
-// Clamp texture coordinates to a picture.
-vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
-
 void main()
 {
     vec3 n = normalize(v_normal);
@@ -163,22 +156,13 @@ void main()
 #endif
     pigment = texture(colour_map, of_colour).rgb;
 #endif
-    vec2 rotation = v_axis;
-#ifdef AXIS_MAPPED
-    vec2 of_axis = (axis_uv * vec3(v_texcoord, 1.0)).xy;
-#ifdef AXIS_CLAMPED
-    of_axis = within(of_axis, vec2(textureSize(axis_map, 0)));
-#endif
-    rotation = texture(axis_map, of_axis).rg;
-#endif
+    vec2 rotation = patch_frame(v_texcoord, v_axis);
 #ifdef PIGMENT_IN_LIGHT
     pigment = pigment_in_light * pigment;
 #endif
 #ifdef PRINCIPLED
     base_colour = pigment;
 #endif
-    float turned = length(rotation);
-    rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
 #if defined(SHADOWED) || defined(LOOKED_UP)
     vec3 flat_normal = cross(dFdx(v_position), dFdy(v_position));
@@ -186,6 +170,7 @@ void main()
     if (dot(flat_normal, towards_eye) < 0.0) flat_normal = -flat_normal;
 #endif
 
+    if (masked(v_texcoord)) discard;
     vec3 radiance = vec3(0.0);
 #ifdef LOOKED_UP
 #ifdef LOBES

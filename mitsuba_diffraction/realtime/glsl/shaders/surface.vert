@@ -8,7 +8,7 @@ in vec3 normal;
 in vec3 tangent;   // dp/du
 in vec2 texcoord;
 in vec3 colour;    // diffuse reflectance, linear sRGB
-in vec2 axis;      // (cos, sin) from the tangent to the patch's x axis
+in vec3 axis;      // (cos, sin) from the tangent to the patch's x axis, and its stretch
 
 uniform mat4 view_projection;
 
@@ -17,7 +17,7 @@ out vec3 v_normal;
 out vec3 v_tangent;
 out vec2 v_texcoord;
 out vec3 v_colour;
-out vec2 v_axis;
+out vec3 v_axis;
 
 void main()
 {

@@ -30,6 +30,20 @@ function restored(planes, layout) {
   return array;
 }
 
+// Decode integers with the exponent of their step in the last column: floats, or words of the upper
+// halves of two.
+function seriesOf(array, { rows, columns, series }) {
+  const floats = new Float32Array(rows * (columns - 1));
+  let to = 0;
+  for (let from = 0; from < array.length; ++from) {
+    const step = 2 ** (array[from + columns - 1] - 128);
+    for (const end = from + columns - 1; from < end; ++from) floats[to++] = ((array[from] >>> 1) ^ -(array[from] & 1)) * step;
+  }
+  if (series === "half") return floats;
+  const bits = new Uint32Array(floats.buffer);
+  return Uint32Array.from({ length: bits.length / 2 }, (_, n) => (bits[2 * n] >>> 16) | (bits[2 * n + 1] & 0xffff0000));
+}
+
 class Data {
   constructor(bytes, layouts) {
     this.bytes = bytes;
@@ -42,11 +56,17 @@ class Data {
   }
 
   async array(number) {
-    return restored(await inflated(this.part(number)), this.layouts[number]);
+    const layout = this.layouts[number];
+    const array = restored(await inflated(this.part(number)), layout);
+    return layout.series ? seriesOf(array, layout) : array;
+  }
+
+  async text(number) {
+    return new TextDecoder().decode(await inflated(this.part(number)));
   }
 
   async picture(number) {
-    const file = new Blob([this.part(number)], { type: "image/png" });
+    const file = new Blob([this.part(number)], { type: "image/webp" });
     return createImageBitmap(file, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   }
 }

@@ -93,7 +93,8 @@ async function uploadTexture(gl, data, entry) {
     const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
     const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
+    const kind = numbers instanceof Float32Array ? gl.FLOAT : type; // half floats may come as floats
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, kind, numbers);
   }
   const filter = entry.smooth ? gl.LINEAR : gl.NEAREST;
   const wrap = entry.smooth ? gl.REPEAT : gl.CLAMP_TO_EDGE;
@@ -160,6 +161,7 @@ class Drawing {
         ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
       });
     }
+    drawing.sources = JSON.parse(await data.text(header.programs));
     const { light } = header;
     drawing.daylight = await data.array(light.daylight);
     drawing.spectra = light.spectra === null ? null : await data.array(light.spectra);
@@ -179,12 +181,12 @@ class Drawing {
   // Load a method's tables and compile its programs; lit: `viewer.lit`.
   async prepare(method, lit, progress) {
     if (!this.tables[method]) {
-      await progress(`Unpacking the tables of ${method}`);
+      await progress("Unpacking colours");
       const tables = [];
       for (const table of this.header.tables[method]) tables.push(await Part.load(this.gl, this.data, table));
       this.tables[method] = tables;
     }
-    await progress(`Compiling ${method}`);
+    await progress("Preparing");
     for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light);
   }
 
@@ -192,7 +194,7 @@ class Drawing {
   program(surface, method, lit, main = "surface") {
     const { gl, header } = this;
     const number = surface.programs[method], key = `${number} ${lit} ${main}`;
-    const fragment = () => header.programs[number].replace("#define LIGHTS_LIT 1\n", lit) + header.mains[main];
+    const fragment = () => this.sources[number].replace("#define LIGHTS_LIT 1\n", lit) + header.mains[main];
     return (this.programs[key] ??= new Program(gl, main === "map" ? header.shown.vertex : header.vertex, fragment()));
   }
 

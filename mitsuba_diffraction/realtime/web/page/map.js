@@ -61,7 +61,7 @@ class BrdfMap {
     };
     const wi = read(0), wo = read(1);
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
-    return wi[3] ? { wi: [...wi.slice(0, 3)], wo: [...wo.slice(0, 3)], surface: drawing.surfaces[wi[3] - 1], light } : null;
+    return wi[3] ? { wi: [...wi.slice(0, 3)], wo: [...wo.slice(0, 3)], stretch: wo[3], surface: drawing.surfaces[wi[3] - 1], light } : null;
   }
 
   update() {
@@ -78,7 +78,7 @@ class BrdfMap {
     this.words.textContent = this.orders(this.found);
   }
 
-  draw({ wi, wo, surface, light }) {
+  draw({ wi, wo, stretch, surface, light }) {
     const { viewer, gl } = this;
     const { drawing } = viewer;
     const program = drawing.program(surface, viewer.drawn, viewer.lit.one, "map");
@@ -91,7 +91,7 @@ class BrdfMap {
     const white = { ...light, place: [0, 0, 1, 0], colour: [1, 1, 1] };
     program.set({
       ...viewer.viewed().uniforms, ...lightUniforms([white], viewer.colour()), wavenumbers: viewer.header.light.wavenumbers,
-      height_scale: surface.height_scale * viewer.heights, light_direction: wo, side: SIDE,
+      height_scale: surface.height_scale * viewer.heights, light_direction: wo, side: SIDE, stretch,
       exposure: 4 * viewer.exposure / (viewer.drawn === "exact" && viewer.wavelength === null ? Math.max(dot(light.colour, LUMINANCE), 1e-6) : 1),
     });
     drawing.full(this.drawn, SIDE, SIDE);
@@ -112,12 +112,13 @@ class BrdfMap {
   }
 
   // The strongest orders, and the wavelength of each that is diffracted towards the eye.
-  orders({ wi, wo, surface }) {
+  orders({ wi, wo, stretch, surface }) {
     if (wo[2] <= 0) return "The light is behind the surface.";
     const list = this.viewer.header.orders[surface.table];
     if (!list.length) return "White ring: eye. Blue: mirror direction.";
     const [u, v] = plus(wi, wo);
-    const lines = list.slice(0, 3).map(([x, y]) => {
+    const lines = list.slice(0, 3).map(([a, b]) => {
+      const x = a / stretch, y = b / stretch;
       const length = Math.hypot(x, y), angle = ((Math.atan2(y, x) * 180) / Math.PI + 180) % 180;
       const along = Math.abs(u * x + v * y) / length, nm = (2e3 * Math.PI * along) / length;
       const off = (Math.asin(clamp(Math.abs(u * y - v * x) / length, 0, 1)) * 180) / Math.PI;

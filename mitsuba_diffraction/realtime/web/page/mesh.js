@@ -1,6 +1,6 @@
 // Decode a surface's triangles, which sections.py encodes, and upload them.
 
-const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 2 };
+const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 3 };
 
 // Decode a direction from two 16-bit integers (Cigolle et al. 2014).
 function fromOctahedron(a, b, to, at) {

@@ -1,4 +1,4 @@
-"""A grid of directions, and linear interpolation on it (NumPy only)."""
+"""Functions of direction on a grid, linear in between, and of wavelength (NumPy only)."""
 
 from __future__ import annotations
 

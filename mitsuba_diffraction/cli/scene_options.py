@@ -1,0 +1,114 @@
+"""The scene of a command, or a mesh on a stage, with parameters and materials.
+
+`add_scene` declares the options, `scene_parameters` reads their values, and `put_on_stage` puts a
+mesh in place of a scene into the studio.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..errors import DiffractionError, quoted
+from ..files import readable_file
+from ..scene.parameters import Change, change_of
+from .options import add_mode, whole_number
+
+
+def definition(text: str) -> tuple[str, str]:
+    """Parse KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not (equals and key):
+        raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {quoted(text)}")
+    return key, value
+
+
+def change(text: str) -> Change:
+    """Parse KEY=FROM:TO, a parameter of a scene that changes."""
+    try:
+        return change_of(text)
+    except DiffractionError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """Add a scene, its parameters, variant and sensor."""
+    parser.add_argument(
+        "scene", metavar="SCENE", type=Path,
+        help="Mitsuba XML file; or, with --patch, a mesh (PLY, OBJ), which is put into a studio",
+    )  # fmt: skip
+    parser.add_argument(
+        "--patch", metavar="FILE", type=Path,
+        help="surface of a mesh: heights, recipe or table; pixel_size, max_height, material, up, "
+        "turn and the lamp are set by -D",
+    )  # fmt: skip
+    parser.add_argument(
+        "--material", metavar="ID=FILE[,NAME=VALUE...]", type=definition, action="append",
+        default=[], dest="materials",
+        help="put a surface on the BSDF or shape of this id, e.g. mat-Skin=scale.exr,int_ior=1.56; "
+        "what the scene has there lies beneath it, unless `material` names a conductor; may be "
+        "given several times",
+    )  # fmt: skip
+    add_mode(parser)
+    parser.add_argument(
+        "-D", "--define", metavar="KEY=VALUE", type=definition, action="append", default=[],
+        dest="parameters", help="set a parameter of the scene; may be given several times",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sensor", metavar="N", type=whole_number(0), default=0,
+        help="number of the sensor, from 0; default: 0",
+    )  # fmt: skip
+
+
+def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
+    """Return the values of -D and --material, as `load_scene` takes them.
+
+    A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
+    """
+    from ..scene.additions import MATERIAL
+
+    parameters = _definitions(args)
+    ids = [name for name, _ in args.materials]
+    for name in ids:
+        if ids.count(name) > 1:
+            args.parser.error(f"argument --material: {name!r} is given more than once")
+    return parameters | {MATERIAL + name: value for name, value in args.materials}
+
+
+def put_on_stage(args: argparse.Namespace) -> None:
+    """Replace a mesh in place of the scene by the studio, with the mesh and its surface.
+
+    The scene is then the studio, and default names of outputs follow the mesh: `args.name`.
+    """
+    from ..scene.stage import MESHES, OTHER_MESHES, STUDIO
+
+    args.name, suffix = args.scene, args.scene.suffix.lower()
+    if suffix in OTHER_MESHES:
+        raise DiffractionError(
+            f"mesh '{args.scene}': Mitsuba does not read {suffix}; convert it to PLY or OBJ, as "
+            "Blender's export does"
+        )
+    if suffix not in MESHES:
+        if args.patch is not None:
+            args.parser.error(
+                f"argument --patch: is for a mesh ({', '.join(MESHES)}); for '{args.scene}' use "
+                "--material ID=FILE"
+            )
+        return
+    if args.patch is None:
+        args.parser.error(
+            f"'{args.scene}' is a mesh: say which surface it has, --patch FILE (heights, recipe "
+            "or table)"
+        )
+    mesh, patch = readable_file(args.scene), readable_file(args.patch)
+    args.parameters += [("mesh", str(mesh.absolute())), ("patch", str(patch.absolute()))]
+    args.scene = STUDIO
+
+
+def _definitions(args: argparse.Namespace) -> dict[str, str]:
+    """Return the values of -D; a parameter given twice is a usage error."""
+    parameters = dict(args.parameters)
+    if len(parameters) < len(args.parameters):
+        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
+        args.parser.error(f"argument -D: {twice!r} is set more than once")
+    return parameters

@@ -1,0 +1,228 @@
+"""`mitsuba-diffraction solve`: from a groove's profile, or a file of efficiencies, to orders."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import DiffractionError
+from . import options
+from .console import Bar, say
+from .options import number_between, whole_number
+from .report import check_outputs, save_report
+from .workers import add_workers, client_of, on_workers
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from ..solve.orders import Estimate
+    from ..solve.recipes import SolvedRecipe
+    from ..tables.orders import OrderTable
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "solve", run, "solve the orders of a periodic profile rigorously",
+        "Solve Maxwell's equations for a grating and write the efficiencies of its reflected "
+        "orders, for all directions and wavelengths, as a table of the BSDF diffraction_orders. "
+        "Interrupted by Ctrl-C, the same command goes on.",
+    )  # fmt: skip
+    parser.add_argument(
+        "source", metavar="SOURCE",
+        help="lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, undercut "
+        "allowed); a recipe (.toml); with --from-csv a file of efficiencies",
+    )  # fmt: skip
+    options.add_output(parser, "the table; default: SOURCE's name with .nc", ".nc")
+    group = parser.add_argument_group("the grating")
+    group.add_argument("--period", metavar="D", type=number_between(0.01, 1000), help="µm")
+    group.add_argument(
+        "--depth", metavar="H", type=number_between(0, 100), help="µm, of a generator"
+    )
+    group.add_argument("--duty", metavar="F", type=number_between(0, 1), help="ridge, lamellar")
+    group.add_argument(
+        "--direction", choices=("descending", "ascending"), help="towards +x, blazed"
+    )
+    group.add_argument(
+        "--material", metavar="M",
+        help="conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, or none (reflects "
+        "all); default: Al",
+    )  # fmt: skip
+    group.add_argument(
+        "--superstrate", metavar="N", type=number_between(1, 5),
+        help="index of the clear medium above the grooves, e.g. 1.58 under polycarbonate; "
+        "default: 1",
+    )  # fmt: skip
+    group = parser.add_argument_group("the table")
+    group.add_argument("--wavelength-range", metavar="A,B", type=_pair, help="nm; default: 380,780")
+    group.add_argument(
+        "--tolerance", metavar="E", type=number_between(1e-4, 0.2),
+        help="mean error between nodes, of the light in all orders but 0; default: 0.01",
+    )  # fmt: skip
+    group.add_argument(
+        "--solver", choices=("integral", "coupled"),
+        help="boundary integral (extra solve), or coupled waves, for dielectrics; "
+        "default: integral",
+    )  # fmt: skip
+    group.add_argument(
+        "--resolution", metavar="N", type=whole_number(4),
+        help="points on the boundary, or harmonics; default: chosen by convergence",
+    )  # fmt: skip
+    group.add_argument(
+        "--from-csv", action="store_true",
+        help="SOURCE is a long CSV of wavelength_nm, theta_deg, phi_deg, order, R_s, R_p; needs "
+        "--period",
+    )  # fmt: skip
+    parser.add_argument(
+        "--jobs", metavar="N", type=whole_number(1), default=1,
+        help="processes here; default: 1",
+    )  # fmt: skip
+    add_workers(parser)
+    options.add_json(parser, "what is in the table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve, write the table, and return the exit code."""
+    source = Path(args.source)
+    output = args.output or Path(f"{source.stem}.nc")
+    if args.from_csv:
+        from ..solve.measured import read_orders
+
+        if args.period is None:
+            args.parser.error("argument --from-csv: needs --period, µm")
+        check_outputs([output], [source], "table")
+        table = read_orders(source, args.period, superstrate=args.superstrate or 1.0)
+    else:
+        recipe = recipe_of(args)
+        output = recipe.output
+        # the default folder of a recipe is made
+        check_outputs([output], [source], "table", make_folder=True)
+        output.parent.mkdir(parents=True, exist_ok=True)
+        table = solve_recipe(recipe, args)
+    table.save(output)
+    print(f"{args.source} -> {output}")
+    for label, text in _report(table, output):
+        print(f"  {label:<11} {text}")
+    save_report(args, {"file": str(output), **table.summary()})
+    return 0
+
+
+def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
+    """Return what to solve, from a recipe and the options that override it."""
+    from ..solve.orders import Settings
+    from ..solve.recipes import SolvedRecipe, profile_of
+
+    source = Path(args.source)
+    shape = {
+        name: value
+        for name in ("period", "depth", "duty", "direction")
+        if (value := getattr(args, name)) is not None
+    }
+    if source.suffix.lower() == ".toml":
+        if shape:
+            args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
+        recipe = SolvedRecipe.load(source)
+    else:
+        profile = profile_of(args.source, shape)
+        recipe = SolvedRecipe(profile, "Al", 1.0, Settings(), Path(f"{source.stem}.nc"))
+    changed = {
+        field: value
+        for field, value in (
+            ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
+            ("method", args.solver), ("resolution", args.resolution),
+        )
+        if value is not None
+    }  # fmt: skip
+    return replace(
+        recipe,
+        material=recipe.material if args.material is None else args.material,
+        superstrate=recipe.superstrate if args.superstrate is None else args.superstrate,
+        settings=replace(recipe.settings, **changed),
+        output=args.output or recipe.output,
+    )
+
+
+def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
+    """Solve a recipe on the requested processes; what is done lies beside the output until then."""
+    from ..solve.jobs import Jobs
+    from ..solve.orders import solve_orders
+
+    folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(f"cannot write '{folder}': {error.strerror}") from error
+    with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
+
+        def announce(estimate: Estimate) -> None:
+            say(
+                f"{estimate.stage}: {estimate.solutions} solutions at {estimate.stations} "
+                f"stations, about {_time(estimate.seconds / processes)}; results are kept in "
+                f"'{folder}'"
+            )
+
+        table = solve_orders(
+            recipe.profile,
+            recipe.material,
+            superstrate=recipe.superstrate,
+            settings=recipe.settings,
+            jobs=Jobs(folder, executor, bar),
+            announce=announce,
+        )
+    shutil.rmtree(folder)
+    return table
+
+
+@contextlib.contextmanager
+def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
+    """Yield the processes that solve, and their number."""
+    if on_workers(args):
+        if args.jobs > 1:
+            args.parser.error("argument --jobs: is for this machine; --workers has its own")
+        with client_of(args) as client:
+            yield client.get_executor(), max(1, sum(client.nthreads().values()))
+        return
+    from ..solve.jobs import processes
+
+    with processes(args.jobs) as pool:
+        yield pool, args.jobs
+
+
+def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
+    """Yield lines on the table, each with its label."""
+    facts: dict[str, Any] = dict(table.header)
+    low, high = table.wavelengths
+    medium = f" under index {table.superstrate:g}" if table.superstrate > 1 else ""
+    yield "grating", f"{facts['profile']}, {facts['material']}{medium}, {low:g} to {high:g} nm"
+    yield "solver", str(facts["solver"])
+    if facts.get("solver_error") is not None:
+        yield "", f"its next resolution changes {facts['solver_error']:.2g} of the light"
+    size = output.stat().st_size / 1e6
+    yield "table", f"{len(table.bands)} bands, {size:.2g} MB on disk"
+    if "error_mean" in facts:
+        yield (
+            "error",
+            (
+                f"{facts['error_mean']:.2%} of the light in orders on average, at most "
+                f"{facts['error_worst']:.2%} in 95 % of directions"
+            ),
+        )
+        yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
+
+
+def _pair(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"expected two numbers A,B, got '{text[:40]}'") from error
+    return low, high
+
+
+def _time(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

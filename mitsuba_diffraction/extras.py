@@ -1,0 +1,52 @@
+"""Packages of the extras, imported by the features that need them."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, NamedTuple
+
+from .errors import DiffractionError
+
+
+class _Need(NamedTuple):
+    """Need for a package: a clause that states it, the extra that has it, and an alternative."""
+
+    clause: str
+    extra: str
+    alternative: str = ""
+
+
+_NEEDS = {
+    "SurfaceTopography": _Need("instrument files need SurfaceTopography", "afm"),
+    "distributed": _Need("workers need Dask", "cluster"),
+    "flip_evaluator": _Need("FLIP needs flip-evaluator", "gl"),
+    "imageio_ffmpeg": _Need(
+        "films ending in .mp4 need imageio-ffmpeg", "film", "name a film ending in .webp or .gif"
+    ),
+    "imgui_bundle": _Need("view needs imgui-bundle", "view"),
+    "moderngl": _Need("the shaders need moderngl", "gl"),
+    "moderngl_window": _Need("view needs moderngl-window", "view"),
+    "pyoidn": _Need("--denoise needs pyoidn", "denoise"),
+}
+
+
+def optional(module: str, subject: str = "") -> Any:
+    """Import a module of a package that an extra has.
+
+    subject : file or option at which the need arose, for the message.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be imported; the message names the extra.
+    """
+    need = _NEEDS[module.partition(".")[0]]
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        place = f"{subject}: " if subject else ""
+        alternative = f", or {need.alternative}" if need.alternative else ""
+        raise DiffractionError(
+            f"{place}{need.clause}, which is not installed: pip install "
+            f"'mitsuba-diffraction[{need.extra}]'{alternative}"
+        ) from error

@@ -1,0 +1,181 @@
+"""Paths of light by a boundary: reflected or let through, from above or below (NumPy, float64).
+
+On a path an order of a surface sends the share η = G |a_j|² of the light along ωi to ωo, with
+
+    G = 4 qi qo N / w²,   w = qi + qo where light is reflected, |qi − qo| where it is let through,
+
+at κ = k w: N, mean power of the boundary's Jones matrix (`boundary`, `through`, `coat`), and
+q = √(m² − n² sin²θ), with n the index of the medium in which θ is measured and m that of the medium
+at the structure. For Kirchhoff's model and R = 1, G is (1 + ωi·ωo)²/(w² cosθi cosθo). G is
+symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import boundary, coat, through
+from .boundary import Complex, Real
+from .fresnel import Filmed, amplitudes, reflectance
+
+
+@dataclass(frozen=True)
+class Side:
+    """Side of the surface that light comes from or goes to.
+
+    Attributes
+    ----------
+    index : n, of the medium in which directions are measured, over that above the surface.
+    at_structure : m, of the medium at the structure. It is another one below a thin sheet, whose
+        directions are those beyond its flat other side.
+    """
+
+    index: float = 1.0
+    at_structure: float = 1.0
+
+    @property
+    def number(self) -> int:
+        """0 above the surface, 1 below."""
+        return 0 if self.at_structure == 1.0 else 1
+
+    @property
+    def beyond_sheet(self) -> bool:
+        """Whether directions are those beyond the flat side of a sheet."""
+        return self.index != self.at_structure
+
+    def normal(self, cosine: Real) -> Real:
+        """Return q of directions by their cosine to the normal."""
+        square = self.at_structure**2 - self.index**2 + (self.index * cosine) ** 2
+        return np.asarray(np.sqrt(square))
+
+
+ABOVE = Side()
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Light that a boundary sends from one side to another.
+
+    Attributes
+    ----------
+    index : n + ik, or a film. Of reflected light: of the medium beyond the structure over that
+        before it. Of light that is let through: of the medium below over that above. None where G
+        equals `common`.
+    model : one of `boundary.MODELS`; of `through.MODELS` for light let through.
+    came, left : sides of the incident and of the outgoing light.
+    least : of w; powers of orders over w² have a limit for w → 0.
+    """
+
+    index: complex | Filmed | None
+    model: str
+    came: Side = ABOVE
+    left: Side = ABOVE
+    least: float = 0.0
+
+    @property
+    def let_through(self) -> bool:
+        """Whether light crosses the structure."""
+        return self.came.number != self.left.number
+
+    @property
+    def thin(self) -> bool:
+        """Whether light passes the flat side of a sheet."""
+        return self.came.beyond_sheet or self.left.beyond_sheet
+
+    @property
+    def sign(self) -> int:
+        """Sign of the orders' frequencies: seen from below, heights are turned over."""
+        return -1 if self.came.number or self.left.number else 1
+
+    def width(self, cos_i: Real, cos_o: Real) -> Real:
+        """Return w."""
+        q_i, q_o = self.came.normal(cos_i), self.left.normal(cos_o)
+        return np.abs(q_i - q_o) if self.let_through else q_i + q_o
+
+    def tangential(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
+        """Return the tangential part of n_i ωi + n_o ωo; cos_turn : of the azimuth between."""
+        incident = self.came.index**2 * (1.0 - cos_i**2)
+        outgoing = self.left.index**2 * (1.0 - cos_o**2)
+        cross = 2.0 * np.sqrt(np.maximum(incident * outgoing, 0.0)) * cos_turn
+        return np.sqrt(np.maximum(incident + outgoing + cross, 0.0))
+
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
+        """Return G of a perfect conductor, or 1/(qi qo w²) of light that is let through.
+
+        G of any material varies as steeply towards the horizon; the ratio of both is smooth.
+        """
+        w = np.maximum(self.width(cos_i, cos_o), self.least)
+        common = 1.0 / (self.came.normal(cos_i) * self.left.normal(cos_o) * w**2)
+        if self.let_through:
+            return np.asarray(common)
+        one_plus_dot = 0.5 * (self.tangential(cos_i, cos_o, cos_turn) ** 2 + w**2)  # times m²
+        return np.asarray(common * one_plus_dot**2)
+
+    def matrices(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> list[Complex]:
+        """Return K and B of small slope, which are blended, or another model's matrix alone.
+
+        All cosines broadcast; matrices are (..., 2, 2).
+        """
+        cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
+        sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
+        sin_turn = np.sqrt(1.0 - cos_turn**2)
+        wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
+        wo = np.stack([sin_o * cos_turn, sin_o * sin_turn, cos_o], axis=-1)
+        names = ("kirchhoff", "small_slope") if self.model == "small_slope" else (self.model,)
+        if self.let_through:
+            above, below = (wo, wi) if self.came.number else (wi, wo)
+            below = below * [1.0, 1.0, -1.0]
+            return [through.matrices(name, above, below, self._real, self.thin) for name in names]
+        if self.thin:  # the flat side lies over the structure as the face of a coat does
+            n = self.came.at_structure
+            return [coat.matrices(boundary.MODELS[name], wi, wo, n, self._real) for name in names]
+        assert self.index is not None
+        return [boundary.matrices_of(name)(wi, wo, self.index) for name in names]
+
+    def flat_transmittance(self, cos_i: Real, cos_o: Real) -> Real:
+        """Return G of order 0 that is let through: the flat surface's at both directions."""
+        came, left = (
+            through.flat_transmittances(cosine, self._real, self.thin, side.number)
+            for cosine, side in ((cos_i, self.came), (cos_o, self.left))
+        )
+        return np.asarray(np.mean(np.sqrt(came * left), axis=0))
+
+    def face_reflectance(self, cos_i: Real, cos_o: Real) -> Real:
+        """Return G of the flat side of a sheet for light that it reflects from below."""
+        face = Path(None, "kirchhoff")
+        total = np.hypot(face.tangential(cos_i, cos_o, -1.0), face.width(cos_i, cos_o))
+        shares = reflectance(0.5 * total, self.came.at_structure)  # at ωi + ωo
+        return np.asarray(face.common(cos_i, cos_o, -1.0) * shares)
+
+    @property
+    def _real(self) -> float:
+        assert isinstance(self.index, (int, float))  # light is let through dielectrics alone
+        return float(self.index)
+
+
+@dataclass(frozen=True, eq=False)
+class Returned(Path):
+    """Light from above that the flat side of a sheet sends back through the structure.
+
+    It passes the structure twice, which to first order in κ² is one passage of κ = √(κi² + κo²).
+
+    Attributes
+    ----------
+    sheet : index of the sheet.
+    """
+
+    sheet: float = 1.0
+
+    def width(self, cos_i: Real, cos_o: Real) -> Real:
+        inside = Side(1.0, self.sheet)
+        return np.hypot(*(inside.normal(cosine) - cosine for cosine in (cos_i, cos_o)))
+
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
+        """Return G: T² R/(1 − R²) of either direction, the mean of both polarisations."""
+        shares = []
+        for cosine in (cos_i, cos_o):
+            back = np.abs(np.stack(amplitudes(cosine, self.sheet))) ** 2
+            shares.append(np.mean((1.0 - back) * back / (1.0 + back), axis=0))
+        return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)

@@ -1,0 +1,66 @@
+"""Factors on heights and lengths for which scales of energy are tabulated.
+
+A patch stretched by a reflects light of wavelength λ as the patch itself, with heights divided by
+a, reflects light of λ/a: all lengths are divided by a. So the tables of the unstretched patch serve
+it too, at other wavelengths and height scales. Indices are those of the wavelength itself at the
+factor `centre`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ..tables.height_scales import HeightScales
+
+#: Smallest factor over the largest that is tabulated: smaller ones have the values of this one.
+LEAST_SHARE = 0.25
+#: Factors are rounded outwards to powers of 2^(1/8): an optimisation of one waits rarely.
+STEPS_PER_OCTAVE = 8
+
+
+class ScaleRange(NamedTuple):
+    """Factors that energy is conserved for.
+
+    heights, stretch : least and largest factor on heights, and on lengths over the table's.
+    varies : whether either varies over the surface.
+    differentiable : whether derivatives with respect to either are wanted.
+    """
+
+    heights: tuple[float, float]
+    stretch: tuple[float, float]
+    varies: bool
+    differentiable: bool
+
+    @property
+    def height_scale(self) -> float:
+        """Height scale to look up where neither factor varies."""
+        return self.heights[1] / self._tabulated[0]
+
+    @property
+    def centre(self) -> float:
+        """Factor on lengths at which wavelengths are those of the light."""
+        low, high = self._rounded
+        return math.sqrt(low * high)
+
+    def nodes(self, scales: HeightScales) -> list[float]:
+        """Return the height scales at which a function of them is tabulated."""
+        if not self.varies:
+            return list(scales.nodes(self.height_scale, interval=self.differentiable))
+        return scales.between(self.heights[0] / self.stretch[1], self.height_scale)
+
+    def wavelengths(self, wavelength_range: tuple[float, float]) -> tuple[float, float]:
+        """Return the range λ/a of wavelengths λ, nm."""
+        low, high = self._rounded
+        return wavelength_range[0] / high, wavelength_range[1] / low
+
+    @property
+    def _rounded(self) -> tuple[float, float]:
+        low, high = (math.log2(factor) * STEPS_PER_OCTAVE for factor in self._tabulated)
+        ends = math.floor(low), math.ceil(high)
+        return 2.0 ** (ends[0] / STEPS_PER_OCTAVE), 2.0 ** (ends[1] / STEPS_PER_OCTAVE)
+
+    @property
+    def _tabulated(self) -> tuple[float, float]:
+        low, high = self.stretch
+        return max(low, LEAST_SHARE * high), high

@@ -1,0 +1,16 @@
+"""Orders of periodic profiles by rigorous solvers, for the BSDF `diffraction_orders`.
+
+Contents
+--------
+orders      `solve_orders`: from a profile and a material to a table
+measured    `read_orders`: from a file of efficiencies, solved or measured elsewhere
+profiles    one period of the grooves as a polygon; generators and a reader
+materials   refractive index over wavelength, by name or number
+stations    sets of directions with one system matrix
+integral    solver: boundary integral method
+coupled     solver: coupled waves, for dielectrics
+resolution  choice of the solver's resolution, by convergence
+nodes       choice of the numbers of nodes
+jobs        stations solved in processes, and stored until the table is written
+recipes     recipes with `method = "solved"`
+"""

@@ -1,0 +1,210 @@
+"""Stations solved here, in other processes or on a cluster, and stored as they are done."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+
+import numpy as np
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from ..progress import Progress, silent
+from .coupled import CoupledWaves
+from .integral import IntegralSolver
+from .nodes import Place
+from .profiles import Profile
+from .stations import Grating, Real, Solver
+
+#: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
+METHODS: dict[str, Callable[[Profile, int], Solver]] = {
+    "integral": IntegralSolver,
+    "coupled": CoupledWaves,
+}
+# Threads that libraries of linear algebra start in each process, which would compete for the cores
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Grating, solver and its resolution; `digest` is that of the grating and the solver."""
+
+    grating: Grating
+    method: str
+    resolution: int
+    digest: str
+
+
+def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
+    """Return a problem with its digest.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such method.
+    """
+    if method not in METHODS:
+        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    content = hashlib.sha256(repr((method, grating.superstrate, grating.wavelengths)).encode())
+    profile, material = grating.profile, grating.material
+    content.update(repr(profile.period).encode())
+    for array in (profile.x, profile.z, material.wavelengths, material.values):
+        content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
+    return Problem(grating, method, resolution, content.hexdigest())
+
+
+@lru_cache(maxsize=2)
+def _solver(digest: str, resolution: int, problem: _Uncompared) -> Solver:
+    grating = problem.problem.grating
+    return METHODS[problem.problem.method](grating.profile, resolution)
+
+
+class _Uncompared:
+    """Argument that a cache does not compare."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Uncompared)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def solver_of(problem: Problem) -> Solver:
+    """Return the solver of a problem; a process keeps the last ones."""
+    return _solver(problem.digest, problem.resolution, _Uncompared(problem))
+
+
+def solve_place(problem: Problem, place: Place) -> Real:
+    """Return efficiencies (w, j, 2, q, 2) at a place; see `stations.Solver`."""
+    grating = problem.grating
+    w = place.w[:1] if grating.is_perfect else place.w
+    station = grating.station(place.band, place.kind, place.tau, place.rho, w)
+    return solver_of(problem).efficiencies(station)
+
+
+@dataclass
+class Jobs:
+    """Where stations are solved and stored.
+
+    Attributes
+    ----------
+    folder : of results, which another run finds again; None stores nothing.
+    executor : processes or a cluster; None solves here.
+    progress : called as progress(done, total, text).
+    """
+
+    folder: Path | None = None
+    executor: Executor | None = None
+    progress: Progress = silent
+
+    def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
+        """Return the efficiencies at all places, of which those in the folder are read.
+
+        An exception or Ctrl-C leaves in the folder what is done by then.
+        """
+        files = {place: self._file(problem, place) for place in places}
+        results = {place: _read(file) for place, file in files.items()}
+        known = {place: values for place, values in results.items() if values is not None}
+        missing = [place for place in files if place not in known]
+        done = len(known)
+        self.progress(done, len(files), text)
+        for place, values in self._solved(problem, missing):
+            known[place] = values
+            if (file := files[place]) is not None:
+                with atomic_path(file) as temporary:
+                    np.save(temporary, values.astype(np.float32))
+            done += 1
+            self.progress(done, len(files), text)
+        return known
+
+    def seconds(self, problem: Problem, place: Place) -> float:
+        """Return the seconds that a place takes."""
+        if self.executor is None:
+            return timed(problem, place)
+        return float(self.executor.submit(timed, problem, place).result())
+
+    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Real]]:
+        if self.executor is None:
+            for place in places:
+                yield place, solve_place(problem, place)
+            return
+        futures = {self.executor.submit(solve_place, problem, place): place for place in places}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def _file(self, problem: Problem, place: Place) -> Path | None:
+        if self.folder is None:
+            return None
+        key = hashlib.sha256(repr((problem.digest, problem.resolution, tuple(place))).encode())
+        return self.folder / f"{key.hexdigest()[:24]}.npy"
+
+    def clear(self) -> None:
+        """Remove the stored results and their folder."""
+        if self.folder is not None and self.folder.is_dir():
+            for file in self.folder.glob("*.npy"):
+                file.unlink()
+            self.folder.rmdir()
+
+
+def timed(problem: Problem, place: Place) -> float:
+    """Return the seconds that a place takes, without the start of the solver."""
+    solver_of(problem)
+    start = time.perf_counter()
+    solve_place(problem, place)
+    return time.perf_counter() - start
+
+
+@contextmanager
+def processes(count: int) -> Iterator[Executor]:
+    """Yield a pool of processes with one thread of linear algebra each."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _begin() -> None:
+    """Leave Ctrl-C, which reaches all processes of a terminal, to the first, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def _read(file: Path | None) -> Real | None:
+    if file is None or not file.is_file():
+        return None
+    try:
+        return np.load(file).astype(np.float64)
+    except (OSError, ValueError, EOFError):
+        return None  # solved again

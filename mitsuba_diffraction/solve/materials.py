@@ -1,0 +1,83 @@
+"""Refractive index of a grating's material over wavelength."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError, quoted
+from ..plugin.conductors import tabulated_index
+
+#: Name of the perfect conductor, as in the BSDF `diffraction`.
+PERFECT = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Complex index n + ik, interpolated linearly; held at the ends.
+
+    Attributes
+    ----------
+    name : for people.
+    wavelengths : (n,) nm, in vacuum.
+    values : (n,) n + ik; None for a perfect conductor.
+    """
+
+    name: str
+    wavelengths: NDArray[np.float64]
+    values: NDArray[np.complex128] | None
+
+    def index(self, wavelength: ArrayLike) -> NDArray[np.complex128] | None:
+        """Index at wavelengths in vacuum, nm; None for a perfect conductor."""
+        if self.values is None:
+            return None
+        lam = np.asarray(wavelength, np.float64)
+        real, imaginary = (
+            np.interp(lam, self.wavelengths, part) for part in (self.values.real, self.values.imag)
+        )
+        return np.asarray(real + 1j * imaginary)
+
+
+def material_of(
+    material: str | float | complex | Material, wavelengths: tuple[float, float]
+) -> Material:
+    """Return a material from a name that Mitsuba knows, an index, or "none" (R = 1).
+
+    Parameters
+    ----------
+    material : name such as "Al", number such as 1.5 or 0.6+5.6j, or their text.
+    wavelengths : shortest and longest, nm, for which the index must be known.
+
+    Raises
+    ------
+    DiffractionError
+        If the name is unknown, the index impossible, or its table ends within the wavelengths.
+    """
+    if isinstance(material, Material):
+        return material
+    if material == PERFECT:
+        return Material("perfect conductor", np.array([0.0]), None)
+    try:
+        number = (
+            complex(material.replace(" ", "").replace("i", "j"))
+            if isinstance(material, str)
+            else complex(material)
+        )
+    except ValueError:
+        nodes, values = tabulated_index(str(material))
+        low, high = wavelengths
+        if low < nodes[0] or high > nodes[-1]:
+            raise DiffractionError(
+                f"material={material!r} is tabulated from {nodes[0]:.0f} to {nodes[-1]:.0f} nm, "
+                f"and the wavelengths are {low:g} to {high:g} nm; choose wavelengths within, or "
+                "give the index as a number"
+            ) from None
+        return Material(str(material), nodes, values)
+    if not (0.01 <= number.real <= 100 and 0 <= number.imag <= 100):
+        raise DiffractionError(
+            f"material={quoted(material)}: an index is n + ik with n from 0.01 to 100 and k from 0 "
+            "to 100, such as 1.5 or 0.65+5.6j"
+        )
+    return Material(f"index {number.real:g}+{number.imag:g}i", np.array([0.0]), np.array([number]))

@@ -1,0 +1,138 @@
+"""Recipes of solved orders: TOML files with `method = "solved"`.
+
+    method = "solved"
+    profile = "lamellar"            # blazed, sinusoidal; or the path of a line, CSV of x, z in µm
+    material = "Al"                 # a name, an index such as "1.5" or "0.65+5.6i", or "none"
+    superstrate = 1.58              # index of the clear medium above; default 1
+    wavelengths = [380, 730]        # nm
+    tolerance = 0.01
+    output = "tables/cd.nc"
+
+    [arguments]                     # of the profile
+    period = 1.6                    # µm
+    depth = 0.12                    # µm
+
+Paths are relative to the recipe.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError, one_line, quoted
+from ..files import read_text
+from .orders import Settings
+from .profiles import GENERATORS, Profile, read_profile
+
+_KEYS = (
+    "method", "profile", "material", "superstrate", "wavelengths", "tolerance", "solver",
+    "resolution", "output", "arguments",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SolvedRecipe:
+    """Checked content of a recipe of solved orders.
+
+    Attributes
+    ----------
+    profile, material, superstrate, settings : arguments of `solve_orders`.
+    output : path of the table.
+    """
+
+    profile: Profile
+    material: str
+    superstrate: float
+    settings: Settings
+    output: Path
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
+        """Read and check a recipe.
+
+        Raises
+        ------
+        DiffractionError
+            If the file cannot be read, is no TOML, or has a key or value that is not allowed.
+        """
+        file, shown = Path(path), repr(os.fspath(path))
+        try:
+            content = tomllib.loads(read_text(file))
+        except tomllib.TOMLDecodeError as error:
+            raise DiffractionError(
+                f"{shown} is not a recipe (TOML): {one_line(str(error))}"
+            ) from error
+        for key in content:
+            if key not in _KEYS:
+                near = difflib.get_close_matches(key, _KEYS, 1)
+                hint = f"did you mean {near[0]}? " if near else ""
+                raise DiffractionError(
+                    f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
+                )
+        if content.get("method") != "solved":
+            raise DiffractionError(
+                f'{shown}: this recipe has no line method = "solved"; build its table by precompute'
+            )
+        try:
+            return cls(
+                profile_of(content.get("profile"), content.get("arguments", {}), file.parent),
+                str(content.get("material", "Al")),
+                float(content.get("superstrate", 1.0)),
+                _settings(content),
+                file.parent / str(content.get("output", f"{file.stem}.nc")),
+            )
+        except (DiffractionError, TypeError, ValueError) as error:
+            raise DiffractionError(f"{shown}: {error}") from error
+
+
+def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -> Profile:
+    """Return the profile of a generator, or of a file (CSV) whose `arguments` hold the period.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such generator or file, or an argument is missing, unknown or out of range.
+    """
+    names = ", ".join(GENERATORS)
+    if not isinstance(name, str) or (name not in GENERATORS and "." not in name):
+        raise DiffractionError(
+            f"profile: expected one of {names}, or a file (.csv), got {quoted(name)}"
+        )
+    make = GENERATORS.get(name)
+    known = inspect.signature(make).parameters if make else {"period": None}
+    for key in arguments:
+        if key not in known:
+            raise DiffractionError(f"profile {name!r} has no {key!r}; it has {', '.join(known)}")
+    if "period" not in arguments:
+        raise DiffractionError(f"profile {name!r} needs its period in µm")
+    if make is None:
+        return read_profile(folder / name, arguments["period"])
+    if "depth" not in arguments:
+        raise DiffractionError(f"profile {name!r} needs its depth in µm")
+    return make(**arguments)
+
+
+def is_solved_recipe(path: Path) -> bool:
+    """Whether a file is TOML with `method = "solved"`; unreadable ones are not."""
+    try:
+        return tomllib.loads(read_text(path)).get("method") == "solved"
+    except (DiffractionError, tomllib.TOMLDecodeError):
+        return False
+
+
+def _settings(content: Mapping[str, Any]) -> Settings:
+    default = Settings()
+    low, high = content.get("wavelengths", default.wavelengths)
+    return Settings(
+        (float(low), float(high)),
+        float(content.get("tolerance", default.tolerance)),
+        str(content.get("solver", default.method)),
+        content.get("resolution", default.resolution),
+    )

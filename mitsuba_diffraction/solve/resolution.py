@@ -1,0 +1,125 @@
+"""Resolution of a solver, chosen by its convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..tables.orders import cells
+from .jobs import Jobs, Problem
+from .nodes import Place
+from .stations import Real, reversed_light
+
+#: Factor between resolutions that are compared, and comparisons at most.
+_STEP, _MOST = 1.35, 6
+#: Points for each wavelength in the material, at first; meshes graded at corners are half as fine
+#: between them.
+_POINTS_PER_WAVELENGTH = 2.5
+_FEWEST_POINTS, _POINTS_PER_CORNER = 48, 12
+#: Harmonics on either side beyond the orders that propagate, at first.
+_HARMONICS = 8
+
+
+class Chosen(NamedTuple):
+    """Problem with a resolution, and its error: the change to the next resolution."""
+
+    problem: Problem
+    error: float
+
+
+def chosen_resolution(
+    problem: Problem, jobs: Jobs, bands: Sequence[int], tolerance: float
+) -> Chosen:
+    """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
+
+    Raises
+    ------
+    DiffractionError
+        If it does not converge.
+    """
+    places = _test_places(bands)
+    coarse = replace(problem, resolution=coarsest(problem))
+    values = jobs.solve(coarse, places, "choosing the resolution")
+    for _ in range(_MOST):
+        fine, finer, error = _refined(coarse, values, jobs, places)
+        excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
+        if error <= tolerance and excess <= 5e-4 and reciprocity_error(values) <= 2 * tolerance:
+            return Chosen(coarse, error)
+        coarse, values = fine, finer
+    raise DiffractionError(
+        f"{problem.method} does not converge on {problem.grating.profile.name}: at resolution "
+        f"{coarse.resolution} the last step changed {error:.2%} of the light; smooth the profile, "
+        "use a larger tolerance, or set the resolution"
+    )
+
+
+def resolution_error(problem: Problem, jobs: Jobs, bands: Sequence[int]) -> float:
+    """Return the share of the light that the next resolution changes."""
+    places = _test_places(bands)
+    values = jobs.solve(problem, places, "checking the resolution")
+    return _refined(problem, values, jobs, places).error
+
+
+class _Refined(NamedTuple):
+    problem: Problem
+    values: dict[Place, Real]
+    error: float
+
+
+def _refined(
+    problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
+) -> _Refined:
+    """Solve at the next resolution, and compare."""
+    fine = replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+    finer = jobs.solve(fine, places, "choosing the resolution")
+    missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
+    return _Refined(fine, finer, missed / sum(float(finer[p].sum()) for p in places))
+
+
+def _test_places(bands: Sequence[int]) -> list[Place]:
+    """Return places where resolutions are compared; resonances of metals lie in low bands."""
+    some = sorted({*bands[:2], bands[len(bands) // 2], bands[-1]})
+    return [
+        Place(band, kind, tau, 0.41, (0.05, 0.95))
+        for band in some
+        for kind, tau in ((cells.A, 0.5), (cells.B, 0.2))
+        if band or kind == cells.A
+    ]
+
+
+def reciprocity_error(solved: Mapping[Place, Real]) -> float:
+    """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
+
+    They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
+    light of one channel, summed over the outgoing ones.
+    """
+    return max(
+        float(np.abs(values - reversed_light(values)).sum(axis=-1).mean(axis=2).sum(axis=-1).max())
+        for place, values in solved.items()
+        if place.tau == 0.5
+    )
+
+
+def coarsest(problem: Problem) -> int:
+    """Return the resolution to begin with, which shows where efficiencies vary."""
+    grating = problem.grating
+    profile, (low, high) = grating.profile, grating.wavelengths
+    lam = np.linspace(low, high, 32)
+    index = grating.material.index(lam)
+    dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
+    waves = float((1e3 * dense / lam).max())  # per µm
+    if problem.method == "coupled":
+        return int(np.ceil(profile.period * grating.superstrate * 1e3 / low)) + _HARMONICS
+    sides = 2.0 if profile.corners else 1.0
+    points = _POINTS_PER_WAVELENGTH * sides * profile.length * waves
+    # the sums over orders of half as many terms must reach the waves in the material
+    return int(
+        np.ceil(
+            max(points, _FEWEST_POINTS, _POINTS_PER_CORNER * profile.corners,
+                2.2 * profile.period * waves)
+        )
+    )  # fmt: skip

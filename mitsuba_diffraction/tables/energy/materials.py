@@ -1,0 +1,106 @@
+"""Materials whose energy is conserved: a reflector, or a dielectric that lets light through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics import boundary, through
+from ...optics.fresnel import Filmed
+from ...optics.paths import ABOVE, Path, Returned, Side
+from ..directional import Real
+
+#: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
+Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
+#: Paths of light at each of some wavelengths (n,), nm.
+Paths = Callable[[Real], list[list[Path]]]
+
+#: Wavelengths at which a material is told from another.
+PROBES = 24
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """Material that light meets from above and that is asked for reflected light alone.
+
+    Attributes
+    ----------
+    model : one of `optics.boundary.MODELS`.
+    index : of the material over that of the medium above it.
+    """
+
+    model: str
+    index: Index
+
+    #: Whether light is let through.
+    transmits = False
+    #: Largest index of the media that light travels in, over that of the medium above.
+    densest = 1.0
+
+    def paths(self, least: float) -> Paths:
+        """Return the one path of light at each wavelength; `least` does not matter to it."""
+
+        def at_wavelengths(wavelengths: Real) -> list[list[Path]]:
+            index = self.index(wavelengths)
+            indices = [None] * len(wavelengths) if index is None else index
+            return [[Path(indices[n], self.model)] for n in range(len(wavelengths))]
+
+        return at_wavelengths
+
+    def key(self, wavelength_range: tuple[float, float]) -> list[object]:
+        """Return what tells this material from another over a range of wavelengths (nm)."""
+        return [self.model, rounded(self.index(np.geomspace(*wavelength_range, PROBES)))]
+
+
+@dataclass(frozen=True)
+class Dielectric:
+    """Dielectric that light meets from both sides and that lets light through.
+
+    Attributes
+    ----------
+    index : over that of the medium above.
+    model : one of `optics.through.MODELS`.
+    thin : whether below is beyond the flat side of a sheet.
+    """
+
+    index: float
+    model: str
+    thin: bool
+
+    #: Whether light is let through.
+    transmits = True
+
+    @property
+    def densest(self) -> float:
+        """Largest index of the media that light travels in, over that of the medium above."""
+        return self.index
+
+    def paths(self, least: float) -> Paths:
+        """Return the paths of light, the same at all wavelengths; least : w of transmission."""
+        n, model = self.index, boundary.checked_model(self.model, through.MODELS)
+        below = Side(1.0 if self.thin else n, n)
+        paths = [
+            Path(n, model, ABOVE, ABOVE),
+            Path(n, model, ABOVE, below, least),
+            Path(n, model, below, ABOVE, least),
+            Path(1.0 / n, model, below, below),
+        ]
+        if self.thin:
+            paths.insert(0, Returned(None, model, sheet=n))
+        return lambda wavelengths: [paths] * len(wavelengths)
+
+    def key(self, wavelength_range: tuple[float, float]) -> list[object]:
+        """Return what tells this dielectric from another material."""
+        return [self.index, self.model, self.thin]
+
+
+def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
+    """Round indices to five digits: single precision's noise makes no other material."""
+    if index is None:
+        return None
+    if isinstance(index, Filmed):
+        index = np.concatenate([np.ravel(part) for part in index.parts])
+    return [f"{n.real:.5g} {n.imag:.5g}" for n in index]

@@ -1,0 +1,26 @@
+"""Commands on tables of orders: `info` and `brdf-map`."""
+
+from __future__ import annotations
+
+import json
+
+from tests.support.orders import thin_grating
+
+
+def test_info_describes_a_table_of_orders(run, tmp_path):
+    path = tmp_path / "grating.nc"
+    thin_grating(0.6, counts=(2, 2, 1)).save(path)
+    data = json.loads(run("info", path, "--json").out)
+    assert (data["kind"], data["period_um"], data["bands"]) == ("table of orders", 0.6, 4)
+    assert run("info", path, "--level", "plane").code != 0
+
+
+def test_maps_show_a_table_of_orders(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    thin_grating(0.6, counts=(2, 2, 1)).save(tmp_path / "grating.nc")
+    flags = ("--resolution", 16, "--samples", 1, "--wavelength", 550)
+    assert run("brdf-map", "grating.nc", *flags).code == 0
+    assert (tmp_path / "grating-map.exr").is_file()
+    refused = run("brdf-map", "grating.nc", "--material", "Al", *flags)
+    assert refused.code != 0
+    assert "'material' is a parameter of the plugin 'diffraction'" in refused.err

@@ -1,0 +1,132 @@
+"""The BSDF `diffraction_orders` in all variants, its samples, its derivatives, and under a coat."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import OrderTable, reference
+from mitsuba_diffraction.optics.colour import linear_srgb, response
+from tests.support.chi_square import DISPERSED, Case, chi_square
+from tests.support.directions import as_single, uniform_directions
+from tests.support.orders import PERIOD, lit_pairs, load, thin_grating
+from tests.support.variants import evaluate, interaction
+
+pytestmark = pytest.mark.thorough
+
+N = 60
+TABLES = {"bare": thin_grating(), "under a coat": thin_grating(superstrate=1.5)}
+
+
+def test_values_under_a_coat_are_the_references(some_variant):
+    table = TABLES["under a coat"]
+    wi, wo, samples, wavelength = lit_pairs(N)
+    values = evaluate(load(table), wi, wo, samples, wavelength)[0]
+    expected = reference.orders_brdf(
+        table.efficiency, PERIOD, wi, wo, wavelength[:, 0], superstrate=table.superstrate
+    )
+    expected = expected * wo[:, 2]
+    # the grid has the sum of reflections, with a kink at the critical angle of each order
+    assert np.abs(values[:, 0] - expected).sum() <= 0.01 * expected.sum()
+
+
+def test_every_variant_has_the_same_light(every_variant):
+    table, n = TABLES["bare"], 12
+    wi, wo, samples, wavelength = lit_pairs(n)
+    if not mi.is_spectral:
+        wavelength = np.full((n, 4), 600.0)
+    values, pdf, _, _, _, drawn_pdf, weight = evaluate(
+        load(table, wavelength=600.0), wi, wo, samples, wavelength
+    )
+
+    lam = np.tile(np.arange(380.5, 780.0), (n, 1)) if mi.is_rgb else wavelength[:, : len(values[0])]
+    lanes = np.repeat(wi, lam.shape[1], axis=0), np.repeat(wo, lam.shape[1], axis=0), lam.ravel()
+    expected = reference.orders_brdf(table.efficiency, PERIOD, *lanes).reshape(lam.shape)
+    expected = expected * wo[:, 2:]
+    if mi.is_rgb:
+        expected = expected @ linear_srgb(response(lam[0]))
+    # interpolation in cells; RGB variants take an efficiency at the middle of its lobe
+    assert np.abs(values - expected).sum() <= 3e-3 * np.abs(expected).sum()
+    assert pdf.min() >= 0.0
+    assert np.all(drawn_pdf > 0.0)
+    assert np.isfinite(weight).all()
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_weights_are_the_albedo(some_variant, name):
+    table = TABLES[name]
+    bsdf = load(table)
+    for theta in (0.0, 45.0, 75.0):
+        si = interaction(
+            np.tile([np.sin(np.radians(theta)), 0.0, np.cos(np.radians(theta))], (4096, 1)),
+            np.full((4096, 4), 550.0),
+        )
+        random = mi.PCG32(size=4096)
+        numbers = [random.next_float32() for _ in range(3)]
+        _, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(*numbers[1:]))
+        weights = np.array(weight[0])
+        # the lobes are sampled exactly; parts of one may lie beyond the horizon, and under a coat
+        # the chances have the face's transmittance interpolated
+        assert weights.std() <= (0.2 if theta == 75.0 else 0.1) * weights.mean()
+
+
+def test_a_mirror_is_that_of_the_plugin_diffraction(some_variant):
+    rng = np.random.default_rng(1)
+    wi = uniform_directions(N, rng, 0.3)
+    wo = -wi + np.column_stack([rng.normal(0.0, 0.004, (N, 2)), np.zeros(N)])
+    wo[:, 2] = np.sqrt(1.0 - (wo[:, :2] ** 2).sum(axis=1))
+    light = wi, wo, rng.random((N, 3)), as_single(rng.uniform(400.0, 700.0, (N, 4)))
+    flat = md.HeightField(np.zeros((8, 8)), 0.2, periodic=True)
+    mirror = load(flat, material="none", energy_conserving=False)
+    orders = evaluate(load(OrderTable.mirror(PERIOD)), *light)[0]
+    # beside the centre of its lobe Kirchhoff's mirror has (1 + ωi·ωo)²/(w² cosθi cosθo)
+    assert orders == pytest.approx(evaluate(mirror, *light)[0], rel=5e-3)
+
+
+@pytest.mark.parametrize("case", [Case(None, 0.0, DISPERSED), Case(None, 60.0, DISPERSED)])
+def test_the_density_is_that_of_the_samples(some_variant, case):
+    # a window of three periods: lobes that overlap, and wide enough for the histogram
+    bsdf = load(TABLES["bare"], coherence_width=3.0 * PERIOD)
+    test = chi_square(bsdf, case, samples=1 << 19)
+    # 1 % for both cases together; the numbers drawn are always the same
+    assert test.run(0.01, 2, quiet=True), test.messages
+
+
+def test_derivatives_follow_the_orientation(some_variant):
+    wi, wo, _, wavelength = lit_pairs(16)
+    bsdf = load(TABLES["bare"], orientation=1.0, coherence_width=20.0)
+    parameters = mi.traverse(bsdf)
+    si = interaction(wi, wavelength)
+
+    def light():
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))[0])
+
+    dr.enable_grad(parameters["orientation"])
+    parameters.update()
+    total = light()
+    dr.backward(total)
+    derivative = float(parameters["orientation"].grad[0])
+    step = 0.02
+    ends = []
+    for degrees in (1.0 - step, 1.0 + step):
+        parameters["orientation"] = mi.Float(degrees)
+        parameters.update()
+        ends.append(float(light()[0]))
+    # central differences in single precision
+    assert derivative == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=2e-2)
+
+
+def test_light_that_is_in_no_order_goes_on_beneath(some_variant):
+    mirror = OrderTable.mirror(PERIOD, 0.8)
+    white = {"type": "diffuse", "reflectance": 1.0}
+    wi, wo, samples, wavelength = lit_pairs(N)
+    alone, over = (
+        evaluate(load(mirror, **nested), wi, wo, samples, wavelength)[0]
+        for nested in ({}, {"pigment": white})
+    )
+    # T = 1 - 0.8 of either direction; albedos are rounded up by 0.1 %
+    expected = 0.2**2 / np.pi * wo[:, 2:]
+    assert over - alone == pytest.approx(np.tile(expected, 4), rel=1e-2, abs=1e-3)

@@ -1,0 +1,132 @@
+"""Textures of holograms: each dot has the grating of its label or brightness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from PIL import Image
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from scenes.make.sticker import LONGEST, sticker
+from tests.support import ROOT
+from tests.support.directions import polar
+from tests.support.lanes import interaction, lanes, spectra, vectors
+
+LABELS = np.array([[0, 1, 2], [2, 1, 7]], np.uint8)
+PERIODS, TURNS = {1: 0.8, 2: 1.2}, {1: 30.0, 2: -90.0, 7: 0.0}
+
+
+def degrees(hologram: Any) -> np.ndarray:
+    """Angles of the orientation texture."""
+    x, y, z = np.moveaxis(hologram.orientation, -1, 0)
+    assert not z.any()
+    return np.degrees(np.arctan2(y, x))
+
+
+@pytest.mark.parametrize("as_file", [False, True])
+def test_each_label_has_its_grating(tmp_path: Path, as_file: bool) -> None:
+    image: Any = LABELS
+    if as_file:
+        picture = Image.fromarray(LABELS).convert("P")
+        picture.putdata(LABELS.ravel().tolist())
+        picture.save(image := tmp_path / "labels.png")
+    hologram = md.hologram(image, periods=PERIODS, orientations=TURNS)
+    assert hologram.period == 1.2
+    # label 0 has nothing, label 7 no period
+    assert hologram.weight.tolist() == [[0, 1, 1], [1, 1, 0]]
+    lit = hologram.weight > 0
+    assert (hologram.lateral_scale * 1.2)[lit] == pytest.approx([0.8, 1.2, 1.2, 0.8])
+    assert degrees(hologram)[lit] == pytest.approx([30.0, -90.0, -90.0, 30.0], abs=1e-4)
+    # factors are positive everywhere, as the plugin wants them
+    assert hologram.lateral_scale.min() > 0.0
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+def test_brightness_goes_from_black_to_white(kind: Any) -> None:
+    white = np.iinfo(kind).max if np.issubdtype(kind, np.integer) else 1.0
+    image = np.array([[0, white / 3, white]]).astype(kind)
+    hologram = md.hologram(image, periods=(0.6, 1.2), orientations=45.0, period=1.0)
+    assert hologram.weight.tolist() == [[0, 1, 1]]
+    assert hologram.lateral_scale[0, 1:] == pytest.approx([0.8, 1.2], rel=1e-4)
+    assert degrees(hologram)[0, 1:] == pytest.approx([45.0, 45.0], abs=1e-4)
+
+
+def test_large_dots_are_round() -> None:
+    hologram = md.hologram(LABELS, periods=PERIODS, orientations=0.0, dot=40)
+    assert hologram.weight.shape == hologram.lateral_scale.shape == (80, 120)
+    dot = hologram.weight[:40, 40:80]
+    assert dot.mean() == pytest.approx(np.pi / 4, rel=0.01)  # a disc in its square
+    assert not dot[0, 0]
+    assert not hologram.weight[:40, :40].any()
+
+
+@pytest.mark.usefixtures("variant")
+def test_what_is_written_is_what_the_plugin_reads(tmp_path: Path) -> None:
+    hologram = md.hologram(LABELS, periods=PERIODS, orientations=TURNS)
+    files = hologram.write(tmp_path, "foil")
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in files)
+    expected = hologram.orientation, hologram.lateral_scale, hologram.weight * 255
+    for path, values in zip(files, expected, strict=True):
+        read = np.array(mi.Bitmap(str(path)), float)
+        assert read.squeeze() == pytest.approx(values, abs=1e-3)  # half precision
+
+
+@pytest.mark.usefixtures("variant")
+def test_order_1_of_each_dot_is_where_its_grating_sends_it() -> None:
+    hologram = md.hologram(LABELS, periods=PERIODS, orientations=TURNS)
+    field = md.gratings.sinusoidal(hologram.period, 0.05, periods=2, rows=2)
+    raw = {"material": "none", "energy_conserving": False, "coherence_width": 12.0}
+    grating = md.bsdf_dict(field, **raw, **hologram.parameters())
+    bsdf = mi.load_dict(hologram.mix(grating, {"type": "diffuse", "reflectance": 0.0}))
+    for label in (1, 2):
+        si = interaction(np.tile(polar(0.0), (LABELS.size, 1)), 550.0)
+        rows, columns = np.indices(LABELS.shape).reshape(2, -1)
+        si.uv = mi.Point2f(lanes((columns + 0.5) / 3), lanes((rows + 0.5) / 2))
+        wo = polar(np.degrees(np.arcsin(0.55 / PERIODS[label])), TURNS[label])
+        values = spectra(bsdf.eval(mi.BSDFContext(), si, vectors(np.tile(wo, (LABELS.size, 1)))))
+        assert ((values[:, 0] > 0.1) == (LABELS.ravel() == label)).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"periods": {1: 0.01}}, "periods from 0.01 to 0.01 µm must be between 0.1 and 100"),
+        ({"periods": {5: 1.0}}, "no dot has a grating"),
+        ({"periods": {1: np.nan}}, "periods: nan must be a finite number"),
+        ({"periods": (0.8, 1.2)}, "both be of labels"),
+        ({"periods": "wide"}, "must be a mapping from labels, a pair"),
+        ({"periods": np.ones((3, 3))}, "an array \\(2, 3\\)"),
+        ({"orientations": np.inf}, "orientations: inf must be a finite number"),
+        ({"period": -1.0}, "period=-1 must be between"),
+        ({"dot": 0}, "dot=0 must be a whole number"),
+        ({"image": np.zeros((2, 3, 3), np.uint8)}, "expected an array \\(ny, nx\\)"),
+        ({"image": np.full((2, 3), 1.5)}, "brightness must be between 0 and 1"),
+        ({"image": "missing.png"}, "missing.png"),
+    ],
+)
+def test_what_makes_no_hologram_is_refused(change: dict[str, Any], said: str) -> None:
+    arguments = {"image": LABELS, "periods": PERIODS, "orientations": TURNS} | change
+    with pytest.raises(DiffractionError, match=said) as caught:
+        md.hologram(**arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_pictures_with_colours_are_refused(tmp_path: Path) -> None:
+    Image.new("RGB", (4, 4)).save(path := tmp_path / "colours.png")
+    with pytest.raises(DiffractionError, match="save it in grey"):
+        md.hologram(path, periods=1.0, orientations=0.0)
+
+
+@pytest.mark.usefixtures("variant")
+def test_the_scene_s_textures_are_those_of_its_maker() -> None:
+    made, folder = sticker(), ROOT / "scenes" / "textures"
+    assert made.period == LONGEST
+    scale = np.array(mi.Bitmap(str(folder / "hologram_lateral_scale.exr")), float)
+    assert scale.squeeze() == pytest.approx(made.lateral_scale, abs=1e-3)
+    weight = np.array(mi.Bitmap(str(folder / "hologram_weight.png")))
+    assert np.array_equal(weight.squeeze(), made.weight * 255)
