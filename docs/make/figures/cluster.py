@@ -105,8 +105,8 @@ def film_times(scene: Path) -> list[tuple[Times, Times]]:
     with ProcessPoolExecutor(1, get_context("spawn")) as alone, connect(2) as client:
 
         def turn(frames: int) -> tuple[Times, Times]:
-            one = alone.submit(in_one_process, scene, frames).result()
-            return one, on_workers(client, scene, frames)
+            single = alone.submit(in_one_process, scene, frames).result()
+            return single, on_workers(client, scene, frames)
 
         turn(2)  # makes tables and kernels, and caches them
         return [turn(FRAMES) for _ in range(RUNS)]
@@ -191,17 +191,16 @@ def scaling(costs: Costs) -> str:
 def film_text(times: Sequence[tuple[Times, Times]]) -> str:
     """The sentences on a film on two workers."""
 
-    def median(quantity: Callable[[Times, Times], float]) -> float:
-        return statistics.median(quantity(*pair) for pair in times)
-
-    ratios = [two.processor / one.processor for one, two in times]
+    ratios = [workers.processor / single.processor for single, workers in times]
+    clock = statistics.median(workers.clock / single.clock for single, workers in times)
+    seconds = statistics.median(single.processor for single, _ in times)
     return (
-        f"A film of {FRAMES} frames takes {median(lambda one, _: one.processor):.1f} s of "
-        "processor time in one process with two threads. Two workers with one thread each take "
+        f"A film of {FRAMES} frames takes {seconds:.1f} s of processor time in one process with "
+        "two threads. Two workers with one thread each take "
         f"{statistics.median(ratios):.2f} times as much, the client and the scheduler included: "
         f"the median of {RUNS} runs by turns, from {min(ratios):.2f} to {max(ratios):.2f}. By the "
-        f"clock they take {median(lambda one, two: two.clock / one.clock):.2f} times as long; "
-        "other programs were running."
+        f"clock it was {clock:.2f} times as long, while other programs ran: of a busy machine, two "
+        "processes get a larger share than one."
     )
 
 
