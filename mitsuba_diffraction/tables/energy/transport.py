@@ -100,12 +100,10 @@ class Transport:
     ) -> None:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
-        self._gain = Gain(
-            path, orders.roughness, float(wavenumber(wavelength)), orders.height_scale
-        )
-        # wavenumber where the light goes to
-        self._k = self._gain.wavenumber * path.left.index
-        self._per_w = self._gain.wavenumber / orders.densest
+        above = float(wavenumber(wavelength))
+        self._gain = Gain(path, orders.roughness, above, orders.height_scale)
+        self._k = above * path.left.index  # where the light goes to
+        self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._shares = self._order_0_shares(theta, grid)
         self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
