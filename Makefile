@@ -46,7 +46,7 @@ fuzz: setup  ## try random surfaces, damaged files and command lines for a minut
 	@MITSUBA_DIFFRACTION_CACHE=out/fuzz OPENBLAS_NUM_THREADS=1 $(PYTHON3) -W ignore -m tests.fuzz \
 	    --seconds $(or $(SECONDS),60) $(if $(ROUNDS),--rounds $(ROUNDS)) $(if $(SEED),--seed $(SEED))
 
-package: setup .venv/browser  ## build wheel and sdist, and test them in an empty environment
+package: setup .venv/browser  ## test wheel and sdist in empty environments, with oldest and newest packages
 	@.ci/package
 
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"

@@ -57,14 +57,24 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
-        os.replace(temporary, target)
+        _replace(temporary, target)
     except OSError as error:
         raise DiffractionError(
             f"cannot write '{target}': {error.strerror or error}; nothing was left behind"
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(PermissionError):  # on Windows, a file that a writer left open
+            temporary.unlink(missing_ok=True)
         _in_use.discard(temporary)
+
+
+def _replace(temporary: Path, target: Path) -> None:
+    try:
+        os.replace(temporary, target)
+    except PermissionError as error:  # on Windows no open file can be replaced
+        raise DiffractionError(
+            f"cannot write '{target}': {error.strerror}; close the programs that have it open"
+        ) from error
 
 
 def remove_temporaries() -> None:

@@ -67,3 +67,19 @@ def test_a_long_name_leaves_room_for_the_temporary_one(tmp_path):
     with atomic_path(target) as path:
         path.write_text("whole")
     assert target.read_text() == "whole"
+
+
+def test_a_target_that_a_program_holds_open_is_one_line_and_stays(tmp_path, monkeypatch):
+    """Windows refuses to replace an open file."""
+    target = tmp_path / "a.txt"
+    target.write_text("before")
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Access is denied")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    denied = pytest.raises(DiffractionError, match="Access is denied; close the programs")
+    with denied, atomic_path(target) as path:
+        path.write_text("after")
+    assert target.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a.txt"]

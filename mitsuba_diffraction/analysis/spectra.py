@@ -25,7 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import kirchhoff_factor, wavenumber
-from ..plugin.fresnel import Conductor, tabulated_range
+from ..plugin.conductors import tabulated_range
+from ..plugin.fresnel import Conductor
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent

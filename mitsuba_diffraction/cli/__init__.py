@@ -6,6 +6,7 @@ main                   the parser, and the boundary at which every error becomes
 precompute             from heights to a table
 info                   what is in a file
 tangents               a patch laid smoothly over any mesh
+solve                  orders of a periodic profile
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 tonemap                a linear EXR to a PNG

@@ -88,9 +88,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
     film.add_argument(
-        "--fps", metavar="N", type=number_between(1, 100),
-        help="frames a second of the film; default: 24",
-    )  # fmt: skip
+        "--fps", metavar="N", type=number_between(1, 100), help="frames a second; default: 24"
+    )
     add_workers(parser)
     add_threads(parser)
 

@@ -34,6 +34,7 @@ energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 boundary        what the material makes of the light, with its polarisation
 second_order    what light diffracted twice makes of orders
+conductors      optical constants of conductors in Mitsuba's tables
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
 layers          a clear coat, a thin film, and how much light reaches what lies beneath
 memory          arrays in the variant's memory, and reading them

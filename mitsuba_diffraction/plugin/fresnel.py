@@ -6,10 +6,8 @@ at both of a film.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -20,6 +18,13 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics import fresnel
 from ..optics.colour import LONGEST, SHORTEST, metal_tint
+from .conductors import (
+    extended_texture,
+    tabulated,
+    tabulated_range,
+    texture_at,
+    unknown_conductor,
+)
 from .parameter_changes import Bounded, Changeable, ObjectValues, children
 from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
@@ -257,13 +262,13 @@ class Conductor:
                 "give spectra of eta and k"
             )
         if mi.is_monochromatic:
-            objects = {name: _at(material, name, wavelength) for name in INDEX_PARTS}
+            objects = {name: texture_at(material, name, wavelength) for name in INDEX_PARTS}
         elif mi.is_spectral and not first <= SHORTEST < LONGEST <= last:
-            objects = {name: _extended(material, name) for name in INDEX_PARTS}
+            objects = {name: extended_texture(material, name) for name in INDEX_PARTS}
         eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
         conductor = cls(eta, k, material)
         if mi.is_rgb:
-            index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
+            index = tabulated(material, "eta", _VISIBLE) + 1j * tabulated(material, "k", _VISIBLE)
             conductor._spectrum = index, conductor._channels()
         return conductor
 
@@ -332,89 +337,8 @@ def _load(plugin: str, **parameters: float | str) -> BSDF:
         arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
         if plugin == "conductor":
-            raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
+            raise DiffractionError(unknown_conductor(str(parameters["material"]))) from error
         raise DiffractionError(
             f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
             "name from Mitsuba's table of materials, or eta and k"
         ) from error
-
-
-def _unknown_conductor(material: str) -> str:
-    """Return the message on an unknown conductor, with the names of known ones."""
-    names = _conductors()
-    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
-    listed = [name for name in names if name.lower() in close] or names
-    hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
-    return (
-        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
-        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
-    )
-
-
-def _conductors() -> list[str]:
-    """Return names of tabulated conductors, without second entries from Palik's table."""
-    folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
-    return sorted(
-        (name for name in names if name.removesuffix("_palik") not in names - {name}),
-        key=str.lower,
-    )
-
-
-def tabulated_range(material: str) -> tuple[float, float] | None:
-    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = _file(material, "eta")
-    if not file.is_file():
-        return None
-    nodes, _ = _table(material, "eta")
-    return float(nodes[0]), float(nodes[-1])
-
-
-def tabulated_index(material: str) -> tuple[Array, Array]:
-    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
-
-    Raises
-    ------
-    DiffractionError
-        If Mitsuba has no such table.
-    """
-    if tabulated_range(material) is None:
-        raise DiffractionError(_unknown_conductor(material))
-    nodes, eta = _table(material, "eta")
-    k = _tabulated(material, "k", nodes)
-    return nodes, np.asarray(eta + 1j * k)
-
-
-def _at(material: str, name: str, wavelength: float) -> Texture:
-    """Part of a material's index at one wavelength, as a texture."""
-    value = float(_tabulated(material, name, wavelength))
-    return mi.load_dict({"type": "uniform", "value": value})
-
-
-def _extended(material: str, name: str) -> Texture:
-    """Part of a material's index as a texture, constant beyond the ends of the table.
-
-    Mitsuba's own has the index 0 there.
-    """
-    nodes, _ = _table(material, name)
-    nodes = np.union1d(nodes, [SHORTEST, LONGEST])
-    wavelengths, values = (
-        ", ".join(map(str, numbers.tolist()))
-        for numbers in (nodes, _tabulated(material, name, nodes))
-    )
-    return mi.load_dict({"type": "irregular", "wavelengths": wavelengths, "values": values})
-
-
-def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
-    """Part of a material's index at wavelengths in nm, as Mitsuba has it tabulated."""
-    return np.asarray(np.interp(wavelengths, *_table(material, name)))
-
-
-def _table(material: str, name: str) -> Array:
-    """Wavelengths in nm and values of a part of a material's index, (2, n)."""
-    return np.asarray(np.loadtxt(_file(material, name)).T)
-
-
-def _file(material: str, name: str) -> Path:
-    """Return the path of Mitsuba's table of a part of a material's index."""
-    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))

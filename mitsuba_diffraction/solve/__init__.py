@@ -9,6 +9,7 @@ materials   refractive index over wavelength, by name or number
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
 coupled     solver: coupled waves, for dielectrics
+resolution  choice of the solver's resolution, by convergence
 nodes       choice of the numbers of nodes
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`

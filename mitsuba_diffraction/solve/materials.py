@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
-from ..plugin.fresnel import tabulated_index
+from ..plugin.conductors import tabulated_index
 
 #: Name of the perfect conductor, as in the BSDF `diffraction`.
 PERFECT = "none"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,12 @@ from .jobs import Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import FEWEST, MOST, Line, Place, count_for, lines
 from .profiles import Profile
-from .resolution import chosen_resolution, reciprocity_error
+from .resolution import (
+    chosen_resolution,
+    coarsest,
+    reciprocity_error,
+    resolution_error,
+)
 from .stations import Grating, Real, reversed_light
 
 #: Wavelengths of a table, nm: the visible.
@@ -25,8 +30,9 @@ WAVELENGTHS = (380.0, 780.0)
 TOLERANCE = 0.01
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
 WORST = 4.0
-#: Sum over the orders of a solution from which on it is refused; sums from 1 are scaled to 1.
-MOST_EXCESS = 1.02
+#: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
+#: of coarse solutions near grazing, are scaled to 1.
+MOST_EXCESS = 1.1
 #: Random directions and wavelengths at which the error is measured.
 SAMPLES = 128
 
@@ -108,11 +114,12 @@ def solve_orders(
     grating = Grating(profile, material_of(material, how.wavelengths), superstrate, how.wavelengths)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
-    solver_error = None
+    coarse = replace(problem, resolution=how.resolution or coarsest(problem))
+    counts = _counts(coarse, work, bands, how.tolerance, tell)
     if how.resolution is None:
-        chosen = chosen_resolution(problem, work, bands, how.tolerance / 2)
-        problem, solver_error = chosen.problem, chosen.error
-    counts = _counts(problem, work, bands, how.tolerance, tell)
+        problem, solver_error = chosen_resolution(problem, work, bands, how.tolerance / 2)
+    else:
+        solver_error = resolution_error(problem, work, bands)
     places = [p for band in bands for p in _places(band, counts[band])]
     _announce(tell, "solving", problem, work, places)
     solved = work.solve(problem, places, "solving orders")
@@ -258,8 +265,8 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
         total = values.sum(axis=-2, keepdims=True)
         if total.max() > MOST_EXCESS:
             raise DiffractionError(
-                f"efficiencies of a solution sum to {total.max():.4g}; use a higher resolution or "
-                "a lower tolerance"
+                f"efficiencies of a solution sum to {total.max():.4g}; use a higher "
+                "resolution, or a smaller tolerance"
             )
         kinds.append(values / np.maximum(total, 1.0))
     return Band(band, *kinds)

@@ -25,9 +25,10 @@ MOST_VERTICES = 10_000
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """One period of the grooves, as an open polygon that continues at (x[0] + period, z[0]).
+    """Cross-section of one period of the grooves, an open polygon.
 
-    The material lies below it. Undercut profiles, whose x turns back, are allowed.
+    It continues at (x[0] + period, z[0]), and the material lies below it. Undercut profiles, whose
+    x turns back, are allowed.
 
     Attributes
     ----------

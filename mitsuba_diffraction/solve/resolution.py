@@ -41,23 +41,11 @@ def chosen_resolution(
     DiffractionError
         If it does not converge.
     """
-    # resonances of metals lie in low bands
-    some = sorted({*bands[:2], bands[len(bands) // 2], bands[-1]})
-    places = [
-        Place(band, kind, tau, 0.41, (0.05, 0.95))
-        for band in some
-        for kind, tau in ((cells.A, 0.5), (cells.B, 0.2))
-        if band or kind == cells.A
-    ]
-    resolution = _first(problem)
-    coarse = replace(problem, resolution=resolution)
+    places = _test_places(bands)
+    coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")
-    error = np.inf
     for _ in range(_MOST):
-        fine = replace(problem, resolution=int(np.ceil(coarse.resolution * _STEP)))
-        finer = jobs.solve(fine, places, "choosing the resolution")
-        missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
-        error = missed / sum(float(finer[p].sum()) for p in places)
+        fine, finer, error = _refined(coarse, values, jobs, places)
         excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
         if error <= tolerance and excess <= 5e-4 and reciprocity_error(values) <= 2 * tolerance:
             return Chosen(coarse, error)
@@ -67,6 +55,40 @@ def chosen_resolution(
         f"{coarse.resolution} the last step changed {error:.2%} of the light; smooth the profile, "
         "use a larger tolerance, or set the resolution"
     )
+
+
+def resolution_error(problem: Problem, jobs: Jobs, bands: Sequence[int]) -> float:
+    """Return the share of the light that the next resolution changes."""
+    places = _test_places(bands)
+    values = jobs.solve(problem, places, "checking the resolution")
+    return _refined(problem, values, jobs, places).error
+
+
+class _Refined(NamedTuple):
+    problem: Problem
+    values: dict[Place, Real]
+    error: float
+
+
+def _refined(
+    problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
+) -> _Refined:
+    """Solve at the next resolution, and compare."""
+    fine = replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+    finer = jobs.solve(fine, places, "choosing the resolution")
+    missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
+    return _Refined(fine, finer, missed / sum(float(finer[p].sum()) for p in places))
+
+
+def _test_places(bands: Sequence[int]) -> list[Place]:
+    """Return places where resolutions are compared; resonances of metals lie in low bands."""
+    some = sorted({*bands[:2], bands[len(bands) // 2], bands[-1]})
+    return [
+        Place(band, kind, tau, 0.41, (0.05, 0.95))
+        for band in some
+        for kind, tau in ((cells.A, 0.5), (cells.B, 0.2))
+        if band or kind == cells.A
+    ]
 
 
 def reciprocity_error(solved: Mapping[Place, Real]) -> float:
@@ -82,8 +104,8 @@ def reciprocity_error(solved: Mapping[Place, Real]) -> float:
     )
 
 
-def _first(problem: Problem) -> int:
-    """Return the resolution to begin with."""
+def coarsest(problem: Problem) -> int:
+    """Return the resolution to begin with, which shows where efficiencies vary."""
     grating = problem.grating
     profile, (low, high) = grating.profile, grating.wavelengths
     lam = np.linspace(low, high, 32)

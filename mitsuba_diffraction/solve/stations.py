@@ -76,7 +76,7 @@ class Grating:
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """One set of channels at some wavelengths.
+    """Set of channels at some wavelengths.
 
     Attributes
     ----------

@@ -76,7 +76,8 @@ class Tab:
     def __init__(
         self, browser: Any, size: tuple[int, int], script: str = "", phone: bool = False
     ) -> None:
-        kind = {"has_touch": True, "is_mobile": True, "device_scale_factor": 2} if phone else {}
+        # fewer pixels than a phone's: shaders run in software
+        kind = {"has_touch": True, "is_mobile": True, "device_scale_factor": 0.5} if phone else {}
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]}, **kind)
         self.page.set_default_timeout(PATIENCE)
         self.said: list[str] = []

@@ -149,8 +149,9 @@ def _channels(table: OrderTable) -> Iterator[int]:
 def _records(values: Array, counts: Counts) -> NDArray[np.float16]:
     """Return records (n, 8) of a grid (τ, ρ, w, j, q)."""
     whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+    whole = whole.astype(np.float16)
     eighths = [
-        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w].astype(np.float16)
+        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w]
         for i in (0, 1)
         for j in (0, 1)
         for n in (0, 1)

@@ -39,8 +39,9 @@ class Band:
     ----------
     k : the band.
     a : (τ, ρ, w, k + 1, k + 1, 2) float32, kind A: share of the light incident through channel j
-        (fourth axis) that leaves through channel q (fifth), for s- and p-polarised incident light
-        (last), summed over the polarisations of the leaving light. Nodes are `cells.nodes`.
+        (fourth axis) that leaves through channel q (fifth), for incident light whose E, or B, lies
+        along the grooves (last; s, or p, in light across them), summed over the polarisations of
+        the leaving light. Nodes are `cells.nodes`.
     b : (τ, ρ, w, k, k, 2) of kind B, with the same nodes; None for k = 0.
     """
 

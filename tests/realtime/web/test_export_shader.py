@@ -131,7 +131,7 @@ def exported(sphere: Any, three: Path) -> Path:
 @pytest.fixture(scope="module")
 def opened(browser: Any, exported: Path) -> Iterator[Any]:
     """The page of the material, served from the folder without a server."""
-    page = browser.new_page()
+    page = browser.new_page(viewport={"width": 480, "height": 270})
     page.set_default_timeout(PATIENCE)
     said: list[str] = []
     page.on("pageerror", lambda error: said.append(str(error)))

@@ -1,0 +1,98 @@
+"""Optical constants of conductors in Mitsuba's tables."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError
+from ..optics.colour import LONGEST, SHORTEST
+from .types import Texture
+
+Array = NDArray[Any]
+
+
+def unknown_conductor(material: str) -> str:
+    """Return the message on an unknown conductor, with the names of known ones."""
+    names = _names()
+    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
+    listed = [name for name in names if name.lower() in close] or names
+    hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
+    return (
+        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
+        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
+    )
+
+
+def _names() -> list[str]:
+    """Return names of tabulated conductors, without second entries from Palik's table."""
+    folder = Path(str(mi.file_resolver().resolve("data/ior")))
+    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    return sorted(
+        (name for name in names if name.removesuffix("_palik") not in names - {name}),
+        key=str.lower,
+    )
+
+
+def tabulated_range(material: str) -> tuple[float, float] | None:
+    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
+    file = _file(material, "eta")
+    if not file.is_file():
+        return None
+    nodes, _ = _table(material, "eta")
+    return float(nodes[0]), float(nodes[-1])
+
+
+def tabulated_index(material: str) -> tuple[Array, Array]:
+    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba has no such table.
+    """
+    if tabulated_range(material) is None:
+        raise DiffractionError(unknown_conductor(material))
+    nodes, eta = _table(material, "eta")
+    k = tabulated(material, "k", nodes)
+    return nodes, np.asarray(eta + 1j * k)
+
+
+def texture_at(material: str, name: str, wavelength: float) -> Texture:
+    """Part of a material's index at one wavelength, as a texture."""
+    value = float(tabulated(material, name, wavelength))
+    return mi.load_dict({"type": "uniform", "value": value})
+
+
+def extended_texture(material: str, name: str) -> Texture:
+    """Part of a material's index as a texture, constant beyond the ends of the table.
+
+    Mitsuba's own has the index 0 there.
+    """
+    nodes, _ = _table(material, name)
+    nodes = np.union1d(nodes, [SHORTEST, LONGEST])
+    wavelengths, values = (
+        ", ".join(map(str, numbers.tolist()))
+        for numbers in (nodes, tabulated(material, name, nodes))
+    )
+    return mi.load_dict({"type": "irregular", "wavelengths": wavelengths, "values": values})
+
+
+def tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
+    """Part of a material's index at wavelengths in nm, as Mitsuba has it tabulated."""
+    return np.asarray(np.interp(wavelengths, *_table(material, name)))
+
+
+def _table(material: str, name: str) -> Array:
+    """Wavelengths in nm and values of a part of a material's index, (2, n)."""
+    return np.asarray(np.loadtxt(_file(material, name)).T)
+
+
+def _file(material: str, name: str) -> Path:
+    """Return the path of Mitsuba's table of a part of a material's index."""
+    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))
