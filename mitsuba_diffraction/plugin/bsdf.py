@@ -48,8 +48,8 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. Scales of
-    energy are those of that factor (docs/holograms.md). A table serves factors up to 1.
+    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
+    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
 lateral_scale_max : float [of a bitmap]
     Largest factor of such a texture, above which factors are clipped. Required unless the texture
     is a bitmap.

@@ -5,9 +5,10 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     vec3 sum = wi + wo;
     place.xy = in_patch(sum, rotation);
     patch_area = dot(rotation, rotation);
+    float area = patch_area * area_factor;
     float one_plus_dot = 0.5 * dot(sum, sum);
     float ratio = one_plus_dot / sum.z;
-    float outside = patch_area * area_factor * ratio * ratio / wi.z;
+    float outside = area * ratio * ratio / wi.z;
     vec2 there = vec2(1.0), back = vec2(1.0);
 #ifdef COATED
     there = transmittances(wi.z);
@@ -19,7 +20,7 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     sum = wi + wo;
     one_plus_dot = 0.5 * dot(sum, sum);
     ratio = one_plus_dot / sum.z;
-    outside = patch_area * area_factor * ratio * ratio / wi.z * leaving / wo.z;
+    outside = area * ratio * ratio / wi.z * leaving / wo.z;
     sum.z *= coat;  // κ is larger by the index of the coat
 #endif
     begin_pair(wi, wo, there, back);

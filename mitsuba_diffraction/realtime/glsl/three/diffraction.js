@@ -16,8 +16,8 @@ const LIGHT = (name) => `
 void RE_Direct_Diffraction(const in IncidentLight light, const in vec3 position, const in vec3 normal,
     const in vec3 eye, const in vec3 coat, const in LambertMaterial material, inout ReflectedLight reflected) {
   vec3 s = normalize(vTangent - normal * dot(normal, vTangent)), t = cross(normal, s);
-  vec3 wi = vec3(dot(eye, s), dot(eye, t), dot(eye, normal));
-  vec3 wo = vec3(dot(light.direction, s), dot(light.direction, t), dot(light.direction, normal));
+  mat3 frame = mat3(s, t, normal);
+  vec3 wi = eye * frame, wo = light.direction * frame;
   vec3 base = saturate(wo.z) * BRDF_Lambert(material.diffuseColor) * diffraction_transmission(wi, wo);
   reflected.directDiffuse += light.color * (base + ${name}(wi, wo));
 }
@@ -64,19 +64,17 @@ export async function diffractionMaterial(folder = ".", { method = "fast", envir
 // Sample an equirectangular float texture (RGBA): a direction and its irradiance in each of `count`
 // parts of equal light.
 export function sampled({ image: { data, width, height } }, count = 64) {
-  const weights = new Float64Array(width * height);
+  const cell = (2 * Math.PI ** 2) / (width * height), weights = new Float64Array(width * height);
+  const latitude = (i) => Math.PI * ((Math.floor(i / width) + 0.5) / height - 0.5);
   let total = 0;
-  for (let i = 0; i < weights.length; ++i) {
-    const solid = Math.sin((Math.PI * (Math.floor(i / width) + 0.5)) / height) * ((2 * Math.PI * Math.PI) / (width * height));
-    total += weights[i] = solid * (0.2126 * data[4 * i] + 0.7152 * data[4 * i + 1] + 0.0722 * data[4 * i + 2]);
-  }
+  for (let i = 0; i < weights.length; ++i)
+    total += weights[i] = cell * Math.cos(latitude(i)) * (0.2126 * data[4 * i] + 0.7152 * data[4 * i + 1] + 0.0722 * data[4 * i + 2]);
   const found = [];
   for (let n = 0, i = 0, sum = weights[0]; n < count; ++n) {
     while (sum < ((n + 0.5) / count) * total && i < weights.length - 1) sum += weights[++i];
-    const polar = (Math.PI * (Math.floor(i / width) + 0.5)) / height - Math.PI / 2, turn = 2 * Math.PI * (((i % width) + 0.5) / width - 0.5);
-    const solid = Math.cos(polar) * ((2 * Math.PI * Math.PI) / (width * height)), share = total / count / weights[i];
-    found.push(new THREE.Vector3(Math.cos(polar) * Math.cos(turn), Math.sin(polar), Math.cos(polar) * Math.sin(turn)));
-    found.push(new THREE.Vector3(...data.subarray(4 * i, 4 * i + 3)).multiplyScalar(solid * share));
+    const level = Math.cos(latitude(i)), turn = 2 * Math.PI * (((i % width) + 0.5) / width - 0.5);
+    found.push(new THREE.Vector3(level * Math.cos(turn), Math.sin(latitude(i)), level * Math.sin(turn)));
+    found.push(new THREE.Vector3(...data.subarray(4 * i, 4 * i + 3)).multiplyScalar((cell * level * total) / count / weights[i]));
   }
   return found;
 }
