@@ -144,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="small and noisy")
     args = parser.parse_args(argv)
     small = ["-D", "resx=300", "-D", "resy=220"]
-    flags = [*small, "-D", "spp=64"] if args.quick else ["-D", "spp=512"]
+    flags = [*small, "-D", "spp=64"] if args.quick else ["-D", "spp=128"]
 
     def work() -> None:
         with tempfile.TemporaryDirectory() as folder:
