@@ -68,7 +68,7 @@ def requests(frames: int) -> list[FrameRequest]:
 
 
 def processor_of(client: Any) -> float:
-    """Return the processor seconds so far of this process, in which the scheduler is, and workers."""
+    """Return the processor seconds so far of workers and of this process, with the scheduler."""
     return time.process_time() + sum(client.run(time.process_time).values())
 
 
