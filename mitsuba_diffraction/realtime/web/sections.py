@@ -141,7 +141,7 @@ class Mesh:
 
 
 def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
-    """Encode vertices (n, 16) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
+    """Encode vertices (n, 17) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
     parts: dict[str, NDArray[np.float32]] = {}
     start = 0
     for name, size in VERTEX:
