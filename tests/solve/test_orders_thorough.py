@@ -12,8 +12,10 @@ from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.nodes import Place
 from mitsuba_diffraction.solve.orders import Settings, solve_orders
 from mitsuba_diffraction.solve.profiles import sinusoidal
+from mitsuba_diffraction.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import OrderTable
+from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
 pytest.importorskip("gratinglab")
@@ -102,3 +104,22 @@ def test_what_is_missing_is_named_in_one_line(arguments, message, capsys, tmp_pa
     (line,) = captured.err.splitlines()
     assert message in line
     assert not list(tmp_path.iterdir())
+
+
+def test_precompute_names_the_command_for_recipes_of_solved_orders(tmp_path, capsys):
+    recipe = tmp_path / "groove.toml"
+    recipe.write_text(RECIPE)
+    assert main(["precompute", str(recipe)]) == 1
+    assert "run solve" in capsys.readouterr().err
+
+
+def test_the_shipped_tables_are_those_of_their_recipes():
+    for file in sorted((ROOT / "precompute" / "orders").glob("*.nc")):
+        table, recipe = OrderTable.load(file), SolvedRecipe.load(file.with_suffix(".toml"))
+        assert file.stat().st_size < 2e6
+        assert table.period == recipe.profile.period
+        assert table.header["profile"] == recipe.profile.name
+        assert table.wavelengths == recipe.settings.wavelengths
+        assert table.superstrate == recipe.superstrate
+        assert table.header["error_mean"] <= recipe.settings.tolerance
+        assert table.header["reciprocity_error"] < 0.01
