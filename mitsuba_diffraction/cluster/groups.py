@@ -126,7 +126,7 @@ class Groups:
         self._headcount, self._report, self._stop = headcount, report, stop
         self._progress = progress
         self._contents: dict[str, Any] = {}
-        self._with: list[_Group] = []  # the workers
+        self._under_way: list[_Group] = []
         # of each frame: the groups that it is added from, and those that are on disk
         self._spans: list[set[Span]] = []
         self._stored = [kept.spans(frame) for frame in frames]
@@ -174,18 +174,19 @@ class Groups:
 
     def cancel(self) -> None:
         """Cancel tasks whose results nobody waits for."""
-        self._client.cancel([f for group in self._with for f in (*group.tasks.values(), group.sum)])
-        self._with.clear()
+        for group in self._under_way:
+            self._client.cancel([*group.tasks.values(), group.sum])
+        self._under_way.clear()
 
     def _give_out(self) -> None:
         workers = max(1, self._headcount.now())
         size = task_size(self._total, len(self._frames), workers)
-        under_way = sum(len(group.tasks) for group in self._with)
-        while self._waiting and under_way < AHEAD * workers:
+        tasks = sum(len(group.tasks) for group in self._under_way)
+        while self._waiting and tasks < AHEAD * workers:
             group = _Group(self._waiting.pop(), size)
             self._submit(group)
-            self._with.append(group)
-            under_way += len(group.tasks)
+            self._under_way.append(group)
+            tasks += len(group.tasks)
 
     def _submit(self, group: _Group, lacking: Sequence[str] = ()) -> None:
         """Submit the additions, and the tasks that no worker has or has done.
@@ -220,13 +221,13 @@ class Groups:
         return self._contents[digest]
 
     def _take(self) -> None:
-        for group in [group for group in self._with if group.sum.done()]:
+        for group in [group for group in self._under_way if group.sum.done()]:
             answer, task = outcome(group.sum), group.passes
             if isinstance(answer, Sums):
                 self._kept.write(self._frames[task.frame], task.span, answer)
                 self._stored[task.frame].add(task.span)
                 self._left -= task.span.count
-                self._with.remove(group)
+                self._under_way.remove(group)
                 self._report.add(answer)
             elif isinstance(answer, Failed):
                 raise DiffractionError(f"{task}, {answer}")

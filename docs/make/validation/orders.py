@@ -36,7 +36,7 @@ Real = NDArray[np.float64]
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
-TABLES = ("cd", "blazed", "sinusoidal")
+TABLES = ("cd", "dvd", "blazed", "sinusoidal")
 MOUNTS = ((0, 0), (30, 0), (30, 50), (30, 90), (60, 0), (60, 50), (60, 90))
 WAVELENGTHS = (450.0, 530.0, 610.0)
 # orders beyond are left out, as in `compare`: an error of little light

@@ -30,8 +30,8 @@ def write(measured: Measurements) -> str:
     ]
     return f"""# Solved orders
 
-The shipped tables of `diffraction_orders` and the default model, beside solvers that did not make
-the tables ([orders.md](../orders.md)). All are aluminium; `cd` lies under polycarbonate.
+The shipped tables of `diffraction_orders` and the default model, beside solutions that did not make
+the tables ([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` lie under polycarbonate.
 
 {table(header, rows)}
 
@@ -40,9 +40,10 @@ the tables ([orders.md](../orders.md)). All are aluminium; `cd` lies under polyc
 orders but 0 that leave within 75°, as a share of their light ([validation.md](../validation.md)).
 *Sum* is the largest deviation of the sum over all orders, which is 1 less the absorption.
 
-The solver beside `cd` is coupled waves in layers, and beside `sinusoidal` Rayleigh's expansion. No
-independent solver here converges on sloped metal for both polarisations: beside `blazed` is the
-integral method at twice the points, which checks interpolation and convergence alone.
+The solver beside `cd` and `dvd` is coupled waves in layers, and beside `sinusoidal` Rayleigh's
+expansion. No independent solver here converges on sloped metal for both polarisations: beside
+`blazed` is the integral method at twice the points, which checks interpolation and convergence
+alone.
 
 What is left is interpolation, most of it beside surface plasmons. The tables' own figures, measured
 at random directions and wavelengths:
