@@ -69,8 +69,8 @@ SCENES = (
     ),
 )  # fmt: skip
 _INTRODUCTION = (
-    "Left: the model of `diffraction`. Right: solved orders of the same profile, in the same light. "
-    "Ridges half as wide as the period have no second order in the model."
+    "Left: the model of `diffraction`. Right: solved orders of the same profile, in the same "
+    "light. Ridges half as wide as the period have no second order in the model."
 )
 _HOW = (
     "`python -m docs.make.figures.orders` makes the pictures and the table, of blocks of 5 pixels "
