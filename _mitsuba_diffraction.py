@@ -32,7 +32,16 @@ def main() -> int:
         # lines hold µ and κ, which the code pages of Windows and the C locale lack
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8")
-    from mitsuba_diffraction.cli import main as command
+    try:
+        from mitsuba_diffraction.cli import main as command
+    except NameError as error:
+        # Dr.Jit raises it while it handles the error of a missing library of the system
+        if not isinstance(error.__context__, ImportError):
+            raise
+        sys.exit(
+            f"mitsuba-diffraction: error: Dr.Jit cannot be loaded: {error.__context__}; install "
+            "that library (on Debian and Ubuntu: apt install libatomic1 libllvm19)"
+        )
 
     if signal.getsignal(signal.SIGINT) is _leave:
         signal.signal(signal.SIGINT, signal.default_int_handler)

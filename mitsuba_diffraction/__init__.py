@@ -47,8 +47,8 @@ select_llvm()  # before Dr.Jit picks a library by itself: some would end the pro
 from . import reference  # noqa: E402
 from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heights import HeightField, gratings  # noqa: E402
-from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
 from .plugin.dictionary import bsdf_dict  # noqa: E402
+from .plugin.registration import register_in_all  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 from .tables.orders import OrderTable  # noqa: E402
 
@@ -62,6 +62,8 @@ if TYPE_CHECKING:
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
     from .thesis import period_fit
+
+register_in_all()
 
 __version__ = version(__name__)
 __all__ = [

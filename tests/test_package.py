@@ -89,8 +89,7 @@ def test_the_wheel_declares_command_and_plugin(wheel):
         entry_points = archive.read(f"{name}entry_points.txt").decode()
         metadata = archive.read(f"{name}METADATA").decode()
     assert "mitsuba-diffraction = _mitsuba_diffraction:main" in entry_points
-    assert "diffraction = mitsuba_diffraction.plugin.bsdf" in entry_points
-    assert "diffraction_mix = mitsuba_diffraction.plugin.blended_patches" in entry_points
+    assert "mitsuba_diffraction = mitsuba_diffraction.plugin.registration" in entry_points
     assert f"\nVersion: {md.__version__}\n" in metadata
     for extra in ("afm", "gl", "view", "notebooks"):
         assert f"\nProvides-Extra: {extra}\n" in metadata

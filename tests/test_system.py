@@ -70,6 +70,25 @@ def test_package_and_commands_need_nothing_of_posix_alone(tmp_path):
     assert [file.suffix for file in tmp_path.glob("table-*")] == [".cache"]
 
 
+# how Dr.Jit 1.5 fails without libatomic
+WITHOUT_ATOMIC = """
+try:
+    raise ImportError("libatomic.so.1: cannot open shared object file")
+except ImportError:
+    _drjit_ext
+"""
+
+
+def test_missing_library_of_the_system_is_one_line(tmp_path):
+    (tmp_path / "drjit.py").write_text(WITHOUT_ATOMIC)
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    ran = run(tmp_path, "import _mitsuba_diffraction as m; m.main()", PYTHONPATH=path)
+    assert ran.returncode == 1
+    (line,) = ran.stderr.splitlines()
+    assert "libatomic.so.1: cannot open" in line
+    assert "apt install libatomic1" in line
+
+
 def test_a_process_lives_until_it_has_ended():
     assert system.process_lives(os.getpid())
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:

@@ -160,7 +160,9 @@ class Film:
     def _bytes_of_sums(self) -> float:
         film = self.sensor.film()
         channels = film.prepare(integrator_of(self.scene).aov_names())
-        return 4.0 * channels * int(np.prod(film.crop_size())) * sums_in_worker(self.frames)
+        passes = sum(frame.span.count for frame in self.frames)
+        sums = sums_in_worker(passes, len(self.frames))
+        return 4.0 * channels * int(np.prod(film.crop_size())) * sums
 
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
         """Yield frame after frame; end early once asked to stop.

@@ -22,13 +22,13 @@ from .workers import Headcount, outcome, wait_for_scheduler
 #: Groups of a job, at most, unless it has more frames: a client that is killed loses 1/64 of the
 #: work, and 64 sums are little to receive.
 GROUPS = 64
-#: Tasks of a job for each worker, so that all end within 1/8 of the time.
-TASKS_A_WORKER = 8
+#: Tasks of a job for each worker, so that all end within a tenth of the time.
+TASKS_A_WORKER = 10
 #: Tasks for each worker whose sums have not arrived yet: rendered, waited for, or to be added.
-AHEAD = 6
+AHEAD = 8
 #: Sums that a worker adds at once.
-ADDED = 8
-_POLL = 0.02  # seconds
+ADDED = 4
+_POLL = 0.05  # seconds
 
 
 @dataclass
@@ -81,15 +81,27 @@ class _Group:
     sum: Any = None
 
 
-def group_size(frames: Sequence[Task]) -> int:
+def group_size(passes: int, frames: int) -> int:
     """Return the passes of a group, a power of two; frames may have fewer."""
-    least = -(-sum(frame.span.count for frame in frames) // max(GROUPS, len(frames)))
-    return 1 << (least - 1).bit_length()
+    return 1 << (-(-passes // max(GROUPS, frames)) - 1).bit_length()
 
 
-def sums_in_worker(frames: Sequence[Task]) -> int:
+def task_size(passes: int, frames: int, workers: int) -> int:
+    """Return the passes of a task, a power of two, for a job on so many workers."""
+    size = max(1, passes // (TASKS_A_WORKER * workers))
+    return min(group_size(passes, frames), 1 << size.bit_length() - 1)
+
+
+def terms_of(span: Span, size: int) -> list[Span]:
+    """Cut passes into spans whose sums a worker adds at once, of `size` passes or more."""
+    while size * ADDED < span.count:
+        size *= ADDED
+    return span.pieces(size)
+
+
+def sums_in_worker(passes: int, frames: int) -> int:
     """Return how many sums a worker holds: of its tree, that it adds, and that are waited for."""
-    return group_size(frames).bit_length() + 2 + ADDED + AHEAD
+    return group_size(passes, frames).bit_length() + 2 + ADDED + AHEAD
 
 
 class Groups:
@@ -114,19 +126,19 @@ class Groups:
         self._headcount, self._report, self._stop = headcount, report, stop
         self._progress = progress
         self._contents: dict[str, Any] = {}
-        self._with: list[_Group] = []  # the workers
+        self._under_way: list[_Group] = []
         # of each frame: the groups that it is added from, and those that are on disk
         self._spans: list[set[Span]] = []
         self._stored = [kept.spans(frame) for frame in frames]
         self._waiting: list[Task] = []
-        self._size = group_size(frames)
+        self._total = sum(frame.span.count for frame in frames)
+        size = group_size(self._total, len(frames))
         for frame, stored in zip(frames, self._stored, strict=True):
-            spans = list(_cut(frame.span, self._size, stored))
+            spans = list(_cut(frame.span, size, stored))
             self._spans.append(set(spans))
             self._waiting += [frame.part(span) for span in spans if span not in stored]
             report.kept += len(stored)
         self._waiting.reverse()
-        self._total = sum(frame.span.count for frame in frames)
         self._left = sum(task.span.count for task in self._waiting)
 
     def sum_of(self, frame: Task, span: Span) -> Sums | None:
@@ -162,18 +174,19 @@ class Groups:
 
     def cancel(self) -> None:
         """Cancel tasks whose results nobody waits for."""
-        self._client.cancel([f for group in self._with for f in (*group.tasks.values(), group.sum)])
-        self._with.clear()
+        for group in self._under_way:
+            self._client.cancel([*group.tasks.values(), group.sum])
+        self._under_way.clear()
 
     def _give_out(self) -> None:
         workers = max(1, self._headcount.now())
-        most = max(1, min(self._size, self._total // (TASKS_A_WORKER * workers)))
-        under_way = sum(len(group.tasks) for group in self._with)
-        while self._waiting and under_way < AHEAD * workers:
-            group = _Group(self._waiting.pop(), 1 << most.bit_length() - 1)
+        size = task_size(self._total, len(self._frames), workers)
+        tasks = sum(len(group.tasks) for group in self._under_way)
+        while self._waiting and tasks < AHEAD * workers:
+            group = _Group(self._waiting.pop(), size)
             self._submit(group)
-            self._with.append(group)
-            under_way += len(group.tasks)
+            self._under_way.append(group)
+            tasks += len(group.tasks)
 
     def _submit(self, group: _Group, lacking: Sequence[str] = ()) -> None:
         """Submit the additions, and the tasks that no worker has or has done.
@@ -186,10 +199,7 @@ class Groups:
 
         def sum_of(span: Span) -> Any:
             if span.count > size:
-                part = size
-                while part * ADDED < span.count:
-                    part *= ADDED
-                parts = [sum_of(piece) for piece in span.pieces(part)]
+                parts = [sum_of(part) for part in terms_of(span, size)]
                 # before other tasks: it takes sums out of the workers' memory
                 return client.submit(add_sums, parts, pure=False, priority=1)
             future = group.tasks.get(span)
@@ -211,13 +221,13 @@ class Groups:
         return self._contents[digest]
 
     def _take(self) -> None:
-        for group in [group for group in self._with if group.sum.done()]:
+        for group in [group for group in self._under_way if group.sum.done()]:
             answer, task = outcome(group.sum), group.passes
             if isinstance(answer, Sums):
                 self._kept.write(self._frames[task.frame], task.span, answer)
                 self._stored[task.frame].add(task.span)
                 self._left -= task.span.count
-                self._with.remove(group)
+                self._under_way.remove(group)
                 self._report.add(answer)
             elif isinstance(answer, Failed):
                 raise DiffractionError(f"{task}, {answer}")

@@ -54,7 +54,7 @@ class Side:
 ABOVE = Side()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Path:
     """Light that a boundary sends from one side to another.
 
@@ -155,7 +155,7 @@ class Path:
         return float(self.index)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Returned(Path):
     """Light from above that the flat side of a sheet sends back through the structure.
 

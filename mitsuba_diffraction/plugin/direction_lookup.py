@@ -28,7 +28,7 @@ class DirectionLookup:
         self.present = False
         self._values: Buffer = None
         self._nodes: Buffer = None
-        self._last, self._varies, self._centre = 0, False, 1.0
+        self._last, self._varies = 0, False
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = 1
@@ -40,9 +40,8 @@ class DirectionLookup:
         self.present = tables is not None
         if tables is None:
             return
-        height_scale, varies, self._centre = scales.height_scale, scales.varies, scales.centre
-        tables = [DirectionalTable(t.wavelengths * self._centre, t.values) for t in tables]
-        maps = np.stack([_cells(table) for table in tables])
+        height_scale, varies = scales.height_scale, scales.varies
+        maps = np.stack([_cells(table, scales.centre) for table in tables])
         self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
@@ -73,7 +72,6 @@ class DirectionLookup:
         """
         tangential, share = frame.turned(direction), None
         height_scale = height_scale * dr.rcp(frame.stretch)
-        wavenumbers = [k * (frame.stretch * (1.0 / self._centre)) for k in wavenumbers]
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
         cell, s, t = self._cell(*self._place(tangential, cosine))
@@ -87,7 +85,7 @@ class DirectionLookup:
             return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
         values = []
         for k in wavenumbers:
-            place = (self._first - dr.log2(k)) * self._pages_per_log
+            place = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
             n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
             values.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
         return values
@@ -140,14 +138,17 @@ def between(
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def _cells(table: DirectionalTable) -> Array:
+def _cells(table: DirectionalTable, stretch: float) -> Array:
     """Values at the corners of each cell, (rows, columns, channels or wavelengths, 4).
+
+    stretch : factor from the table's wavelengths to those of the light.
 
     All wavelengths of a cell lie together: a call reads several of them, within few cache lines.
     """
     values = table.values
     if mi.is_rgb and len(values) > 1:
-        values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
+        weights = _sensitivities(table.wavelengths * stretch)
+        values = np.tensordot(weights, values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)
     corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
     return np.stack(corners, axis=-1).transpose(1, 2, 0, 3)

@@ -82,7 +82,12 @@ class EnergyModel:
         scales : the factors; beneath : whether light goes on to something.
         """
         self._scales = scales
-        material = Reflector(self._model, partial(self._indices, INDEX_STEP))
+        # of the material alone: a reference to this object would be a cycle, and keep the table
+        self._indices, self._exact = (
+            partial(_indices_under, self._material, step, scales.centre, self._range)
+            for step in (INDEX_STEP, FILM_STEP)
+        )
+        material = Reflector(self._model, self._indices)
         self._energy = Energy(self._table, material, scales.wavelengths(self._range))
         if not (self.conserving or beneath or self._filmed):
             return
@@ -101,19 +106,15 @@ class EnergyModel:
             self._warn(conserved)
             self._scale.update(scales_of([energy.scale for energy in conserved]), nodes, scales)
         if beneath:
-            ratios = [self._ratio(energy.albedo) for energy in conserved]
+            ratios = [self._ratio(energy) for energy in conserved]
             self._reflected.update(ratios, nodes, scales)
-
-    def _indices(self, step: float, wavelengths: NDArray[np.float64]) -> Indices | None:
-        """Return indices to a step, of the light that tables have at these wavelengths."""
-        light = np.clip(wavelengths * self._scales.centre, *self._range)
-        return _rounded_indices(self._material, step, light)
 
     def _warn(self, conserved: list[Conservation]) -> None:
         """Say once that much is taken of a real material."""
         if self._warned or isinstance(self._material, Perfect) or conserved[0].scale is None:
             return
         albedo = conserved[0].albedo
+        assert albedo is not None  # of a reflector
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
         if largest > 1.0 + MUCH:
             self._warned = True
@@ -140,7 +141,7 @@ class EnergyModel:
         """Return the table that `reflected` looks up, for shaders."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
-        ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
+        ratios = [self._ratio(self._energy.at(node)) for node in nodes]
         ratio = between(ratios, nodes, height_scale)
         return DirectionalTable(ratio.wavelengths * self._scales.centre, ratio.values)
 
@@ -183,13 +184,14 @@ class EnergyModel:
 
     def _mean_gain(self, height_scale: float) -> DirectionalTable:
         """g at a height scale."""
-        exact = partial(self._indices, FILM_STEP)
-        exponents = mean_exponents(self._table, exact, self._energy.wavelength_range)
+        exponents = mean_exponents(self._table, self._exact, self._energy.wavelength_range)
         values = limited(exponents.values * height_scale**2).astype(np.float32)
         return DirectionalTable(exponents.wavelengths, values)
 
-    def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
-        index = self._indices(INDEX_STEP, albedo.wavelengths)
+    def _ratio(self, conserved: Conservation) -> DirectionalTable:
+        albedo = conserved.albedo
+        assert albedo is not None  # of a reflector
+        index = self._indices(albedo.wavelengths)
         assert index is not None  # without an index no light goes beneath
         flat = fresnel.reflectance(np.cos(albedo.grid.theta), index[:, None])
         # of an index of 1 there is neither
@@ -223,6 +225,21 @@ def indices_of(
         return np.broadcast_to(np.array(indices), wavelengths.shape)
     colours = np.broadcast_to(np.array(indices[0]), len(RGB_WAVELENGTHS))
     return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
+
+
+def _indices_under(
+    material: Reflectance | Inside | UnderFilm,
+    step: float,
+    centre: float,
+    wavelength_range: tuple[float, float],
+    wavelengths: NDArray[np.float64],
+) -> Indices | None:
+    """Return indices to a step, of the light that tables have at these wavelengths.
+
+    centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
+    """
+    light = np.clip(wavelengths * centre, *wavelength_range)
+    return _rounded_indices(material, step, light)
 
 
 def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:

@@ -1,4 +1,8 @@
-"""Registration of the plugins in every variant of Mitsuba that is set."""
+"""Registration of the plugins in every variant of Mitsuba that is set.
+
+Mitsuba 3.10 imports this module by itself, which imports the package, and reloads it at each change
+of variant. So nothing happens here but definitions: the package calls `register_in_all` once.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +26,8 @@ def register(old: str | None, new: str | None) -> None:
             importlib.import_module(module)
 
 
-mi.detail.add_variant_callback(register)
-if mi.variant() is not None:
-    register(None, mi.variant())
+def register_in_all() -> None:
+    """Register the plugins in the current variant, and in every one that is set later."""
+    mi.detail.add_variant_callback(register)
+    if mi.variant() is not None:
+        register(None, mi.variant())

@@ -87,7 +87,6 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     """
     import mitsuba as mi
 
-    from ..plugin import registration  # noqa: F401  registers the plugin
     from .additions import split_materials
 
     readable_file(file)

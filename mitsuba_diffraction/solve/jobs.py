@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +39,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 class Problem:
     """Grating, solver and its resolution; `digest` is that of the grating and the solver."""
 
-    grating: Grating
+    grating: Grating = field(compare=False)
     method: str
     resolution: int
     digest: str
@@ -64,27 +64,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
 
 
 @lru_cache(maxsize=2)
-def _solver(digest: str, resolution: int, problem: _Uncompared) -> Solver:
-    grating = problem.problem.grating
-    return METHODS[problem.problem.method](grating.profile, resolution)
-
-
-class _Uncompared:
-    """Argument that a cache does not compare."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Uncompared)
-
-    def __hash__(self) -> int:
-        return 0
-
-
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
-    return _solver(problem.digest, problem.resolution, _Uncompared(problem))
+    return METHODS[problem.method](problem.grating.profile, problem.resolution)
 
 
 def solve_place(problem: Problem, place: Place) -> Real:
@@ -101,7 +83,7 @@ class Jobs:
 
     Attributes
     ----------
-    folder : of results, which another run finds again; None stores nothing.
+    folder : of results, which another run finds again, made when needed; None stores nothing.
     executor : processes or a cluster; None solves here.
     progress : called as progress(done, total, text).
     """
@@ -119,6 +101,8 @@ class Jobs:
         results = {place: _read(file) for place, file in files.items()}
         known = {place: values for place, values in results.items() if values is not None}
         missing = [place for place in files if place not in known]
+        if self.folder is not None and missing:
+            _make(self.folder)
         done = len(known)
         self.progress(done, len(files), text)
         for place, values in self._solved(problem, missing):
@@ -155,13 +139,6 @@ class Jobs:
         key = hashlib.sha256(repr((problem.digest, problem.resolution, tuple(place))).encode())
         return self.folder / f"{key.hexdigest()[:24]}.npy"
 
-    def clear(self) -> None:
-        """Remove the stored results and their folder."""
-        if self.folder is not None and self.folder.is_dir():
-            for file in self.folder.glob("*.npy"):
-                file.unlink()
-            self.folder.rmdir()
-
 
 def timed(problem: Problem, place: Place) -> float:
     """Return the seconds that a place takes, without the start of the solver."""
@@ -179,6 +156,11 @@ def processes(count: int) -> Iterator[Executor]:
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
     try:
         yield pool
+    except BaseException:
+        # Ctrl-C does not wait for stations in progress
+        for process in active_children():
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
         for name, value in before.items():
@@ -199,6 +181,16 @@ def _end_with_parent() -> None:
     assert parent is not None
     parent.join()
     os._exit(1)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot write '{folder}': {error.strerror}; choose a folder that exists and is "
+            "writable"
+        ) from error
 
 
 def _read(file: Path | None) -> Real | None:

@@ -17,11 +17,12 @@ Paths are relative to the recipe.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import inspect
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -119,12 +120,24 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     return make(**arguments)
 
 
-def is_solved_recipe(path: Path) -> bool:
-    """Whether a file is TOML with `method = "solved"`; unreadable ones are not."""
-    try:
-        return tomllib.loads(read_text(path)).get("method") == "solved"
-    except (DiffractionError, tomllib.TOMLDecodeError):
-        return False
+def refuse_solved(paths: Iterable[Path]) -> None:
+    """Refuse recipes with `method = "solved"`, which are no recipes of a model's table.
+
+    Raises
+    ------
+    DiffractionError
+        If there is one; files that cannot be read are left to their reader.
+    """
+    for path in paths:
+        with contextlib.suppress(tomllib.TOMLDecodeError, DiffractionError):
+            method = tomllib.loads(read_text(path)).get("method")
+            if method == "solved":
+                break
+    else:
+        return
+    raise DiffractionError(
+        f"'{path}' is a recipe of solved orders; run solve instead of precompute"
+    )
 
 
 def _settings(content: Mapping[str, Any]) -> Settings:

@@ -20,8 +20,8 @@ from tests.support.room import SCENE
 @pytest.fixture(scope="package")
 def client():
     """Two workers of one thread each."""
-    with cluster.connect(2) as found:
-        yield found
+    with cluster.connect(2) as connected:
+        yield connected
 
 
 @pytest.fixture(autouse=True)

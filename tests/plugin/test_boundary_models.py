@@ -26,7 +26,7 @@ CALLS = {
     "gain": lambda name: Gain(Path(1.5, name), RoughnessTable(0.0, np.zeros(2)), 12.0, 1.0).exact(
         np.array(0.5), np.array(0.5), 0.0
     ),
-    "dielectric": lambda name: Dielectric(1.5, name, thin=False).paths(0.1),
+    "dielectric": lambda name: Dielectric(1.5, name, thin=False).paths(np.ones(1), 0.1),
 }
 
 

@@ -67,7 +67,7 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
     draw = dr.freeze(lambda bsdf, si, one, two: bsdf.sample(context, si, one, two))
     texture = mi.TensorXf(np.full((2, 2, 3), 0.61, np.float32))
     surfaces = [
-        diffraction(energy_conserving=True),
+        diffraction(energy_conserving=True, lateral_scale=1.0),
         diffraction(OTHER),
         diffraction(
             OTHER, coherence="patch", orientation={"type": "bitmap", "raw": True, "data": texture}
@@ -77,7 +77,8 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
         bsdf = mi.load_dict(surface)
         parameters = mi.traverse(bsdf)
         for n, scale in enumerate((1.0, 0.9, 0.7)):
-            parameters["height_scale"] = scale
+            for name in {"height_scale", "lateral_scale"} & set(dict(parameters)):
+                parameters[name] = scale
             parameters.update()
             wi, wo = pairs(seed=n)
             si, wo = interaction(wi, WAVELENGTHS), vectors(wo)

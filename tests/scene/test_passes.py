@@ -99,7 +99,8 @@ class Tree:
         return Tree(f"({self.text} {other.text})")
 
 
-@hypothesis.given(st.integers(1, 300), st.lists(st.integers(0, 6), max_size=3))
+@hypothesis.settings(max_examples=40)
+@hypothesis.given(st.integers(1, 150), st.lists(st.integers(0, 6), max_size=3))
 def test_however_passes_are_cut_they_are_added_in_one_tree(count, sizes):
     def whole(span):
         return None if span.count > 1 else Tree(f"{span.first}")

@@ -12,8 +12,10 @@ from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.nodes import Place
 from mitsuba_diffraction.solve.orders import Settings, solve_orders
 from mitsuba_diffraction.solve.profiles import sinusoidal
+from mitsuba_diffraction.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import OrderTable
+from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
 pytest.importorskip("gratinglab")
@@ -93,6 +95,8 @@ def test_the_command_says_what_it_will_do_writes_the_table_and_clears_up(tmp_pat
         (["sinusoidal", "--period", "1", "--depth", "0.1", "--duty", "0.5"], "duty"),
         (["missing.csv", "--period", "1"], "missing.csv"),
         (["heap", "--period", "1"], "expected one of"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "--material", "Unob"], "conductor"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "-o", "none/x.nc"], "folder"),
     ],
 )
 def test_what_is_missing_is_named_in_one_line(arguments, message, capsys, tmp_path, monkeypatch):
@@ -102,3 +106,22 @@ def test_what_is_missing_is_named_in_one_line(arguments, message, capsys, tmp_pa
     (line,) = captured.err.splitlines()
     assert message in line
     assert not list(tmp_path.iterdir())
+
+
+def test_precompute_names_the_command_for_recipes_of_solved_orders(tmp_path, capsys):
+    recipe = tmp_path / "groove.toml"
+    recipe.write_text(RECIPE)
+    assert main(["precompute", str(recipe)]) == 1
+    assert "run solve" in capsys.readouterr().err
+
+
+def test_the_shipped_tables_are_those_of_their_recipes():
+    for file in sorted((ROOT / "precompute" / "orders").glob("*.nc")):
+        table, recipe = OrderTable.load(file), SolvedRecipe.load(file.with_suffix(".toml"))
+        assert file.stat().st_size < 2e6
+        assert table.period == recipe.profile.period
+        assert table.header["profile"] == recipe.profile.name
+        assert table.wavelengths == recipe.settings.wavelengths
+        assert table.superstrate == recipe.superstrate
+        assert table.header["error_mean"] <= recipe.settings.tolerance
+        assert table.header["reciprocity_error"] < 0.01

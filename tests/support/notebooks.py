@@ -93,6 +93,7 @@ SMALLER = {
         "spp=512": "spp=64",
         "spp=128": "spp=16",
     },
+    "solved_orders": {"spp=256": "spp=8"},
     "speed_and_accuracy": {
         "pixels=240": "pixels=128",
         "PAIRS = 80": "PAIRS = 40",

@@ -2,176 +2,282 @@
 
 python -m docs.make.figures.cluster scenes/plate.xml -o docs/cluster.md
 
-Renders a film of 16 frames twice, with two threads in one process and with one in each of two
-workers; measures what the client and the scheduler do for a task; and simulates clusters of up to
-1,000 workers with these times.
+Renders a film of 16 frames five times by turns in one process with two threads and on two workers
+with one; measures what a pass, the client, the scheduler and an addition cost; and simulates jobs
+on clusters of up to 3,000 workers with these costs. All that is measured is processor time, which
+other programs on the machine hardly change.
 """
 
 from __future__ import annotations
 
 import argparse
-import heapq
-import json
-import subprocess
+import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.cluster.frames import Kept
-from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task
+from mitsuba_diffraction.cluster.frames import Film, FrameRequest
+from mitsuba_diffraction.cluster.kept import Kept
+from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task, add_sums
+from mitsuba_diffraction.cluster.workers import connect
+from mitsuba_diffraction.errors import warn
 from mitsuba_diffraction.extras import optional
+from mitsuba_diffraction.progress import silent
+from mitsuba_diffraction.scene.load import load_scene, set_variant
+from mitsuba_diffraction.scene.passes import (
+    Pass,
+    Span,
+    Stop,
+    render_pass,
+    render_passes,
+    samples_per_pass,
+)
 
 from . import pages
+from .cluster_simulation import Costs, Job, Simulation
 from .pages import exit_code
 
-FRAMES = 16
-WORKERS = (1, 2, 10, 30, 100, 300, 1000)
-#: What is simulated: a film of 2,000 frames of 1,024 samples, 1,024 × 640 pixels of 4 channels.
-TASKS, PIXELS, CHANNELS = 2000 * 320 // 8, 1024 * 640, 4
+VARIANT, SPP = "llvm_ad_rgb", 32
+FRAMES, RUNS = 16, 5
+WORKERS = (1, 10, 100, 300, 1000, 3000)
+FILM, STILL = Job(2000, 1024, 640, 1024), Job(1, 3840, 2160, 65_536)
+#: Network of every machine, in bytes a second, and the spread of the times of tasks: assumed.
+NETWORK, SPREAD = 1.25e8, 0.15
 
 
-@dataclass(frozen=True)
-class Costs:
-    """Seconds of a task."""
+class Times(NamedTuple):
+    """Seconds: of the clock, and of processors."""
 
-    work: float  # of a worker
-    spread: float  # standard deviation of that
-    scheduler: float  # of the scheduler, for one task after the other
-    client: float  # of the client: to receive, write, read and add a sum
-    transfer: float  # of the client's network, for a sum
+    clock: float
+    processor: float
 
 
-def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int = 0) -> float:
-    """Seconds until the last sum is added up.
-
-    Scheduler and client do one thing at a time, a worker one task. The client gives out a task for
-    each that it has taken in, `ahead` for every worker at first, as `cluster.frames` does.
-    """
-    rng = np.random.default_rng(seed)
-    scheduler = client = 0.0
-    free = [0.0] * workers
-    heapq.heapify(free)
-    done: list[float] = []
-    submitted = 0
-
-    def give(now: float) -> None:
-        nonlocal scheduler, submitted
-        scheduler = max(scheduler, now) + costs.scheduler
-        start = max(heapq.heappop(free), scheduler)
-        end = start + max(0.1 * costs.work, rng.normal(costs.work, costs.spread))
-        heapq.heappush(free, end)
-        heapq.heappush(done, end)
-        submitted += 1
-
-    while submitted < min(tasks, ahead * workers):
-        give(0.0)
-    while done:
-        client = max(client, heapq.heappop(done)) + max(costs.client, costs.transfer)
-        if submitted < tasks:
-            give(client)
-    return client
+def requests(frames: int) -> list[FrameRequest]:
+    """Return frames of 240 × 200 pixels, in which the lamp turns by 90°."""
+    angles = np.linspace(0.0, 90.0, frames)
+    size = {"resx": "240", "resy": "200"}
+    return [FrameRequest({**size, "lamp_azimuth": str(angle)}, SPP, 0) for angle in angles]
 
 
-def film_seconds(
-    scene: Path, frames: int, more: Sequence[str] = ()
-) -> tuple[float, dict[str, Any]]:
-    """Seconds of the command for so many frames, start included, and its report."""
+def processor_of(client: Any) -> float:
+    """Return the processor seconds so far of workers and of this process, with the scheduler."""
+    return time.process_time() + sum(client.run(time.process_time).values())
+
+
+def on_workers(client: Any, scene: Path, frames: int) -> Times:
+    """Render the film on workers; their processor time, and the client's."""
+
+    set_variant(VARIANT)
     with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder, "report.json")
-        command = [
-            sys.executable, "-m", "mitsuba_diffraction", "render", str(scene),
-            "--frames", str(frames), "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200",
-            "-s", "32", "--no-progress", "--animate", "lamp_azimuth=0:90",
-            "-o", str(Path(folder, "film")), "--json", str(report), *more,
-        ]  # fmt: skip
-        start = time.perf_counter()
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
+        film = Film(
+            client, scene, requests(frames), VARIANT, keep=Path(folder, "passes"), warn=warn,
+            threads=1,
+        )  # fmt: skip
+        start, before = time.perf_counter(), processor_of(client)
+        assert len(list(film.render(Stop(), silent))) == frames
+        return Times(time.perf_counter() - start, processor_of(client) - before)
 
 
-def client_seconds(count: int = 20) -> float:
-    """Seconds that the client spends on one sum: written, read, added."""
-    task = Task(SceneFiles("scene", (), ()), "", 0, False, "", 0, 0, (), (), 1)
-    rng = np.random.default_rng(0)
-    raw = rng.random((640, PIXELS // 640, CHANNELS)).astype(np.float32).astype(np.float64)
-    total = np.zeros_like(raw)
+def in_one_process(scene: Path, frames: int) -> Times:
+    """Render the film in this process with two threads."""
+    import drjit as dr
+
+    set_variant(VARIANT)
+    dr.set_thread_count(2)
+    start, before = time.perf_counter(), time.process_time()
+    for frame in requests(frames):
+        loaded = load_scene(scene, frame.values)
+        render_passes(
+            loaded, loaded.sensors()[0], spp=SPP, seed=0, variant=VARIANT, stop=Stop(),
+            progress=silent,
+        )  # fmt: skip
+    return Times(time.perf_counter() - start, time.process_time() - before)
+
+
+class FilmTimes(NamedTuple):
+    """Times of the film, of one process and of two workers, in runs by turns."""
+
+    single: list[Times]
+    workers: list[Times]
+    idle: float  # processor seconds of client, scheduler and workers in a second without work
+
+    def ratios(self) -> list[float]:
+        """Processor time of workers, as it is on two free cores, over that of one process.
+
+        A busy machine stretches the film, and with it the time that Dask's processes take without
+        work.
+        """
+        return [
+            (workers.processor - self.idle * workers.clock) / (1 - self.idle / 2) / single.processor
+            for single, workers in zip(self.single, self.workers, strict=True)
+        ]
+
+
+def film_times(scene: Path) -> FilmTimes:
+    """Render the film by turns in one process and on two workers."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as alone, connect(2) as client:
+
+        def turn(frames: int) -> tuple[Times, Times]:
+            single = alone.submit(in_one_process, scene, frames).result()
+            return single, on_workers(client, scene, frames)
+
+        turn(2)  # makes tables and kernels, and caches them
+        before = processor_of(client)
+        time.sleep(10.0)
+        idle = (processor_of(client) - before) / 10.0
+        single, workers = zip(*(turn(FRAMES) for _ in range(RUNS)), strict=True)
+        return FilmTimes(list(single), list(workers), idle)
+
+
+def processor_seconds(work: Callable[[], Any]) -> float:
+    """Return the processor seconds of a call."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def costs_of_passes(scene: Path) -> tuple[float, float]:
+    """Return seconds on two cores for a sample, and for the scene and kernels of a frame."""
+    import drjit as dr
+
+    set_variant(None)
+    dr.set_thread_count(2)
+    loaded: list[Any] = []
+    load = processor_seconds(lambda: loaded.append(load_scene(scene, {})))
+    sensor = loaded[0].sensors()[0]
+    pixels = int(np.prod(sensor.film().crop_size()))
+    spp = samples_per_pass(2**30, pixels, "llvm")
+    first, *others = (
+        processor_seconds(partial(render_pass, loaded[0], sensor, Pass(seed, spp)))
+        for seed in range(4)
+    )
+    each = statistics.median(others)
+    return each / 2 / (spp * pixels), load + max(0.0, first - each)
+
+
+def costs_of_sums(count: int = 20) -> tuple[float, float]:
+    """Return seconds of the client and of an addition, for a byte of a sum of the film."""
+    task = Task(SceneFiles("scene", (), ()), "", 0, False, "", 0, Span(0, 1), (), (), 1)
+    raw = np.random.default_rng(0).random((FILM.height, FILM.width, 4), np.float32)
+    sums = Sums(raw, (), (), 1, 0.0, 0)
     with tempfile.TemporaryDirectory() as folder:
         store = Kept(Path(folder) / "passes")
-        start = time.perf_counter()
-        for _ in range(count):
-            store.write(task, Sums(raw, "", "", 0.0, 0))
-            stored = store.read(task)
+
+        def take() -> None:
+            store.write(task, task.span, sums)
+            stored = store.read(task, task.span)
             assert stored is not None
-            total += stored.raw
-            store.forget(task)
-        return (time.perf_counter() - start) / count
+            add_sums([sums, stored])
+
+        client = statistics.median(processor_seconds(take) for _ in range(count))
+    large = [Sums(np.ones(STILL.bytes // 4, np.float32), (), (), 1, 0.0, 0) for _ in range(2)]
+    addition = statistics.median(processor_seconds(lambda: add_sums(large)) for _ in range(5))
+    return client / raw.nbytes, addition / STILL.bytes
 
 
-def scheduler_seconds(count: int = 500) -> float:
-    """Seconds of client, scheduler and worker together for an empty task, one after the other
-    in the queue: more than the scheduler's own."""
+def scheduler_seconds(count: int = 1000) -> float:
+    """Seconds of client and scheduler, in one process, for an empty task among many."""
     distributed = optional("distributed")
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0"
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
         ) as local,
         distributed.Client(local) as client,
     ):
-        client.gather(client.map(abs, range(10), pure=False))
-        start = time.perf_counter()
-        client.gather(client.map(abs, range(count), pure=False))
-        return (time.perf_counter() - start) / count
+
+        def work() -> None:
+            client.gather([client.submit(abs, n, pure=False) for n in range(count)])
+
+        work()
+        return processor_seconds(work) / count
 
 
 def scaling(costs: Costs) -> str:
     """The table of simulated clusters."""
     rows = []
     for workers in WORKERS:
-        seconds = simulate(workers, TASKS, costs)
-        ideal = TASKS * costs.work / workers
-        rows.append((f"{workers:,}", f"{seconds / 3600:.3g} h", f"{ideal / seconds:.0%}"))
-    return pages.table(("workers", f"{TASKS:,} tasks take", "of the ideal"), rows)
+        row = [f"{workers:,}"]
+        for job in (FILM, STILL):
+            seconds = Simulation(job, workers, costs).seconds()
+            ideal = job.work(costs) / workers
+            row += [f"{seconds / 3600:.3g} h", f"{ideal / seconds:.0%}"]
+        rows.append(tuple(row))
+    return pages.table(("workers", "film", "of the ideal", "still", "of the ideal"), rows)
+
+
+def film_text(times: FilmTimes) -> str:
+    """The sentences on a film on two workers."""
+    ratios, seconds = times.ratios(), [single.processor for single in times.single]
+    clock = [
+        workers.clock / single.clock
+        for single, workers in zip(times.single, times.workers, strict=True)
+    ]
+    return (
+        f"A film of {FRAMES} frames takes {statistics.median(seconds):.1f} s of processor time in "
+        "one process with two threads. Two workers with one thread each take "
+        f"{statistics.median(ratios):.2f} times as much, the client and the scheduler included: "
+        f"the median of {RUNS} runs by turns, from {min(ratios):.2f} to {max(ratios):.2f}. Dask's "
+        f"processes take {times.idle:.2f} s in a second without work, which is counted for as long "
+        "as the film takes on two free cores. By the clock of this busy machine the film took "
+        f"{statistics.median(clock):.2f} times as long: two processes get a larger share than one."
+    )
+
+
+def job_text(job: Job) -> str:
+    """The size of a job."""
+    frames = f"{job.frames:,} frames of " if job.frames > 1 else ""
+    return (
+        f"{frames}{job.width:,} × {job.height:,} pixels at {job.spp:,} samples, a sum of "
+        f"{job.bytes / 1e6:.3g} MB"
+    )
+
+
+def costs_text(costs: Costs) -> str:
+    """The measured and the assumed costs, as a list."""
+    seconds = costs.sample * 2**21
+    return (
+        f"- Measured: {seconds:.2g} s for a pass of 2²¹ samples of the snake on two cores; "
+        f"{costs.load:.2g} s for a scene and its kernels; {1e3 * costs.scheduler:.2g} ms of client "
+        "and scheduler for a task or an addition; "
+        f"{1e9 * costs.client:.2g} ns a byte for the client to write, read and add a sum; "
+        f"{1e9 * costs.addition:.2g} ns a byte for a worker to add one.\n"
+        f"- Assumed: workers of two such cores, tasks that vary by {costs.spread:.0%} (standard "
+        f"deviation), {8e-9 / costs.network:g} Gbit/s at every machine. The scheduler and the "
+        "client do one thing at a time; a free worker takes the next task; nobody dies.\n"
+        f"- The film: {job_text(FILM)}.\n"
+        f"- The still: {job_text(STILL)}."
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, simulate, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene", type=Path)
+    parser.add_argument("scene", type=Path, help="of the film")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/cluster.md"))
-    parser.add_argument("--work", type=float, default=20.0, help="simulated seconds of a task")
+    parser.add_argument(
+        "--simulated", type=Path, default=Path("scenes/snake.xml"),
+        help="scene of the simulated jobs; default: %(default)s",
+    )  # fmt: skip
     args = parser.parse_args(argv)
 
     def work() -> None:
-        film_seconds(args.scene, 1)  # makes the table, and caches it
-        alone = film_seconds(args.scene, FRAMES)[1]["seconds"]
-        two_workers, workers_report = film_seconds(
-            args.scene, FRAMES, ["--workers", "2", "--threads", "1"]
-        )
-        report = workers_report["workers"]
-        seconds = report["seconds"]
-        scheduler, client = scheduler_seconds(), client_seconds()
-        transfer = PIXELS * CHANNELS * 8 / 1.25e8
-        costs = Costs(args.work, 0.15 * args.work, scheduler, client, transfer)
-        film = (
-            f"A film of {FRAMES} frames takes {alone:.0f} s in one process with two threads. Two "
-            f"workers with one thread each take {seconds:.0f} s, {seconds / alone:.2f} times as "
-            f"long, and {two_workers - seconds:.0f} s to start; "
-            f"{report['overhead_per_task_s']:.2g} s a task are not work."
-        )
-        times = (
-            f"Measured: {1e3 * scheduler:.2g} ms a task for the scheduler, {1e3 * client:.3g} ms "
-            f"for the client to write, read and add a sum of {PIXELS * CHANNELS * 8 / 1e6:.3g} "
-            f"MB. Assumed: tasks of {args.work:g} ± {0.15 * args.work:g} s, and 1 Gbit/s to the "
-            f"client, {1e3 * transfer:.3g} ms a sum."
-        )
-        print(film, times, scaling(costs), sep="\n\n")
-        pages.update(args.output, {"film": film, "times": times, "scaling": scaling(costs)})
+        film = film_text(film_times(args.scene))
+        sample, load = costs_of_passes(args.simulated)
+        client, addition = costs_of_sums()
+        costs = Costs(
+            sample, SPREAD, load, scheduler_seconds(), client, addition, 1 / NETWORK
+        )  # fmt: skip
+        parts = {"film": film, "times": costs_text(costs), "scaling": scaling(costs)}
+        print(*parts.values(), sep="\n\n")
+        pages.update(args.output, parts)
 
     return exit_code("cluster", work)
 

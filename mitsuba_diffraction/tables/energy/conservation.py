@@ -79,9 +79,8 @@ class Surface:
         height_scale: float = 1.0,
     ) -> None:
         self.material, self.orders = material, Orders(table, height_scale, material.densest)
-        self._paths = material.paths(self.orders.least_width)
         self._settings = settings = energy_settings()
-        self._both_sides = material.transmits
+        self._both_sides = isinstance(material, Dielectric)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
@@ -109,7 +108,7 @@ class Surface:
             pair = slice(n, n + 2)
             c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair])
 
-        for first in (0, 1):  # neighbouring pairs share a wavelength
+        for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
             parallel(lower, range(first, len(between), 2))
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
@@ -149,8 +148,8 @@ class Surface:
             sent = [Transport(self.orders, path, wavelength, *directions) for path in paths]
             return Light(sent, here)
 
-        each = zip(self._paths(wavelengths), wavelengths.tolist(), strict=True)
-        return [partial(make, *both) for both in each]
+        paths = self.material.paths(wavelengths, self.orders.least_width)
+        return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
 
     def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
         """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""

@@ -107,6 +107,6 @@ def _nodes() -> tuple[Real, Real, Real]:
     return cosine[:, None, None], cosine[:, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
 
 
-@lru_cache(maxsize=4)  # the paths of a dielectric, the same at all wavelengths
+@lru_cache(maxsize=4)  # as many as a dielectric has, the same at all wavelengths
 def _matrices_at_nodes(path: Path) -> list[Complex]:
     return path.matrices(*_nodes())

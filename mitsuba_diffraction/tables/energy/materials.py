@@ -15,9 +15,6 @@ from ..directional import Real
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
-#: Paths of light at each of some wavelengths (n,), nm.
-Paths = Callable[[Real], list[list[Path]]]
-
 #: Wavelengths at which a material is told from another.
 PROBES = 24
 
@@ -35,20 +32,14 @@ class Reflector:
     model: str
     index: Index
 
-    #: Whether light is let through.
-    transmits = False
     #: Largest index of the media that light travels in, over that of the medium above.
     densest = 1.0
 
-    def paths(self, least: float) -> Paths:
-        """Return the one path of light at each wavelength; `least` does not matter to it."""
-
-        def at_wavelengths(wavelengths: Real) -> list[list[Path]]:
-            index = self.index(wavelengths)
-            indices = [None] * len(wavelengths) if index is None else index
-            return [[Path(indices[n], self.model)] for n in range(len(wavelengths))]
-
-        return at_wavelengths
+    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
+        """Return the one path of light at each wavelength (nm); `least` does not matter to it."""
+        index = self.index(wavelengths)
+        indices = [None] * len(wavelengths) if index is None else index
+        return [[Path(indices[n], self.model)] for n in range(len(wavelengths))]
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this material from another over a range of wavelengths (nm)."""
@@ -70,16 +61,13 @@ class Dielectric:
     model: str
     thin: bool
 
-    #: Whether light is let through.
-    transmits = True
-
     @property
     def densest(self) -> float:
         """Largest index of the media that light travels in, over that of the medium above."""
         return self.index
 
-    def paths(self, least: float) -> Paths:
-        """Return the paths of light, the same at all wavelengths; least : w of transmission."""
+    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
+        """Return the paths of light at each wavelength; least : w of light let through."""
         n, model = self.index, boundary.checked_model(self.model, through.MODELS)
         below = Side(1.0 if self.thin else n, n)
         paths = [
@@ -90,7 +78,7 @@ class Dielectric:
         ]
         if self.thin:
             paths.insert(0, Returned(None, model, sheet=n))
-        return lambda wavelengths: [paths] * len(wavelengths)
+        return [paths] * len(wavelengths)
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this dielectric from another material."""

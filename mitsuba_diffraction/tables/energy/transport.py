@@ -100,12 +100,10 @@ class Transport:
     ) -> None:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
-        self._gain = Gain(
-            path, orders.roughness, float(wavenumber(wavelength)), orders.height_scale
-        )
-        # wavenumber where the light goes to
-        self._k = self._gain.wavenumber * path.left.index
-        self._per_w = self._gain.wavenumber / orders.densest
+        above = float(wavenumber(wavelength))
+        self._gain = Gain(path, orders.roughness, above, orders.height_scale)
+        self._k = above * path.left.index  # where the light goes to
+        self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._shares = self._order_0_shares(theta, grid)
         self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
@@ -117,8 +115,7 @@ class Transport:
             here = half.interpolation(theta[:, None], phi)
             self._others.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
         if orders.strong:
-            strong, polar, azimuth = self._strong_shares(theta, phi)
-            self._others.append(grid.interpolation(polar, azimuth).summed(strong))
+            self._others.append(self._strong(theta, phi, grid))
 
     def order_0(self, s: Array) -> Array:
         """Return the light of order 0 for weights on the grid, (t, p)."""
@@ -181,15 +178,15 @@ class Transport:
         shares += flat.take(index + rows * columns) * (factor * upper_share)[:, None]
         return shares
 
-    def _strong_shares(self, theta: Real, phi: Real) -> tuple[Array, Real, Real]:
-        """Return shares (t, p, m) of the strong orders, and their θo and azimuths."""
-        mixture, width = self._orders.mixture, self._width
+    def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> LinearMap:
+        """Return the map from weights on a grid to the light of the strong orders."""
+        mixture = self._orders.mixture
         cos_i, sine = self._start(theta[:, None, None])
         places = mixture.frequency * (self._path.sign / self._k)
         x = places[:, 0] - sine * np.cos(phi)[:, None]
         y = places[:, 1] - sine * np.sin(phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
-        share, cos_o, pole = _lobe_means(width, radius)
+        visible, cos_o, pole = _lobe_means(self._width, radius)
         kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
         turn = azimuth - phi[:, None]
         gain = self._gain(cos_i, cos_o, turn)
@@ -200,8 +197,8 @@ class Transport:
         )
         rising = np.clip(at_horizon / np.maximum(gain[near] * cos_o[near], 1e-30), 0.0, 1.0)
         gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
-        shares = mixture.strong_at(kappa) * gain * share
-        return shares.astype(np.float32), np.arccos(cos_o), azimuth
+        shares = (mixture.strong_at(kappa) * gain * visible).astype(np.float32)
+        return grid.interpolation(np.arccos(cos_o), azimuth).summed(shares)
 
 
 @dataclass(frozen=True)
@@ -246,24 +243,32 @@ class Light:
         return sums
 
 
-def _lobe_means(width: float, radius: Real) -> tuple[Real, Real, Real]:
-    """Return the visible share of lobes, and its means of cosθo and of 1/cosθo.
+class LobeMeans(NamedTuple):
+    """Share of lobes that is above the horizon, and means of cosθo and of 1/cosθo over it."""
 
-    width : of the lobes, radius : of their centres from the normal; in direction cosines.
+    visible: Real
+    cosine: Real
+    pole: Real
+
+
+def _lobe_means(width: float, radius: Real) -> LobeMeans:
+    """Return means over lobes of a width with centres at a distance from the normal.
+
+    width, radius : in direction cosines.
     """
     cosine = np.sqrt(np.maximum(1.0 - radius**2, 1e-12))
-    edge, places, means = _lobes(width)
-    at = radius > edge
-    share_and_means = [np.ones_like(radius), cosine, 1.0 / cosine]
-    for values, tabulated in zip(share_and_means, means, strict=True):
-        values[at] = np.interp(radius[at], places, tabulated)
-    share_and_means[0][radius >= places[-1]] = 0.0
-    return share_and_means[0], share_and_means[1], share_and_means[2]
+    places, at_horizon = _lobes(width)
+    whole = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
+    means = (
+        np.where(radius > places[0], np.interp(radius, places, cut), mean)
+        for mean, cut in zip(whole, at_horizon, strict=True)
+    )
+    return LobeMeans(*means)
 
 
 @lru_cache(maxsize=64)
-def _lobes(width: float) -> tuple[float, Real, list[Real]]:
-    """Tabulate `_lobe_means` where part of a lobe is beyond the horizon, from a distance on."""
+def _lobes(width: float) -> tuple[Real, LobeMeans]:
+    """Tabulate the means against the distance, from where part of a lobe is below the horizon."""
     edge = max(1.0 - 2.0 * _LOBE * width, 0.0)
     deepest = math.sqrt(1.0 - max(edge - _LOBE * width, 0.0) ** 2)
     cosines = (np.arange(_LOBE_NODES) + 0.5) * (deepest / _LOBE_NODES)
@@ -273,7 +278,8 @@ def _lobes(width: float) -> tuple[float, Real, list[Real]]:
     lobes *= deepest / _LOBE_NODES / (math.sqrt(math.pi) * width) * cosines / sines
     visible = np.minimum(lobes.sum(axis=1), 1.0)
     safe = np.maximum(visible, 1e-30)
-    return edge, places, [visible, lobes @ cosines / safe, lobes @ (1.0 / cosines) / safe]
+    visible[-1] = 0.0
+    return places, LobeMeans(visible, lobes @ cosines / safe, lobes @ (1.0 / cosines) / safe)
 
 
 class Nodes(NamedTuple):

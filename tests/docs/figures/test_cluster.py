@@ -1,30 +1,49 @@
-"""The simulation of a cluster: ideal while workers are few, as fast as the client when many."""
+"""The simulation of a cluster: ideal while workers are few; what limits many of them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from docs.make.figures import cluster, pages
+from docs.make.figures import pages
+from docs.make.figures.cluster_simulation import Costs, Job, Simulation
 from tests.support import ROOT
 
-COSTS = cluster.Costs(work=10.0, spread=1.0, scheduler=0.001, client=0.1, transfer=0.05)
+#: Passes of 2 s.
+COSTS = Costs(
+    sample=1e-6, spread=0.1, load=0.0, scheduler=0.001, client=1e-9, addition=1e-9, network=1e-8
+)
+FILM, STILL = Job(100, 1024, 512, 256), Job(1, 1024, 1024, 8192)
 
 
-def test_few_workers_take_their_share_of_the_work():
-    for workers in (1, 4):
-        found = cluster.simulate(workers, 400, COSTS)
-        assert found == pytest.approx(400 * 10.0 / workers, rel=0.03)
+@pytest.mark.parametrize("job", [FILM, STILL])
+@pytest.mark.parametrize("workers", [1, 4])
+def test_few_workers_take_their_share_of_the_work(job, workers):
+    seconds = Simulation(job, workers, COSTS).seconds()
+    # tasks are a tenth of a worker's work at most, and vary by a tenth
+    assert seconds == pytest.approx(job.work(COSTS) / workers, rel=0.06)
 
 
-def test_many_workers_wait_for_the_client():
-    found = cluster.simulate(1000, 4000, COSTS)
-    # all that the client takes in one after the other, and the first task before it
-    assert 400.0 < found < 400.0 + 20.0
+def test_every_sum_passes_the_clients_network():
+    slow = replace(COSTS, network=1e-6)
+    seconds = Simulation(FILM, 1000, slow).seconds()
+    assert seconds > FILM.frames * FILM.bytes * slow.network
+    assert seconds < 1.2 * FILM.frames * FILM.bytes * slow.network
 
 
-def test_a_slow_scheduler_is_what_breaks_first_then():
-    slow = cluster.Costs(work=10.0, spread=1.0, scheduler=0.5, client=0.1, transfer=0.05)
-    assert cluster.simulate(1000, 1000, slow) > 500.0
+def test_the_scheduler_takes_one_task_after_the_other():
+    slow = replace(COSTS, scheduler=0.5)
+    # passes are tasks: 64 in each frame, and additions of four at a time
+    assert Simulation(FILM, 1000, slow).seconds() > 100 * (64 + 16 + 4 + 1) * 0.5
+
+
+def test_additions_wait_for_the_network_of_workers():
+    fast, slow = (
+        Simulation(STILL, 500, replace(COSTS, network=network)).seconds()
+        for network in (1e-12, 1e-7)
+    )
+    assert slow > fast + STILL.bytes * 1e-7 * 3  # three sums come to the last addition at least
 
 
 def test_the_page_has_the_places_for_the_figures():

@@ -40,8 +40,7 @@ def test_deep_surfaces_take_more_intervals_not_longer_look_ups(coherence):
     assert max(relative_error(table, DEEP)) <= 1e-3
 
 
-@pytest.mark.parametrize("axis", ["x", "y"])
-@pytest.mark.parametrize("coherence", ["ensemble", "patch"])
+@pytest.mark.parametrize(("coherence", "axis"), [("ensemble", "x"), ("patch", "y")])
 def test_orders_of_gratings_are_the_closed_forms(coherence, axis):
     period, depth, n = 2.0, 0.2, 64
     patches = {
@@ -115,7 +114,7 @@ def test_patches_of_other_pixels_but_one_size_are_averaged():
 
 
 @pytest.mark.parametrize("coherence", reference.COHERENCES)
-@pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-12, 1e-18, 1e-38])
+@pytest.mark.parametrize("depth", [1e-3, 1e-12, 1e-38])
 def test_shallow_patches_take_the_shortest_series(depth, coherence):
     field = HeightField(PATCH.heights * (depth / PATCH.range), PATCH.pixel_size)
     table = DiffractionTable.build(field, coherence=coherence, **DEFAULTS)

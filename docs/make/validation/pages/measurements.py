@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .. import cells, coated, filmed, models, statistics, transmitted
+from .. import cells, coated, filmed, models, orders, statistics, transmitted
 from ..cases import FEW_WAVELENGTHS, Grating
 from ..compare import Comparison, compare
 from ..goals import Sides
@@ -26,6 +26,16 @@ class Measurements:
     """
 
     quick: bool = False
+
+    @cached_property
+    def solved_orders(self) -> list[orders.Case]:
+        """Shipped tables of solved orders."""
+        return [orders.Case(name) for name in orders.TABLES[: 1 if self.quick else None]]
+
+    @property
+    def mounts(self) -> tuple[tuple[int, int], ...]:
+        """Directions of light on the tables of solved orders: θ and φ, degrees."""
+        return orders.MOUNTS[: 1 if self.quick else None]
 
     @cached_property
     def perfect(self) -> Comparison:

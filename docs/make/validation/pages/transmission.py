@@ -76,8 +76,8 @@ as `info --energy` prints them: model → `energy_conserving`, the default.
 {table(["surface", "light", *map(angle, PASSED)], rows)}
 
 Only order 0 is scaled. Where it has too little light, the missing part stays missing. Where the
-other orders exceed 1 on their own, all light is attenuated; these sums are then bounds. Both happen
-on blazed gratings, whose order 0 has little light. `energy_conserving=false` keeps the model's."""
+other orders exceed 1 on their own, all light is attenuated. Both happen on blazed gratings, whose
+order 0 has little light. `energy_conserving=false` keeps the model's."""
 
 
 def _recipes(measured: Measurements) -> str:
@@ -94,8 +94,8 @@ def _recipes(measured: Measurements) -> str:
     header = ["recipe", "medium", "model", "`energy_conserving`"]
     return f"""### Recipes
 
-The recipes of `precompute/` with a coherence width of 65 µm; least and largest R + T of light from
-both sides up to 75°.
+The recipes of `precompute/`, with a coherence width of 65 µm but for the hologram's 12 µm; least
+and largest R + T of light from both sides up to 75°.
 
 {table(header, rows)}"""
 

@@ -1,0 +1,56 @@
+"""Paths of light by a boundary: closed forms of q and G, and both orders of directions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.optics import coat, fresnel
+from mitsuba_diffraction.optics.paths import ABOVE, Path, Returned, Side
+
+RNG = np.random.default_rng(1)
+COS_I, COS_O = RNG.uniform(0.1, 1.0, (2, 50))
+TURN = RNG.uniform(-np.pi, np.pi, 50)
+INSIDE, BEYOND_SHEET = Side(1.5, 1.5), Side(1.0, 1.5)
+
+
+@pytest.mark.parametrize("side", [ABOVE, INSIDE, BEYOND_SHEET])
+def test_q_is_that_of_the_refracted_direction(side):
+    sine = np.sqrt(1.0 - COS_I**2)
+    direction = np.stack([sine, 0.0 * sine, COS_I], axis=-1)
+    inside = coat.refracted(direction, side.at_structure / side.index)
+    assert side.normal(COS_I) == pytest.approx(side.at_structure * inside[:, 2])
+
+
+@pytest.mark.parametrize("side", [ABOVE, INSIDE])
+def test_a_perfect_conductor_has_stam_s_factor(side):
+    path = Path(None, "kirchhoff", side, side)
+    sines = np.sqrt((1.0 - COS_I**2) * (1.0 - COS_O**2))
+    one_plus_dot = 1.0 + COS_I * COS_O + sines * np.cos(TURN)
+    expected = (one_plus_dot / (COS_I + COS_O)) ** 2 / (COS_I * COS_O)
+    assert path.common(COS_I, COS_O, np.cos(TURN)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("below", [INSIDE, BEYOND_SHEET])
+def test_light_takes_a_path_in_either_direction(below):
+    down, up = (Path(1.5, "small_slope", *ends) for ends in ((ABOVE, below), (below, ABOVE)))
+    turn = np.cos(TURN)
+    for forth, back in zip(
+        down.matrices(COS_I, COS_O, turn), up.matrices(COS_O, COS_I, turn), strict=True
+    ):
+        powers = (np.sum(np.abs(jones) ** 2, axis=(-2, -1)) for jones in (forth, back))
+        assert next(powers) == pytest.approx(next(powers))
+    assert down.common(COS_I, COS_O, turn) == pytest.approx(up.common(COS_O, COS_I, turn))
+
+
+def test_light_of_a_flat_sheet_adds_up_to_1():
+    """Order 0 in the refracted direction: structure and flat side reflect, and both transmit."""
+    passed = Path(1.5, "small_slope", ABOVE, BEYOND_SHEET).flat_transmittance(COS_I, COS_I)
+    back = Returned(None, "small_slope", sheet=1.5).common(COS_I, COS_I, -1.0)
+    assert passed + back + fresnel.reflectance(COS_I, 1.5) == pytest.approx(1.0)
+
+
+def test_the_flat_side_of_a_sheet_reflects_what_fresnel_says():
+    face = Path(1.0 / 1.5, "small_slope", BEYOND_SHEET, BEYOND_SHEET)
+    expected = fresnel.reflectance(COS_I, 1.5)
+    assert face.face_reflectance(COS_I, COS_I) == pytest.approx(expected)
