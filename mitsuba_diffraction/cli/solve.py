@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -99,9 +98,10 @@ def run(args: argparse.Namespace) -> int:
     else:
         recipe = recipe_of(args)
         output = recipe.output
-        # the default folder of a recipe is made
-        check_outputs([output], [source], "table", make_folder=True)
-        output.parent.mkdir(parents=True, exist_ok=True)
+        # the folder that a recipe names is made
+        check_outputs([output], [source], "table", make_folder=args.output is None)
+        if args.output is None:
+            output.parent.mkdir(parents=True, exist_ok=True)
         table = solve_recipe(recipe, args)
     table.save(output)
     print(f"{args.source} -> {output}")
@@ -152,10 +152,6 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     from ..solve.orders import solve_orders
 
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(f"cannot write '{folder}': {error.strerror}") from error
     with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
 
         def announce(estimate: Estimate) -> None:
@@ -173,7 +169,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             jobs=Jobs(folder, executor, bar),
             announce=announce,
         )
-    shutil.rmtree(folder)
+    shutil.rmtree(folder, ignore_errors=True)
     return table
 
 

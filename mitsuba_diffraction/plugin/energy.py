@@ -106,7 +106,7 @@ class EnergyModel:
             self._warn(conserved)
             self._scale.update(scales_of([energy.scale for energy in conserved]), nodes, scales)
         if beneath:
-            ratios = [self._ratio(energy.albedo) for energy in conserved]
+            ratios = [self._ratio(energy) for energy in conserved]
             self._reflected.update(ratios, nodes, scales)
 
     def _warn(self, conserved: list[Conservation]) -> None:
@@ -114,6 +114,7 @@ class EnergyModel:
         if self._warned or isinstance(self._material, Perfect) or conserved[0].scale is None:
             return
         albedo = conserved[0].albedo
+        assert albedo is not None  # of a reflector
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
         if largest > 1.0 + MUCH:
             self._warned = True
@@ -140,7 +141,7 @@ class EnergyModel:
         """Return the table that `reflected` looks up, for shaders."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
-        ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
+        ratios = [self._ratio(self._energy.at(node)) for node in nodes]
         ratio = between(ratios, nodes, height_scale)
         return DirectionalTable(ratio.wavelengths * self._scales.centre, ratio.values)
 
@@ -187,7 +188,9 @@ class EnergyModel:
         values = limited(exponents.values * height_scale**2).astype(np.float32)
         return DirectionalTable(exponents.wavelengths, values)
 
-    def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
+    def _ratio(self, conserved: Conservation) -> DirectionalTable:
+        albedo = conserved.albedo
+        assert albedo is not None  # of a reflector
         index = self._indices(albedo.wavelengths)
         assert index is not None  # without an index no light goes beneath
         flat = fresnel.reflectance(np.cos(albedo.grid.theta), index[:, None])

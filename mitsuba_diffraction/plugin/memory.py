@@ -44,22 +44,27 @@ def float_of_bits(bits: Index) -> Float:
     return dr.reinterpret_array(mi.Float, bits)
 
 
-def read_packets(source: Buffer, index: Index, floats: int) -> list[Packet]:
-    """Gather the record with this index, of so many floats, in the largest packets that fit."""
+def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True) -> list[Packet]:
+    """Gather the record with this index, of so many floats, in the largest packets that fit.
+
+    Inactive lanes of JIT variants get zeros, and read no memory.
+    """
     if not dr.is_jit_v(mi.Float):
         return [mi.ArrayXf(source[index * floats : (index + 1) * floats])]
     size = packet_size(floats)
     count = floats // size
     kind = mi.ArrayXf16 if dr.type_v(source) is dr.VarType.Float16 else mi.ArrayXf
     return [
-        mi.ArrayXf(dr.gather(kind, source, index * count + n, shape=(size, dr.width(index))))
+        mi.ArrayXf(
+            dr.gather(kind, source, index * count + n, active, shape=(size, dr.width(index)))
+        )
         for n in range(count)
     ]
 
 
-def read_record(source: Buffer, index: Index, floats: int) -> list[Float]:
-    """Gather the floats of the record with this index."""
-    return [x for packet in read_packets(source, index, floats) for x in packet]
+def read_record(source: Buffer, index: Index, floats: int, active: Mask = True) -> list[Float]:
+    """Gather the floats of the record with this index; see `read_packets`."""
+    return [x for packet in read_packets(source, index, floats, active) for x in packet]
 
 
 def packet_size(floats: int) -> int:

@@ -83,7 +83,7 @@ class Jobs:
 
     Attributes
     ----------
-    folder : of results, which another run finds again; None stores nothing.
+    folder : of results, which another run finds again, made when needed; None stores nothing.
     executor : processes or a cluster; None solves here.
     progress : called as progress(done, total, text).
     """
@@ -101,6 +101,8 @@ class Jobs:
         results = {place: _read(file) for place, file in files.items()}
         known = {place: values for place, values in results.items() if values is not None}
         missing = [place for place in files if place not in known]
+        if self.folder is not None and missing:
+            _make(self.folder)
         done = len(known)
         self.progress(done, len(files), text)
         for place, values in self._solved(problem, missing):
@@ -179,6 +181,16 @@ def _end_with_parent() -> None:
     assert parent is not None
     parent.join()
     os._exit(1)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot write '{folder}': {error.strerror}; choose a folder that exists and is "
+            "writable"
+        ) from error
 
 
 def _read(file: Path | None) -> Real | None:

@@ -13,9 +13,9 @@ scenes       what is rendered: noise beside sampling by the cosine, and the time
 
 from __future__ import annotations
 
+import functools
 import gc
 from collections.abc import Callable, Collection, Iterable, Iterator
-from functools import partial
 from pathlib import Path
 
 from mitsuba_diffraction.heights.field import HeightField
@@ -60,19 +60,23 @@ def sections(
     from .orders import measure_orders
     from .scenes import measure_efficiency, measure_noise, measure_snake
 
-    tables = build_tables(plan, folder, progress, patch)
+    tables = functools.cache(lambda: build_tables(plan, folder, progress, patch))
+
+    def colours(backend: str) -> Iterable[Section]:
+        return measure_colours(plan, tables(), scenes, backend, progress)
+
     for backend in ("llvm", "cuda"):
         if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
             continue
         set_variant(f"{backend}_ad_spectral")
         measured: dict[str, Callable[[], Iterable[Section]]] = {
-            "eval": lambda: [measure_eval(plan, tables, progress)],
-            "sample": lambda: measure_sampling(plan, tables, progress),
-            "snake": lambda: [measure_snake(plan, tables, scenes, progress)],
+            "eval": lambda: [measure_eval(plan, tables(), progress)],
+            "sample": lambda: measure_sampling(plan, tables(), progress),
+            "snake": lambda: [measure_snake(plan, tables(), scenes, progress)],
             "orders": lambda: measure_orders(plan, scenes, progress),
-            "noise": lambda: [measure_noise(plan, tables, progress)],
-            "efficiency": lambda: [measure_efficiency(plan, tables, scenes, progress)],
-            "colours": partial(measure_colours, plan, tables, scenes, backend, progress),
+            "noise": lambda: [measure_noise(plan, tables(), progress)],
+            "efficiency": lambda: [measure_efficiency(plan, tables(), scenes, progress)],
+            "colours": functools.partial(colours, backend),
         }
         for part, measure in measured.items():
             if part in parts:

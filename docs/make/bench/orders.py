@@ -64,7 +64,10 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
         goals = []
         if most is not None and name != _ROUGH:
             goals = [Goal(f"at most {most:g}× roughconductor", times <= most)]
-        values = {"ns/call": 1e9 * statistics.median(taken) / plan.lanes, "× roughconductor": times}
+        values: dict[str, float | None] = {
+            "ns/call": 1e9 * statistics.median(taken) / plan.lanes,
+            "× roughconductor": times,
+        }
         rows.append(Row(f"{what} {name}", values, goals, {"seconds": taken}))
     title = (
         f"solved orders: {mi.variant()}, {plan.lanes} random pairs of directions; kernels alone, "
@@ -74,7 +77,7 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
 
 
 def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
-    rows = []
+    rows: list[Row] = []
     for name, bsdf in bsdfs.items():
         for theta, most in _NOISE.items():
             progress(len(rows), len(bsdfs) * len(_NOISE), "noise")
@@ -83,8 +86,12 @@ def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
                 for phi in AZIMUTHS
                 for wavelength in WAVELENGTHS
             ]
-            values = {"median": float(np.median(deviations)), "most": max(deviations)}
-            goals = [Goal(f"at most {most:g}", values["most"] <= most)]
+            worst = max(deviations)
+            values: dict[str, float | None] = {
+                "median": float(np.median(deviations)),
+                "most": worst,
+            }
+            goals = [Goal(f"at most {most:g}", worst <= most)]
             rows.append(
                 Row(f"{name}, {theta:g}°", values, goals, {"standard deviations": deviations})
             )

@@ -68,6 +68,14 @@ SCENES = (
         _RECIPE.format("blazed") + "period = 1.6667\ndepth = 0.2939\npixels_per_period = 60\n",
     ),
 )  # fmt: skip
+_INTRODUCTION = (
+    "Left: the model of `diffraction`. Right: solved orders of the same profile, in the same "
+    "light. Ridges half as wide as the period have no second order in the model."
+)
+_HOW = (
+    "`python -m docs.make.figures.orders` makes the pictures and the table, of blocks of 5 pixels "
+    "whose light differs by more than 2 %."
+)
 _HEADER = ("scene", "mean ΔE2000", "95th percentile", "seconds, model", "seconds, solved")
 
 
@@ -155,8 +163,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             for scene in SCENES
             for name in [Path(scene.file).stem]
         ]
-        text = "Left: the model of `diffraction`. Right: solved orders, in the same light.\n\n"
-        page = text + "\n\n".join(shown) + "\n\n" + pages.table(_HEADER, rows)
+        page = "\n\n".join([_INTRODUCTION, *shown, pages.table(_HEADER, rows), _HOW])
         pages.update(args.output / "orders.md", {"orders": page})
 
     return exit_code("orders", work)

@@ -126,15 +126,17 @@ class SpectralLobes(_Window):
         for wavelength in wavelengths:
             row = self.lookup.row(pair.incident, pair.cos_i, wavelength)
             position = pair.uv * (1e3 * self.period * dr.rcp(wavelength))
-            light, chance = mi.Float(0.0), mi.Float(0.0)
+            light, chance, near = mi.Float(0.0), mi.Float(0.0), mi.Mask(False)
             for order in self.orders(position.x):
-                share, lobe = self.lookup.order(row, order), self.lobe(position, order)
+                lobe = self.lobe(position, order)
+                share = self.lookup.order(row, order, lobe > 0.0)
+                near |= lobe > 0.0
                 light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
             peak = dr.square((2e3 * math.sqrt(math.pi) * self.sigma) * dr.rcp(wavelength))
             peak *= pair.cos_o
             values.append(light * peak)
-            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row), _LEAST))
+            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
         mean = density * (1.0 / len(wavelengths))
         return Reflected(mi.UnpolarizedSpectrum(values), dr.detach(mean))
 

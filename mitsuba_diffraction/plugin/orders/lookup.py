@@ -119,25 +119,28 @@ class OrderLookup:
             face = 1.0 - self._through(cos_i)
         return Row(start, mi.UInt32(channel), channels, weights, incident, vacuum, face)
 
-    def order(self, row: Row, order: Float) -> Share:
-        """Return the light of an order, a whole number; 0 if it does not propagate."""
+    def order(self, row: Row, order: Float, active: Mask = True) -> Share:
+        """Return the light of an order, a whole number; 0 if it does not propagate or inactive."""
         q = mi.Float(row.channel) - order
-        propagates = (q >= 0.0) & (q < mi.Float(row.channels))
+        propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
         q = mi.UInt32(dr.select(propagates, q, 0.0))
         if not self.coated:
-            efficiency = dr.select(propagates, self._between(row, q, 0), 0.0)
+            efficiency = dr.select(propagates, self._between(row, q, 0, propagates), 0.0)
             return Share(efficiency, efficiency)
         x = dr.fma(order * self._steps, row.wavelength, -row.incident.x)
         squared = dr.fma(x, x, dr.square(row.incident.y))
         leaves = propagates & (squared < 1.0)
         through = self._through(dr.safe_sqrt(1.0 - squared))
         mirror = dr.select(order == 0.0, row.face, 0.0)
-        shares = self._between(row, q, 0) * through, self._between(row, q, 1)
+        shares = (
+            self._between(row, q, 0, propagates) * through,
+            self._between(row, q, 1, propagates),
+        )
         return Share(*(dr.select(leaves, self._outside(row, s, mirror), 0.0) for s in shares))
 
-    def total(self, row: Row) -> Float:
-        """Return the sum of all orders' chances, rounded up."""
-        value = self._between(row, row.channels, self._parts - 1)
+    def total(self, row: Row, active: Mask = True) -> Float:
+        """Return the sum of all orders' chances, rounded up; meaningless where inactive."""
+        value = self._between(row, row.channels, self._parts - 1, active)
         if self.coated:
             value = self._outside(row, value, row.face)
         return value * _RAISED
@@ -157,12 +160,12 @@ class OrderLookup:
         q, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
         return mi.Float(row.channel) - mi.Float(q) + 1.0, reached > target
 
-    def _between(self, row: Row, q: Index, part: int) -> Float:
+    def _between(self, row: Row, q: Index, part: int, active: Mask) -> Float:
         """Interpolate a channel between the corners of a cell.
 
         part : of a record, see `tables.orders.grids.Corners`.
         """
-        corners = read_record(self._values, (row.start + q) * self._parts + part, 8)
+        corners = read_record(self._values, (row.start + q) * self._parts + part, 8, active)
         value = row.weights[0] * mi.Float(corners[0])
         for weight, corner in zip(row.weights[1:], corners[1:], strict=True):
             value = dr.fma(weight, mi.Float(corner), value)

@@ -94,8 +94,8 @@ def _recipes(measured: Measurements) -> str:
     header = ["recipe", "medium", "model", "`energy_conserving`"]
     return f"""### Recipes
 
-The recipes of `precompute/` with a coherence width of 65 µm; least and largest R + T of light from
-both sides up to 75°.
+The recipes of `precompute/`, with a coherence width of 65 µm but for the hologram's 12 µm; least
+and largest R + T of light from both sides up to 75°.
 
 {table(header, rows)}"""
 
