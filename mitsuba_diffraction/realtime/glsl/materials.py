@@ -246,24 +246,16 @@ def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
 
 def pack_surface(material: Material) -> Packed:
     """Pack a material without its tables and energy conservation."""
-    uniforms: dict[str, Uniform] = {
-        "two_sided": material.two_sided,
-        "colour_uv": tuple(material.pigment.to_uv.T.ravel().tolist()),
-        "axis_uv": tuple(material.axis.to_uv.T.ravel().tolist()),
-    }
+    uniforms: dict[str, Uniform] = {"two_sided": material.two_sided}
     definitions: dict[str, str] = {}
     textures = []
-    if material.mask is not None:
-        uniforms["mask_uv"] = tuple(material.mask.to_uv.T.ravel().tolist())
-    pictures = {"colour": material.pigment, "axis": material.axis, "mask": material.mask}
-    for name, value in pictures.items():
+    maps = {"colour": material.pigment, "axis": material.axis, "mask": material.mask}
+    for name, value in maps.items():
         if value is not None and value.picture is not None:
             textures.append(Texture(f"{name}_map", as_half(_four(value.picture)), smooth=True))
-            definitions[f"{name.upper()}_MAPPED"] = ""
-            if value.clamped:
-                definitions[f"{name.upper()}_CLAMPED"] = ""
-            if value.nearest:
-                definitions[f"{name.upper()}_NEAREST"] = ""
+            uniforms[f"{name}_uv"] = tuple(value.to_uv.T.ravel().tolist())
+            marks = {"MAPPED": True, "CLAMPED": value.clamped, "NEAREST": value.nearest}
+            definitions |= {f"{name.upper()}_{mark}": "" for mark, on in marks.items() if on}
     packed = Packed(tuple(textures), uniforms, definitions)
     bsdf, gloss = material.bsdf, material.gloss
     if bsdf is None:

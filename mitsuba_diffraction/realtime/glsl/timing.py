@@ -99,11 +99,11 @@ def _whole(renderer: Renderer, method: str) -> _Triangle:
     definitions = {**surface.definitions, **tables.definitions, **light_definitions(1, False)}
     program = compile_program(renderer.context, method, definitions)
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
-    vertices = np.zeros((3, 16), np.float32)
+    vertices = np.zeros((3, 17), np.float32)
     vertices[:, :2] = corners
     vertices[:, 3:9] = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
     vertices[:, 9:11] = 0.5 * (corners + 1.0)
-    vertices[:, 11:] = [0.1, 0.1, 0.1, 1.0, 0.0]
+    vertices[:, 11:] = [0.1, 0.1, 0.1, 1.0, 0.0, 1.0]
     buffer = renderer.context.buffer(vertices.tobytes())
     uniforms: dict[str, Uniform] = {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,

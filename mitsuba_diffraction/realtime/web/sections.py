@@ -71,7 +71,8 @@ def packed_series(rows: NDArray[np.float16 | np.uint32]) -> Section:
     """
     words = rows.dtype == np.uint32
     if words:
-        pairs = np.stack([rows << 16, rows & np.uint32(0xFFFF0000)], axis=-1)
+        bits = rows.astype(np.uint32)
+        pairs = np.stack([bits << 16, bits & np.uint32(0xFFFF0000)], axis=-1)
         values = pairs.reshape(len(rows), -1).view(np.float32)
     else:
         values = rows.astype(np.float32)
@@ -140,7 +141,7 @@ class Mesh:
 
 
 def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
-    """Encode vertices (n, 16) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
+    """Encode vertices (n, 17) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
     parts: dict[str, NDArray[np.float32]] = {}
     start = 0
     for name, size in VERTEX:

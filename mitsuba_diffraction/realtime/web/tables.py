@@ -21,8 +21,8 @@ from .sections import Section, as_columns, packed_array, packed_series
 #: Methods that a page supports.
 WEB_METHODS = ("fast", "exact")
 
-#: Binary digits of a series' largest number; with these the mean ΔE2000 stays below 0.1.
-DIGITS = {"fast": 9, "exact": 8}
+#: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
+DIGITS = 9
 #: Smallest rounding step relative to a table's largest number: more digits are not visible.
 FLOOR = 2.0**-19
 
@@ -105,7 +105,7 @@ def fitting_tables(
         for method in methods:
             for number, table in enumerate(tables):
                 done = len(rounded_tables)
-                digits = DIGITS[method] - fewer
+                digits = DIGITS - fewer
                 progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
                 rounded_tables[method, number] = web_table(method, table, digits)
         needed = sum(web.nbytes for web in rounded_tables.values())

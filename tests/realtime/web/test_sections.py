@@ -89,7 +89,7 @@ def test_directions_take_two_numbers() -> None:
 def test_triangles_come_back_within_sixteen_bits(flat: bool) -> None:
     rng = np.random.default_rng(2)
     corners = rng.integers(0, 40, (100, 3))
-    per_vertex = rng.normal(size=(40, 16)).astype(np.float32)
+    per_vertex = rng.normal(size=(40, 17)).astype(np.float32)
     per_vertex[:, 11:14] = [0.2, 0.4, 0.6]  # one colour
     vertices = per_vertex[corners.ravel()]
     if flat:
