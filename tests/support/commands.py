@@ -24,8 +24,10 @@ SMALL = {
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
     # a perfect conductor: one wavelength stands for all
-    "solve": ["--tolerance", "0.2", "--wavelength-range", "590,610", "--resolution", "64"]
-    + ["--material", "none"],
+    "solve": [
+        "--tolerance", "0.2", "--wavelength-range", "590,610", "--resolution", "64",
+        "--material", "none",
+    ],  # fmt: skip
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-viewer": ["--method", "exact"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
