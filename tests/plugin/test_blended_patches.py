@@ -84,8 +84,9 @@ def test_samples_add_up_to_the_value(variant, component):
     parts = {0: [(0.25, back, 0)], 1: [(0.75, belly, 0)], 2: [(0.75, belly, 1)]}
     whole = [(0.25, back, 0xFFFFFFFF), (0.75, belly, 0xFFFFFFFF)]
     expected = sum(w * albedo(one, c).mean() for w, one, c in parts.get(component, whole))
-    # standard errors of both
-    assert found.mean() == pytest.approx(expected, abs=5.0 * found.std() / np.sqrt(n))
+    # standard errors of both; a surface that is drawn without noise has rounding alone
+    noise = max(5.0 * found.std() / np.sqrt(n), 4e-7)
+    assert found.mean() == pytest.approx(expected, abs=noise)
 
 
 def test_densities_are_those_of_the_samples(variant):

@@ -22,6 +22,7 @@ def small_clone(folder: Path) -> Path:
             text = re.sub(f'(<default name="{name}" value=)"[^"]*"', rf'\1"{value}"', text)
         (folder / "scenes" / scene.name).write_text(text, encoding="utf-8")
     (folder / "precompute").mkdir()
+    (folder / "precompute" / "orders").symlink_to(ROOT / "precompute" / "orders")
     for recipe in (ROOT / "precompute").glob("*.toml"):
         text = recipe.read_text(encoding="utf-8")
         if recipe.stem.endswith("_like"):  # a coarser and smaller patch of its kind
