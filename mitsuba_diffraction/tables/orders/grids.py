@@ -103,7 +103,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
     back = _TRAPPED * (1.0 - through)
     repeated = np.eye(len(channels)) - values * back[..., None, :]
-    within = np.linalg.solve(repeated, values)
+    within = np.asarray(np.linalg.solve(repeated, values), np.float64)
     return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
 
 

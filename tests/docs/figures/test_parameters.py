@@ -89,7 +89,7 @@ def test_the_choices_are_those_of_the_code(some_variant):
 
 
 def test_what_is_marked_differentiable_is(some_variant, patch):
-    named = {"eta": 1.4, "k": 6.0, "film_ior": 1.5, "film_thickness": 100.0}
+    named = {"eta": 1.4, "k": 6.0, "film_ior": 1.5, "film_thickness": 100.0, "lateral_scale": 1.0}
     bsdf = mi.load_dict(
         md.bsdf_dict(patch, coherence_width=4, tolerance=0.1, energy_conserving=False) | named
     )
