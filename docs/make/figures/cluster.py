@@ -226,8 +226,9 @@ def film_text(times: FilmTimes) -> str:
         f"{statistics.median(ratios):.2f} times as much, the client and the scheduler included: "
         f"the median of {RUNS} runs by turns, from {min(ratios):.2f} to {max(ratios):.2f}. Dask's "
         f"processes take {times.idle:.2f} s in a second without work, which is counted for as long "
-        "as the film takes on two free cores. By the clock of this busy machine the film took "
-        f"{statistics.median(clock):.2f} times as long: two processes get a larger share than one."
+        "as the film takes on two free cores. By the clock the film took "
+        f"{statistics.median(clock):.2f} times as long; of a busy machine, two processes get more "
+        "than one."
     )
 
 
