@@ -139,7 +139,7 @@ def read_surface(
         lateral_scale=lateral,
         height_scale=height_scale,
         optical=optical,
-        wavelength=_wavelength(props, table),
+        wavelength=mono_wavelength(props, table.wavelength_range),
         energy_conserving=flag(props, "energy_conserving", True),
     )
 
@@ -293,12 +293,17 @@ def resolved_path(name: str, parameter: str) -> Path:
     )
 
 
-def _wavelength(props: Properties, table: DiffractionTable) -> float:
-    """Wavelength of mono variants in nm; a scene for all variants may give it in all."""
+def mono_wavelength(props: Properties, wavelength_range: tuple[float, float]) -> float:
+    """Return the wavelength of mono variants in nm; a scene for all variants may give it in all.
+
+    wavelength_range : shortest and longest of the table, nm.
+
+    Raises a DiffractionError if it is outside the table.
+    """
     wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
     if not mi.is_monochromatic and "wavelength" not in props:
         return wavelength
-    shortest, longest = table.wavelength_range
+    shortest, longest = wavelength_range
     if not shortest <= wavelength <= longest:
         raise DiffractionError(
             f"wavelength={wavelength:g} nm is outside the table's {shortest:g} to {longest:g} nm"

@@ -285,15 +285,22 @@ def _table_of(record: Record) -> DiffractionTable:
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
     """Load a table file once for all that use it at the same time."""
+    return loaded_once(path, DiffractionTable.load, _tables)
+
+
+def loaded_once(
+    path: str | os.PathLike[str],
+    load: Callable[[str | os.PathLike[str]], T],
+    in_use: MutableMapping[str, T],
+) -> T:
+    """Return what `load` makes of a file, kept in `in_use` until the file changes."""
     try:
         status = os.stat(path)
     except OSError:
-        return DiffractionTable.load(path)  # which says what is wrong
+        return load(path)  # which says what is wrong
     key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
-    table = _tables.get(key)
-    if table is None:
-        table = _tables.setdefault(key, DiffractionTable.load(path))
-    return table
+    value = in_use.get(key)
+    return in_use.setdefault(key, load(path)) if value is None else value
 
 
 def cached_colours(table: DiffractionTable) -> ColourTable:

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import weakref
 from dataclasses import dataclass
-from pathlib import Path
-
-import mitsuba as mi
 
 from ...errors import DiffractionError
 from ...heights.coherence import USUAL_WIDTH
 from ...heights.lengths import is_auto
 from ...settings import checked
 from ...tables.orders import OrderTable
+from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
-from ..properties import number
-from ..surface_parameters import DEFAULT_WAVELENGTH, nested_of, orientation_of, resolved_path
+from ..surface_parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..textures import Orientation
 from ..types import BSDF, Properties
 
@@ -60,7 +56,7 @@ def read_parameters(props: Properties) -> Parameters:
         table=table,
         coherence_width=_coherence_width(props, table),
         orientation=orientation_of(props),
-        wavelength=_wavelength(props, table),
+        wavelength=mono_wavelength(props, table.wavelengths),
         nested=nested,
     )
 
@@ -79,20 +75,7 @@ def _table(props: Properties) -> OrderTable:
     name = props.get("table")
     if not isinstance(name, str):
         raise DiffractionError(f"table={name!r} must be the name of a file")
-    return loaded_orders(resolved_path(name, "table"))
-
-
-def loaded_orders(path: Path) -> OrderTable:
-    """Load a file once for all that use it at the same time."""
-    try:
-        status = os.stat(path)
-    except OSError:
-        return OrderTable.load(path)  # which says what is wrong
-    key = f"{path.resolve()} {status.st_mtime_ns} {status.st_size}"
-    table = _tables.get(key)
-    if table is None:
-        table = _tables.setdefault(key, OrderTable.load(path))
-    return table
+    return loaded_once(resolved_path(name, "table"), OrderTable.load, _tables)
 
 
 def _coherence_width(props: Properties, table: OrderTable) -> float:
@@ -104,16 +87,3 @@ def _coherence_width(props: Properties, table: OrderTable) -> float:
             f"grating, {LEAST_PERIODS * table.period:g} µm: narrower windows have no orders"
         )
     return float(width)
-
-
-def _wavelength(props: Properties, table: OrderTable) -> float:
-    """Wavelength of mono variants in nm; a scene for all variants may give it in all."""
-    wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
-    if not mi.is_monochromatic and "wavelength" not in props:
-        return wavelength
-    shortest, longest = table.wavelengths
-    if not shortest <= wavelength <= longest:
-        raise DiffractionError(
-            f"wavelength={wavelength:g} nm is outside the table's {shortest:g} to {longest:g} nm"
-        )
-    return wavelength
