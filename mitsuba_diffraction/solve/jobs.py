@@ -26,7 +26,7 @@ from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
 from .profiles import Profile
-from .stations import Grating, Real, Solver
+from .stations import Complex, Grating, Real, Solver
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
@@ -57,7 +57,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     """
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    content = hashlib.sha256(repr((method, grating.superstrate, grating.wavelengths)).encode())
+    content = hashlib.sha256(
+        repr(("amplitudes", method, grating.superstrate, grating.wavelengths)).encode()
+    )
     profile, material = grating.profile, grating.material
     content.update(repr(profile.period).encode())
     for array in (profile.x, profile.z, material.wavelengths, material.values):
@@ -72,12 +74,12 @@ def solver_of(problem: Problem) -> Solver:
 
 
 class Solved(NamedTuple):
-    """Efficiencies of a place, and the processor seconds that they took.
+    """Amplitudes of a place, and the processor seconds that they took.
 
     values : (w, j, 2, q, 2), see `stations.Solver`, of single precision.
     """
 
-    values: Real
+    values: Complex
     seconds: float
 
 
@@ -91,7 +93,7 @@ def solve_place(problem: Problem, place: Place) -> Solved:
     start, grating = time.thread_time(), problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
     station = grating.station(place.band, place.kind, place.tau, place.rho, w)
-    values = solver.efficiencies(station).astype(np.float32).astype(np.float64)
+    values = solver.amplitudes(station).astype(np.complex64).astype(np.complex128)
     return Solved(values, time.thread_time() - start)
 
 
@@ -112,7 +114,14 @@ class Jobs:
     _seconds: dict[tuple[str, int, Place], float] = field(default_factory=dict, init=False)
 
     def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
-        """Return the efficiencies at all places, of which those in the folder are read.
+        """Return the efficiencies at all places; see `amplitudes`."""
+        known = self.amplitudes(problem, places, text)
+        return {place: np.abs(values) ** 2 for place, values in known.items()}
+
+    def amplitudes(
+        self, problem: Problem, places: Sequence[Place], text: str
+    ) -> dict[Place, Complex]:
+        """Return the amplitudes at all places, of which those in the folder are read.
 
         An exception or Ctrl-C leaves in the folder what is done by then.
 
@@ -133,7 +142,7 @@ class Jobs:
             known[place] = solved
             if (file := files[place]) is not None:
                 with atomic_path(file) as temporary:
-                    np.savez(temporary, values=np.float32(solved.values), seconds=solved.seconds)
+                    np.savez(temporary, values=np.complex64(solved.values), seconds=solved.seconds)
             done += 1
             self.progress(done, len(files), text)
         for place, solved in known.items():
@@ -240,6 +249,6 @@ def _read(file: Path | None) -> Solved | None:
         return None
     try:
         with np.load(file) as stored:
-            return Solved(stored["values"].astype(np.float64), float(stored["seconds"]))
+            return Solved(stored["values"].astype(np.complex128), float(stored["seconds"]))
     except (OSError, ValueError, EOFError, KeyError, BadZipFile):
         return None  # solved again
