@@ -24,7 +24,7 @@ from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
 from .profiles import Profile
-from .stations import Grating, Real, Solver
+from .stations import Complex, Grating, Real, Solver
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
@@ -55,7 +55,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     """
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    content = hashlib.sha256(repr((method, grating.superstrate, grating.wavelengths)).encode())
+    content = hashlib.sha256(
+        repr(("amplitudes", method, grating.superstrate, grating.wavelengths)).encode()
+    )
     profile, material = grating.profile, grating.material
     content.update(repr(profile.period).encode())
     for array in (profile.x, profile.z, material.wavelengths, material.values):
@@ -69,12 +71,12 @@ def solver_of(problem: Problem) -> Solver:
     return METHODS[problem.method](problem.grating.profile, problem.resolution)
 
 
-def solve_place(problem: Problem, place: Place) -> Real:
-    """Return efficiencies (w, j, 2, q, 2) at a place; see `stations.Solver`."""
+def solve_place(problem: Problem, place: Place) -> Complex:
+    """Return amplitudes (w, j, 2, q, 2) at a place; see `stations.Solver`."""
     grating = problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
     station = grating.station(place.band, place.kind, place.tau, place.rho, w)
-    return solver_of(problem).efficiencies(station)
+    return solver_of(problem).amplitudes(station)
 
 
 @dataclass
@@ -93,7 +95,14 @@ class Jobs:
     progress: Progress = silent
 
     def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
-        """Return the efficiencies at all places, of which those in the folder are read.
+        """Return the efficiencies at all places; see `amplitudes`."""
+        known = self.amplitudes(problem, places, text)
+        return {place: np.abs(values) ** 2 for place, values in known.items()}
+
+    def amplitudes(
+        self, problem: Problem, places: Sequence[Place], text: str
+    ) -> dict[Place, Complex]:
+        """Return the amplitudes at all places, of which those in the folder are read.
 
         An exception or Ctrl-C leaves in the folder what is done by then.
         """
@@ -109,7 +118,7 @@ class Jobs:
             known[place] = values
             if (file := files[place]) is not None:
                 with atomic_path(file) as temporary:
-                    np.save(temporary, values.astype(np.float32))
+                    np.save(temporary, values.astype(np.complex64))
             done += 1
             self.progress(done, len(files), text)
         return known
@@ -120,7 +129,7 @@ class Jobs:
             return timed(problem, place)
         return float(self.executor.submit(timed, problem, place).result())
 
-    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Real]]:
+    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Complex]]:
         if self.executor is None:
             for place in places:
                 yield place, solve_place(problem, place)
@@ -193,10 +202,10 @@ def _make(folder: Path) -> None:
         ) from error
 
 
-def _read(file: Path | None) -> Real | None:
+def _read(file: Path | None) -> Complex | None:
     if file is None or not file.is_file():
         return None
     try:
-        return np.load(file).astype(np.float64)
+        return np.load(file).astype(np.complex128)
     except (OSError, ValueError, EOFError):
         return None  # solved again
