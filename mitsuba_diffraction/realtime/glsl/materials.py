@@ -142,6 +142,7 @@ class Diffracting(Protocol):
     height_scale : factor on the heights, 1 where the kind has none.
     largest_scale : largest height scale of the table, or None where the kind has none.
     coherence_width : 4σ of the amplitude window, µm.
+    coherent : whether orders interfere, which `exact` does not support.
     """
 
     table: Any
@@ -149,6 +150,7 @@ class Diffracting(Protocol):
     height_scale: float
     largest_scale: float | None
     coherence_width: float
+    coherent: bool
 
     @property
     def axis(self) -> Map:

@@ -41,6 +41,7 @@ class Modelled:
         self.height_scale = number_of(bsdf.height_scale)
         self.largest_scale: float | None = float(self.table.height_scale_max)
         self.coherence_width = float(self.table.coherence_width)
+        self.coherent = self.table.grid.coherent
 
     @property
     def axis(self) -> Map:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
@@ -27,14 +28,17 @@ Array = NDArray[np.float64]
 #: fewer where a table would need more memory than this.
 CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 15), 48 << 20
 
-# lobes: directions and wavelengths of the mean efficiencies, and points of each lobe
-_DIRECTIONS, _WAVELENGTHS, _POINTS = 64, 48, 256
+# efficiency within a layer at most: where more is trapped, its face sends nearly nothing out
+_MOST_WITHIN = 8.0
+
+# lobes: directions and wavelengths of the mean efficiencies
+_DIRECTIONS, _WAVELENGTHS = 32, 24
 
 
 class Solved:
     """Surface of a `diffraction_orders` BSDF; see `materials.Diffracting`."""
 
-    height_scale, largest_scale, stretch = 1.0, None, 1.0
+    height_scale, largest_scale, stretch, coherent = 1.0, None, 1.0, False
 
     def __init__(self, bsdf: Any) -> None:
         self.bsdf = bsdf
@@ -69,9 +73,13 @@ class Solved:
         """See `Diffracting.conservation`: solved orders conserve energy."""
         return Packed()
 
-    def tables(self, method: str, *, floats: bool = False) -> Packed:
-        """See `Diffracting.tables`; the textures are floats in any case."""
-        packed = pack_efficiencies(self.table) | Packed((), {"sigma": self.bsdf.sigma})
+    def tables(self, method: str, *, floats: bool = False, most_bytes: int = MOST_BYTES) -> Packed:
+        """See `Diffracting.tables`; the textures are floats in any case.
+
+        most_bytes : size of the efficiencies at most.
+        """
+        packed = pack_efficiencies(self.table, most_bytes)
+        packed |= Packed((), {"sigma": self.bsdf.sigma})
         return packed | self._daylight() if method == "fast" else packed
 
     def lobes(self) -> Packed:
@@ -103,13 +111,14 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
 
     most_bytes : size of the texture at most.
     """
-    counts = _cells(table, most_bytes)
+    counts = cells_within(table, most_bytes)
     tiles = []
     for band in table.bands:
         for kind in (cells.A, cells.B)[: len(band.kinds)]:
             values = rows(table, band, kind, counts)
             whole = values.through.sum(axis=-1, keepdims=True)
-            row = np.concatenate([values.within, whole], axis=-1).astype(np.float16)
+            within = np.minimum(values.within, _MOST_WITHIN)
+            row = np.concatenate([within, whole], axis=-1).astype(np.float16)
             groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
             # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
             row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
@@ -134,8 +143,8 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
     )
 
 
-def _cells(table: OrderTable, most_bytes: int) -> Counts:
-    """Return the numbers of cells that fit."""
+def cells_within(table: OrderTable, most_bytes: int) -> Counts:
+    """Return the numbers of cells of a texture of this size at most."""
     counts = CELLS if table.superstrate == 1.0 else CELLS_UNDER_LAYER
     tiles = sum(n * (n + 1) for band in table.bands for n in (kind.shape[3] for kind in band.kinds))
     while _tile_bytes(counts) * tiles > most_bytes and max(counts) > 4:
@@ -152,35 +161,38 @@ def _tile_bytes(counts: Counts) -> int:
 def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
     """Return the brightness of all orders in the cells (rings, azimuths) between radii `edges`.
 
-    Efficiencies are means over directions; layers only pass and mirror.
+    Efficiencies are means over directions; layers only pass and mirror. Lobes of orders other than
+    0 are as wide as they are only around the axis: along it, wavelengths spread them further.
     """
-    rng = np.random.default_rng(0)
     index = table.superstrate
     radius = np.sqrt((np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS)
     turn = 2.399963 * np.arange(_DIRECTIONS)  # sunflower spiral
-    x, y = radius * np.cos(turn) / index, radius * np.sin(turn) / index
-    weights = daylight_weights(sigma, table.period)
-    quantile = (np.arange(_WAVELENGTHS) + 0.5) / _WAVELENGTHS
-    places = np.linspace(*ENDS, len(weights.cumulative))
-    lam = np.interp(quantile, weights.cumulative, places)
-    through = face_transmittance(x**2 + y**2, index) if index > 1.0 else np.ones(_DIRECTIONS)
-    last = int(2e3 * table.period / ENDS[0])
-    cell_power = np.zeros((RINGS, AZIMUTHS))
-    for order in range(-last, last + 1):
-        efficiency = through[:, None] * table.efficiency(x[:, None], y[:, None], lam, order)
-        power = np.asarray(efficiency.mean(axis=0))
+    x, y = ((radius / index * part)[:, None] for part in (np.cos(turn), np.sin(turn)))
+    through = np.ones(_DIRECTIONS)
+    if index > 1.0:
+        through = face_transmittance((radius / index) ** 2, index)
+    daylight = np.diff(daylight_weights(sigma, table.period).cumulative)
+    lam = ENDS[0] + (np.arange(len(daylight)) + 0.5) * (ENDS[1] - ENDS[0]) / len(daylight)
+    some = np.linspace(*ENDS, _WAVELENGTHS)
+    deviation = 1e-3 * lam / (2.0 * np.pi * np.sqrt(2.0) * sigma)
+    around = np.linspace(-np.pi, np.pi, AZIMUTHS + 1)  # edges of azimuths
+
+    def power(order: int) -> Array:
+        """Return the mean efficiency at all wavelengths, as bright as these are."""
+        efficiency = table.efficiency(x, y, some, order)
+        mean = (through[:, None] * efficiency).mean(axis=0)
         if order == 0:
-            power = power + (1.0 - through).mean()
-        drawn = np.interp(
-            (np.arange(_WAVELENGTHS)[:, None] + rng.random(_POINTS)) / _WAVELENGTHS,
-            weights.cumulative, places,
-        )  # fmt: skip
-        deviation = 1e-3 * drawn / (2.0 * np.pi * np.sqrt(2.0) * sigma)
-        u, v = rng.normal(size=(2, *drawn.shape)) * deviation
-        u += order * 1e-3 * drawn / table.period
-        ring = np.clip(np.searchsorted(edges, np.hypot(u, v)) - 1, 0, RINGS - 1)
-        azimuth = np.floor(np.arctan2(v, u) / (2.0 * np.pi) % 1.0 * AZIMUTHS).astype(int) % AZIMUTHS
-        shares = np.broadcast_to(power[:, None], u.shape).ravel()
-        flat = (ring * AZIMUTHS + azimuth).ravel()
-        cell_power += np.bincount(flat, shares, RINGS * AZIMUTHS).reshape(cell_power.shape)
-    return cell_power
+            mean = mean + (1.0 - through).mean()
+        return np.asarray(daylight * np.interp(lam, some, mean))
+
+    within = power(0) @ -np.expm1(-0.5 * (edges / deviation[:, None]) ** 2)
+    cell_power = np.diff(within)[:, None] * np.full(AZIMUTHS, 1.0 / AZIMUTHS)
+    for order in range(1, int(2e3 * table.period / ENDS[0]) + 1):
+        radii = order * 1e-3 * lam / table.period
+        rings = np.clip(np.searchsorted(edges, radii) - 1, 0, RINGS - 1)
+        across = np.clip(around, -0.5 * np.pi, 0.5 * np.pi)
+        spread = np.diff(ndtr((radii / deviation)[:, None] * np.sin(across)), axis=1)
+        for sign, first in ((1, AZIMUTHS // 2), (-1, 0)):
+            lobes = power(sign * order)[:, None] * np.roll(spread, first, axis=1)
+            np.add.at(cell_power, rings, lobes)
+    return np.asarray(cell_power)

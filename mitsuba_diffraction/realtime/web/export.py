@@ -7,7 +7,7 @@ import functools
 import html
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -289,11 +289,11 @@ def _add_programs(
     """
     sources: list[str] = []
     for entry, common in surfaces:
+        diffracts = "table" in entry
+        table = entry.setdefault("table", 0)  # of which other surfaces read nothing
         entry["programs"] = {}
         for method in methods:
-            tables: Mapping[str, str] = {}
-            if "table" in entry:
-                tables = packed[method, entry["table"]].packed.definitions
+            tables = packed[method, table].packed.definitions if diffracts else {}
             source = _source(method, {**common.definitions, **tables, **around, "SHADOWED": ""})
             if source not in sources:
                 sources.append(source)
