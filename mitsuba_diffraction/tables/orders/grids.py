@@ -17,6 +17,7 @@ from ...optics.fresnel import reflectance
 from . import cells
 from .cells import Array
 from .lookup import clamped
+from .polarised import nearest_pure
 from .table import Band, Counts, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
@@ -47,15 +48,31 @@ class Corners(NamedTuple):
     values: NDArray[np.float16]
 
 
+class Matrices(NamedTuple):
+    """Mueller matrices on the even grids.
+
+    Attributes
+    ----------
+    starts : (2 × bands,) first record of kind A and B of each band.
+    values : (records, 16) float16, row by row, of each node (τ, ρ, w) and each pair (j, q). Under a
+        coat M₀₀ has the light that the coat's face sent back, which is taken to be depolarised.
+    """
+
+    starts: NDArray[np.uint32]
+    values: NDArray[np.float16]
+
+
 class Rows(NamedTuple):
     """Efficiencies on an even grid, (τ, ρ, w, j, q) from 0 to 1.
 
     Attributes
     ----------
-    within : of the grating, with all reflections between the coat's face and the grating.
+    grating : of the grating alone.
+    within : with all reflections between the coat's face and the grating.
     through : times the face's transmittance towards q.
     """
 
+    grating: Array
     within: Array
     through: Array
 
@@ -78,33 +95,74 @@ def corners(table: OrderTable) -> Corners:
     return Corners(counts, np.array(starts, np.uint32), np.concatenate(parts))
 
 
+def matrices(table: OrderTable, counts: Counts) -> Matrices:
+    """Resample the Mueller matrices of a polarised table on grids of so many cells."""
+    starts, parts, total = [], [], 0
+    for band in table.bands:
+        assert band.mueller is not None
+        for kind in (cells.A, cells.B):
+            starts.append(total)
+            if kind == cells.B and band.b is None:
+                continue
+            of_kind, known = rows(table, band, kind, counts), band.mueller[kind]
+            grid = _grid(table, band, counts)
+            elements = np.empty((*of_kind.grating.shape, 4, 4), np.float16)
+            for i, j in np.ndindex(4, 4):
+                elements[..., i, j] = _resampled(table, band, known[..., i, j], grid)
+            for n, layer in enumerate(elements):  # in parts, for want of memory
+                elements[n] = nearest_pure(layer.astype(np.float64), of_kind.grating[n])
+            elements[..., 0, 0] = of_kind.within
+            parts.append(elements.reshape(-1, 16))
+            total += len(parts[-1])
+    return Matrices(np.array(starts, np.uint32), np.concatenate(parts))
+
+
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     """Evaluate the polynomials of a kind on a grid with so many cells, unpolarised."""
+    grid = _grid(table, band, counts)
     unpolarised = band.kind(kind).mean(axis=-1, dtype=np.float64)
-    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
-    along_tau, along_rho = (
-        cells.interpolation(known, places)
-        for known, places in zip(band.counts, (tau, rho), strict=False)
-    )
-    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, unpolarised, optimize=True)
-    big_k = (band.k + cells.sine_squared(rho))[:, None]
-    lam = wavelength_of(table, big_k, w)
-    at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
-    along_w = cells.interpolation(band.counts.w, at)
-    summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
+    summed = _resampled(table, band, unpolarised, grid)
     values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
-        return Rows(values, values)
+        return Rows(values, values, values)
     channels = np.arange(values.shape[-1])
-    places = tau[:, None, None, None], rho[:, None, None]
-    light = cells.from_cell(band.k, kind, channels, *places, lam[..., None], table.optical_period)
+    places = grid.tau[:, None, None, None], grid.rho[:, None, None]
+    lam = grid.wavelength[..., None]
+    light = cells.from_cell(band.k, kind, channels, *places, lam, table.optical_period)
     through = face_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
     back = _TRAPPED * (1.0 - through)
     repeated = np.eye(len(channels)) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
-    return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
+    return Rows(values, within, within * np.maximum(through, _LEAST)[..., None, :])
+
+
+class _Grid(NamedTuple):
+    """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
+
+    tau: Array
+    rho: Array
+    big_k: Array
+    wavelength: Array
+
+
+def _grid(table: OrderTable, band: Band, counts: Counts) -> _Grid:
+    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
+    big_k = (band.k + cells.sine_squared(rho))[:, None]
+    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w))
+
+
+def _resampled(table: OrderTable, band: Band, values: Array, grid: _Grid) -> Array:
+    """Evaluate the polynomials of values (τ, ρ, w, j, q) at nodes of a band on a grid."""
+    along_tau, along_rho = (
+        cells.interpolation(known, places)
+        for known, places in zip(band.counts, grid[:2], strict=False)
+    )
+    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, values, optimize=True)
+    at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
+    along_w = cells.interpolation(band.counts.w, at)
+    return np.asarray(np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True))
 
 
 def least_c(index: float) -> float:
