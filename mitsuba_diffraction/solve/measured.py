@@ -167,13 +167,12 @@ def _samples(
 
 def _band(k: int, counts: Counts, samples: _Samples, shown: str) -> Band:
     """Interpolate a band, each segment between kinks from its own samples."""
-    return Band(
-        k,
-        *(
-            _kind(k, kind, counts, samples, shown)
-            for kind in ((cells.A, cells.B) if k else (cells.A,))
-        ),
+    a, b = (
+        _kind(k, kind, counts, samples, shown) if kind == cells.A or k else None
+        for kind in (cells.A, cells.B)
     )
+    assert a is not None
+    return Band(k, a, b)
 
 
 def _kind(k: int, kind: int, counts: Counts, samples: _Samples, shown: str) -> NDArray[np.float32]:

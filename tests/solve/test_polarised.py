@@ -11,7 +11,7 @@ from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating
-from mitsuba_diffraction.tables.orders.polarised import mueller_of, nearest_pure
+from mitsuba_diffraction.tables.orders.polarised import mueller_of
 
 pytest.importorskip("gratinglab")
 
@@ -43,4 +43,4 @@ def test_shallow_gratings_polarise_as_the_small_slope_model_says(solver, materia
             expected = mueller(after @ small_slope(wi, wo, station.indices[0]) @ before)
             ratio = found[j, q] / found[j, q, 0, 0], expected / expected[0, 0]
             assert np.abs(ratio[0] - ratio[1]).max() < 1, (ratio, j, q)
-            print(j, q, found[j,q,0,0], np.abs(ratio[0] - ratio[1]).max())
+            print(j, q, found[j, q, 0, 0], np.abs(ratio[0] - ratio[1]).max())

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,7 +153,7 @@ def _grid(table: OrderTable, band: Band, counts: Counts) -> _Grid:
     return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w))
 
 
-def _resampled(table: OrderTable, band: Band, values: Array, grid: _Grid) -> Array:
+def _resampled(table: OrderTable, band: Band, values: NDArray[Any], grid: _Grid) -> Array:
     """Evaluate the polynomials of values (τ, ρ, w, j, q) at nodes of a band on a grid."""
     along_tau, along_rho = (
         cells.interpolation(known, places)

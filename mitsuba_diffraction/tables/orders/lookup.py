@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import DiffractionError
 from . import cells
 from .cells import Array, Cell
-from .polarised import MIRRORED, nearest_pure
+from .polarised import ODD, nearest_pure, smooth_elements
 from .table import Band, OrderTable
 
 
@@ -95,18 +96,15 @@ def mueller(
             "matrices"
         )
 
-    def of_kind(band: Band, kind: int) -> NDArray[np.float32]:
-        assert band.mueller is not None
-        matrices = band.mueller[kind]
-        return matrices.reshape(*matrices.shape[:-2], 16)
+    def of_kind(band: Band, kind: int) -> Array:
+        return smooth_elements(table, band, kind)
 
-    sides = {"from_below": from_below, "transmitted": transmitted}
-    elements = _values(table, x, y, wavelength, order, *sides.values(), of_kind, np.asarray)
-    pure = nearest_pure(
-        elements.reshape(*elements.shape[:-1], 4, 4),
-        efficiency(table, x, y, wavelength, order, **sides),
+    elements = _values(table, x, y, wavelength, order, from_below, transmitted, of_kind, np.asarray)
+    power = efficiency(
+        table, x, y, wavelength, order, from_below=from_below, transmitted=transmitted
     )
-    return np.where(np.asarray(y)[..., None, None] < 0.0, pure * MIRRORED, pure)
+    matrices = elements.reshape(*elements.shape[:-1], 4, 4)
+    return nearest_pure(matrices * np.where(ODD, np.asarray(y)[..., None, None], 1.0), power)
 
 
 def _values(
@@ -117,7 +115,7 @@ def _values(
     order: ArrayLike,
     from_below: bool,
     transmitted: bool,
-    of_kind: Callable[[Band, int], NDArray[np.float32]],
+    of_kind: Callable[[Band, int], NDArray[Any]],
     finish: Callable[[Array], Array],
 ) -> Array:
     """Interpolate values of an order, (…, n), 0 where it does not propagate.
@@ -151,7 +149,7 @@ def _values(
 
 
 def _polynomial(
-    nodes: NDArray[np.float32], cell: Cell, w: Array, here: NDArray[np.int64], first: int
+    nodes: NDArray[Any], cell: Cell, w: Array, here: NDArray[np.int64], first: int
 ) -> Array:
     """Return the rows of all ports of some lanes, (lanes, q, n); first : port of channel 0."""
     weights = [
