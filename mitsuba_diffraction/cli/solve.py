@@ -73,8 +73,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     group.add_argument(
         "--from-csv", action="store_true",
-        help="SOURCE is a long CSV of wavelength_nm, theta_deg, phi_deg, order, R_s, R_p; needs "
-        "--period",
+        help="SOURCE is a long CSV of wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one "
+        "angle of incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1), default=1,
