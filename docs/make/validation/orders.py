@@ -138,7 +138,7 @@ class Case:
             int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), [0.0]
         )
         channel = int(cell.channel)
-        power = solver.efficiencies(station)[0, channel].mean(axis=0).sum(axis=-1)
+        power = (np.abs(solver.amplitudes(station)[0, channel]) ** 2).mean(axis=0).sum(axis=-1)
         return {channel - q: float(value) for q, value in enumerate(power)}
 
 

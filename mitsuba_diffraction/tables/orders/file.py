@@ -3,8 +3,9 @@
 The variable `kind_a_K` holds kind A of band K, with the dimensions `tau_K`, `rho_K`, `w_K`, `j`,
 `q` and `polarisation` (s, p) of `Band.a`; `kind_b_K` holds kind B. Numbers are packed in 16 bits,
 as the CF conventions have it: efficiency = scale_factor × number. Global attributes hold the rest:
-`period` (µm), `wavelengths` (nm, in vacuum), `superstrate` (index), `header` (JSON), `version`, and
-`sha256` of all of these and the numbers.
+`period` (µm), `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose
+`j` and `q` are ports of `cells`; else left out), `header` (JSON), `version`, and `sha256` of all of
+these and the numbers.
 """
 
 from __future__ import annotations
@@ -59,13 +60,16 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
     header = json.dumps(dict(table.header), sort_keys=True)
     content = io.BytesIO()
     with netcdf_file(content, "w") as file:
-        file.title = "Efficiencies of the reflected orders of a grating"
+        file.title = "Efficiencies of the orders of a grating"
         setattr(file, MARK, np.int32(FORMAT_VERSION))
         file.period, file.period_units = np.float64(table.period), "um"
         file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
         file.superstrate = np.float64(table.superstrate)
         file.header = header
-        file.sha256 = _checksum(table.period, table.wavelengths, table.superstrate, header, packed)
+        if table.thin:
+            file.thin = np.int32(1)
+        outline = (table.period, tuple(table.wavelengths), table.superstrate, header)
+        file.sha256 = _checksum(outline, table.thin, packed)
         file.createDimension("polarisation", 2)
         for (k, kind), numbers in packed.items():
             names = [f"{axis}_{k}" for axis in ("tau", "rho", "w")]
@@ -125,14 +129,14 @@ def _table(file: Any) -> OrderTable:
     """Return the table of an open file."""
     period, superstrate = float(file.period), float(file.superstrate)
     low, high = (float(number) for number in file.wavelengths)
-    header = file.header.decode("utf-8")
+    header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     for name, variable in file.variables.items():
         _, kind, k = name.split("_")
         if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
             raise ValueError(f"{name} claims {variable.shape} numbers")
         packed[int(k), kind] = variable[:]
-    checksum = _checksum(period, (low, high), superstrate, header, packed)
+    checksum = _checksum((period, (low, high), superstrate, header), thin, packed)
     if file.sha256 != checksum.encode():
         raise ValueError("its checksum is that of another one")
     kinds = {
@@ -142,17 +146,18 @@ def _table(file: Any) -> OrderTable:
     bands = tuple(
         Band(k, kinds[k, "a"], kinds.get((k, "b"))) for k in sorted({k for k, _ in kinds})
     )
-    return OrderTable(period, (low, high), bands, superstrate, json.loads(header))
+    return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin)
 
 
 def _checksum(
-    period: float,
-    wavelengths: tuple[float, float],
-    superstrate: float,
-    header: str,
+    outline: tuple[float, tuple[float, ...], float, str],
+    thin: bool,
     packed: dict[tuple[int, str], NDArray[np.int16]],
 ) -> str:
-    content = hashlib.sha256(repr((period, tuple(wavelengths), superstrate, header)).encode())
+    """Return the checksum of period, wavelengths, superstrate and header, and the numbers."""
+    content = hashlib.sha256(repr(outline).encode())
+    if thin:
+        content.update(b"thin")
     for key in sorted(packed):
         content.update(repr((key, packed[key].shape)).encode())
         content.update(np.ascontiguousarray(packed[key], ">i2").data)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from . import cells
 from .cells import Array, B, largest_band, nodes
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
@@ -41,7 +42,8 @@ class Band:
     a : (τ, ρ, w, k + 1, k + 1, 2) float32, kind A: share of the light incident through channel j
         (fourth axis) that leaves through channel q (fifth), for incident light whose E, or B, lies
         along the grooves (last; s, or p, in light across them), summed over the polarisations of
-        the leaving light. Nodes are `cells.nodes`.
+        the leaving light. Nodes are `cells.nodes`. A sheet has ports instead of channels, twice as
+        many.
     b : (τ, ρ, w, k, k, 2) of kind B, with the same nodes; None for k = 0.
     """
 
@@ -76,7 +78,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OrderTable:
-    """Efficiencies of the reflected orders of a periodic profile, at nodes of smooth coordinates.
+    """Efficiencies of the orders of a periodic profile, at nodes of smooth coordinates.
 
     x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
     are those of `cells`.
@@ -92,6 +94,8 @@ class OrderTable:
     header : facts for people and programs, JSON: `solver`, `solver_version`, `settings`,
         `material`, `profile`; `error_mean` and `error_worst`, the measured error of interpolation
         as a share of the incident light.
+    thin : whether the profile is the upper side of a thin sheet, whose lower side is flat. The
+        table then has the light on both sides, at the ports of `cells`.
 
     Raises
     ------
@@ -105,6 +109,7 @@ class OrderTable:
     bands: tuple[Band, ...]
     superstrate: float = 1.0
     header: Mapping[str, Any] = field(default_factory=dict)
+    thin: bool = False
 
     # Set by the package, since look-ups and files build on this class
     efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
@@ -113,7 +118,7 @@ class OrderTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 
     def __post_init__(self) -> None:
-        check_outline(self.period, self.wavelengths, self.superstrate)
+        check_outline(self.period, self.wavelengths, self.superstrate, self.thin)
         expected = self.last_band + 1
         if [band.k for band in self.bands] != list(range(expected)):
             raise DiffractionError(
@@ -122,7 +127,7 @@ class OrderTable:
                 f"{self.superstrate:g}"
             )
         for band in self.bands:
-            _check_band(band)
+            _check_band(band, self.sides)
 
     @classmethod
     def mirror(
@@ -151,6 +156,11 @@ class OrderTable:
         return self.superstrate * self.period
 
     @property
+    def sides(self) -> int:
+        """Number of sides with light: 2 of a thin sheet, else 1."""
+        return 2 if self.thin else 1
+
+    @property
     def last_band(self) -> int:
         """Band of in-plane light of the shortest wavelength."""
         return largest_band(self.wavelengths, self.optical_period)
@@ -171,13 +181,14 @@ class OrderTable:
             for values in band.kinds:
                 unpolarised = values.mean(axis=-1)
                 # t becomes 1 − t, and channel j → q becomes last − q → last − j
-                reverse = np.flip(unpolarised, (0, 3, 4)).swapaxes(3, 4)
+                ports = cells.reversed_ports(values.shape[3], self.sides)
+                reverse = np.flip(unpolarised[..., ports, :][..., ports], 0).swapaxes(3, 4)
                 residuals.append(float(np.abs(unpolarised - reverse).max()))
         return max(residuals)
 
     @property
     def albedo(self) -> float:
-        """Mean over nodes and channels of the sum over orders, unpolarised."""
+        """Mean over nodes and channels of the sum over orders of all sides, unpolarised."""
         sums = [kind.sum(axis=-2).mean() for band in self.bands for kind in band.kinds]
         return float(np.mean(sums))
 
@@ -192,7 +203,7 @@ class OrderTable:
 
     @cached_property
     def _digest(self) -> str:
-        outline = [self.period, self.wavelengths, self.superstrate]
+        outline = [self.period, self.wavelengths, self.superstrate, self.thin]
         shapes = [kind.shape for band in self.bands for kind in band.kinds]
         content = hashlib.sha256(json.dumps([outline, shapes]).encode())
         for band in self.bands:
@@ -206,6 +217,7 @@ class OrderTable:
             "period_um": self.period,
             "wavelength_range_nm": list(self.wavelengths),
             "superstrate_index": self.superstrate,
+            "thin_sheet": self.thin,
             "bands": len(self.bands),
             "nodes": sorted({" x ".join(map(str, band.counts)) for band in self.bands}),
             "mean_albedo": round(self.albedo, 4),
@@ -217,13 +229,16 @@ class OrderTable:
     def __repr__(self) -> str:
         low, high = self.wavelengths
         medium = "" if self.superstrate == 1.0 else f" under index {self.superstrate:g}"
+        medium = ", thin sheet" if self.thin else medium
         return (
             f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
             f"{self.nbytes / 1e6:.1f} MB)"
         )
 
 
-def check_outline(period: float, wavelengths: Sequence[float], superstrate: float) -> None:
+def check_outline(
+    period: float, wavelengths: Sequence[float], superstrate: float, thin: bool = False
+) -> None:
     """Refuse a period, wavelengths or index of which there can be no table.
 
     Raises
@@ -241,6 +256,11 @@ def check_outline(period: float, wavelengths: Sequence[float], superstrate: floa
         )
     if not 1.0 <= superstrate <= 5.0:
         raise DiffractionError(f"superstrate={superstrate:g} must be an index of 1 to 5")
+    if thin and superstrate != 1.0:
+        raise DiffractionError(
+            f"superstrate={superstrate:g}: a thin sheet has the same medium on both sides; leave "
+            "the superstrate out, and give the sheet's index relative to that medium"
+        )
     if largest_band((low, high), superstrate * period) >= MOST_BANDS:
         raise DiffractionError(
             f"a period of {period:g} µm has over {MOST_BANDS} orders at {low:g} nm; solve orders "
@@ -248,7 +268,7 @@ def check_outline(period: float, wavelengths: Sequence[float], superstrate: floa
         )
 
 
-def _check_band(band: Band) -> None:
+def _check_band(band: Band, sides: int) -> None:
     tau, rho, w = band.counts
     if not 1 <= min(tau, rho, w) <= max(tau, rho, w) <= MOST_NODES:
         raise DiffractionError(
@@ -257,7 +277,8 @@ def _check_band(band: Band) -> None:
     if (band.b is None) != (band.k == 0):
         raise DiffractionError(f"band {band.k}: kind B must be there for all bands but band 0")
     for name, values, channels in zip("AB", band.kinds, (band.k + 1, band.k), strict=False):
-        expected = (tau, rho, w, channels, channels, 2)
+        ports = sides * channels
+        expected = (tau, rho, w, ports, ports, 2)
         if values.shape != expected or values.dtype != np.float32:
             raise DiffractionError(
                 f"band {band.k}, kind {name}: {values.dtype} of shape {values.shape}, expected "
