@@ -80,7 +80,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p; needs --period",
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
+        "more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
