@@ -149,7 +149,11 @@ def solve_orders(
             f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
             "tolerance, or fewer wavelengths"
         )
-    header |= {"error_mean": error.mean, "error_worst": error.most}
+    header |= {
+        "error_mean": error.mean,
+        "error_worst": error.most,
+        "processor_seconds": round(work.processor_seconds, 1),
+    }
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
     return OrderTable(profile.period, how.wavelengths, made, superstrate, header)
@@ -300,7 +304,7 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Complex], polarised:
         if polarised:
             excess = np.maximum(total.max(axis=-1), 1.0)[..., None, None]
             matrices.append(at_nodes(mueller_of) / excess)
-    return Band(band, kinds[0], kinds[1] if band else None, tuple(matrices) or None)
+    return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 
 def _powers(amplitudes: Complex) -> Real:

@@ -161,7 +161,7 @@ def _table(file: Any) -> OrderTable:
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
     matrices = [arrays[k, kind + _MUELLER] for kind in "ab" if (k, kind + _MUELLER) in arrays]
-    return Band(k, arrays[k, "a"], arrays.get((k, "b")), tuple(matrices) or None)
+    return Band(k, arrays[k, "a"], arrays.get((k, "b")), mueller=tuple(matrices) or None)
 
 
 def _checksum(

@@ -7,7 +7,7 @@ c is at least √(1 − 1/n²).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...optics.fresnel import reflectance
 from . import cells
 from .cells import Array
 from .lookup import clamped
-from .polarised import nearest_pure
+from .polarised import smooth_elements
 from .table import Band, Counts, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
@@ -49,13 +49,13 @@ class Corners(NamedTuple):
 
 
 class Matrices(NamedTuple):
-    """Mueller matrices on the even grids.
+    """Mueller matrices of the grating alone on the even grids.
 
     Attributes
     ----------
     starts : (2 × bands,) first record of kind A and B of each band.
-    values : (records, 16) float16, row by row, of each node (τ, ρ, w) and each pair (j, q). Under a
-        coat M₀₀ has the light that the coat's face sent back, which is taken to be depolarised.
+    values : (records, 16) float16, `polarised.smooth_elements` of each node (τ, ρ, w) and each pair
+        of ports (j, q).
     """
 
     starts: NDArray[np.uint32]
@@ -67,12 +67,10 @@ class Rows(NamedTuple):
 
     Attributes
     ----------
-    grating : of the grating alone.
-    within : with all reflections between the coat's face and the grating.
+    within : of the grating, with all reflections between the coat's face and the grating.
     through : times the face's transmittance towards q.
     """
 
-    grating: Array
     within: Array
     through: Array
 
@@ -80,41 +78,40 @@ class Rows(NamedTuple):
 def corners(table: OrderTable) -> Corners:
     """Resample a table for the renderer."""
     counts = _cells(table)
-    starts, parts, total = [], [], 0
-    for band in table.bands:
-        for kind in (cells.A, cells.B):
-            starts.append(total)
-            if kind == cells.B and band.b is None:
-                continue
-            of_kind = rows(table, band, kind, counts)
-            records = [_records(of_kind.within, counts)]
-            if table.superstrate != 1.0:
-                records.append(_records(of_kind.through, counts))
-            parts.append(np.concatenate(records, axis=-1))
-            total += len(parts[-1])
-    return Corners(counts, np.array(starts, np.uint32), np.concatenate(parts))
+
+    def records(band: Band, kind: int) -> NDArray[np.float16]:
+        of_kind = rows(table, band, kind, counts)
+        parts = [_records(of_kind.within, counts)]
+        if table.superstrate != 1.0:
+            parts.append(_records(of_kind.through, counts))
+        return np.concatenate(parts, axis=-1)
+
+    return Corners(counts, *_stacked(table, records))
 
 
 def matrices(table: OrderTable, counts: Counts) -> Matrices:
     """Resample the Mueller matrices of a polarised table on grids of so many cells."""
+
+    def records(band: Band, kind: int) -> NDArray[np.float16]:
+        elements = smooth_elements(table, band, kind)
+        even = _resampled(table, band, elements, _grid(table, band, counts))
+        return even.astype(np.float16).reshape(-1, 16)
+
+    return Matrices(*_stacked(table, records))
+
+
+def _stacked(
+    table: OrderTable, records: Callable[[Band, int], NDArray[np.float16]]
+) -> tuple[NDArray[np.uint32], NDArray[np.float16]]:
+    """Return the first record of each kind of each band, and all records."""
     starts, parts, total = [], [], 0
     for band in table.bands:
-        assert band.mueller is not None
         for kind in (cells.A, cells.B):
             starts.append(total)
-            if kind == cells.B and band.b is None:
-                continue
-            of_kind, known = rows(table, band, kind, counts), band.mueller[kind]
-            grid = _grid(table, band, counts)
-            elements = np.empty((*of_kind.grating.shape, 4, 4), np.float16)
-            for i, j in np.ndindex(4, 4):
-                elements[..., i, j] = _resampled(table, band, known[..., i, j], grid)
-            for n, layer in enumerate(elements):  # in parts, for want of memory
-                elements[n] = nearest_pure(layer.astype(np.float64), of_kind.grating[n])
-            elements[..., 0, 0] = of_kind.within
-            parts.append(elements.reshape(-1, 16))
-            total += len(parts[-1])
-    return Matrices(np.array(starts, np.uint32), np.concatenate(parts))
+            if kind == cells.A or band.b is not None:
+                parts.append(records(band, kind))
+                total += len(parts[-1])
+    return np.array(starts, np.uint32), np.concatenate(parts)
 
 
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
@@ -124,7 +121,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     summed = _resampled(table, band, unpolarised, grid)
     values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
-        return Rows(values, values, values)
+        return Rows(values, values)
     channels = np.arange(values.shape[-1])
     places = grid.tau[:, None, None, None], grid.rho[:, None, None]
     lam = grid.wavelength[..., None]
@@ -135,7 +132,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     back = _TRAPPED * (1.0 - through)
     repeated = np.eye(len(channels)) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
-    return Rows(values, within, within * np.maximum(through, _LEAST)[..., None, :])
+    return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
 
 
 class _Grid(NamedTuple):
@@ -154,15 +151,15 @@ def _grid(table: OrderTable, band: Band, counts: Counts) -> _Grid:
 
 
 def _resampled(table: OrderTable, band: Band, values: NDArray[Any], grid: _Grid) -> Array:
-    """Evaluate the polynomials of values (τ, ρ, w, j, q) at nodes of a band on a grid."""
+    """Evaluate the polynomials of values (τ, ρ, w, …) at nodes of a band on a grid."""
     along_tau, along_rho = (
         cells.interpolation(known, places)
         for known, places in zip(band.counts, grid[:2], strict=False)
     )
-    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, values, optimize=True)
+    summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
     at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
     along_w = cells.interpolation(band.counts.w, at)
-    return np.asarray(np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True))
+    return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True))
 
 
 def least_c(index: float) -> float:

@@ -54,7 +54,7 @@ class Band:
     k: int
     a: NDArray[np.float32]
     b: NDArray[np.float32] | None = None
-    mueller: tuple[NDArray[np.float32], ...] | None = None
+    mueller: tuple[NDArray[np.float32], ...] | None = field(default=None, kw_only=True)
 
     @property
     def counts(self) -> Counts:
