@@ -42,7 +42,7 @@ def run_in_blender(
     )  # fmt: skip
 
 
-def result_of(code: str, folder: Path, **values: Any) -> Any:
+def result_of(code: str, folder: Path, /, **values: Any) -> Any:
     """Run code in Blender, and return what it leaves in `result`, as JSON types.
 
     values : variables of the code, JSON types.
