@@ -38,7 +38,10 @@ _DIRECTIONS, _WAVELENGTHS = 32, 24
 class Solved:
     """Surface of a `diffraction_orders` BSDF; see `materials.Diffracting`."""
 
-    height_scale, largest_scale, stretch, coherent = 1.0, None, 1.0, False
+    height_scale: float = 1.0
+    largest_scale: float | None = None
+    stretch: float = 1.0
+    coherent: bool = False
 
     def __init__(self, bsdf: Any) -> None:
         self.bsdf = bsdf
