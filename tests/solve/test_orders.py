@@ -43,7 +43,7 @@ def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
 
 
 def test_few_nodes_are_chosen_for_smooth_efficiencies():
-    at = cells.nodes(24)[:, None, None]
+    at = cells.nodes(24)[:, None, None, None]
     smooth, rough = 1 + 0.1 * at**2, 1 + 0.1 / (1 + 900 * (at - 0.4) ** 2)
     assert count_for(smooth, 2, 1e-6) == 3
     assert count_for(rough, 2, 1e-3) > 12
@@ -141,6 +141,27 @@ def test_a_damaged_file_of_efficiencies_is_refused(lines, tmp_path, change, mess
     with pytest.raises(DiffractionError, match=message) as caught:
         md.read_orders(file, 0.5)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("theta", "phi"), [(0, 0), (20, 0), (-20, 0), (20, 180)])
+def test_one_direction_gives_its_efficiencies_to_all(theta, phi, tmp_path):
+    """As an efficiency curve over wavelength has them; θ below 0 is light from the other side."""
+    x = -np.sin(np.radians(theta)) * np.cos(np.radians(phi))
+    curve, rows = {-2: 0.03, -1: 0.2, 0: 0.3, 1: 0.4, 2: 0.04}, []
+    for lam in range(520, 641, 20):
+        orders = [m for m in curve if abs(x + m * lam / 800) < 1]
+        rows += [f"{lam},{theta},{phi},{m},{curve[m]},{curve[m] / 2}\n" for m in orders]
+    file = tmp_path / "curve.csv"
+    file.write_text(HEADER + "".join(rows))
+    with pytest.warns(md.DiffractionWarning, match="no light from some directions"):
+        table = md.read_orders(file, 0.8)
+    sine = np.linspace(-0.15, 0.15, 7) + x
+    for m in (order for order in curve if abs(x + order * 0.58 / 0.8) < 1):
+        inside = np.abs(sine + m * 0.58 / 0.8) < 0.99
+        s, p = table.polarised_efficiency(sine[inside], 0.0, 580.0, m).T
+        # polynomials through values that are constant, stored with 16 bits
+        np.testing.assert_allclose(s, curve[m], atol=2e-4)
+        np.testing.assert_allclose(p, curve[m] / 2, atol=2e-4)
 
 
 def test_sums_above_the_incident_light_are_refused(tmp_path):
