@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from ..solve.recipes import SolvedRecipe
     from ..tables.orders import OrderTable
 
+#: Options that an imported file does not have.
+_SOLVED_ONLY = (
+    "depth", "duty", "direction", "material", "wavelength_range", "tolerance", "solver",
+    "resolution", "jobs", "workers", "scheduler",
+)  # fmt: skip
+
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
@@ -34,7 +40,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "source", metavar="SOURCE",
         help="lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, undercut "
-        "allowed); a recipe (.toml); with --from-csv a file of efficiencies",
+        "allowed); a recipe (.toml); with --import a file of efficiencies",
     )  # fmt: skip
     options.add_output(parser, "the table; default: SOURCE's name with .nc", ".nc")
     group = parser.add_argument_group("the grating")
@@ -72,12 +78,13 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="points on the boundary, or harmonics; default: chosen by convergence",
     )  # fmt: skip
     group.add_argument(
-        "--from-csv", action="store_true",
-        help="SOURCE is a long CSV of wavelength_nm, theta_deg, phi_deg, order, R_s, R_p; needs "
-        "--period",
+        "--import", dest="imports", action="store_true",
+        help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
+        "more; needs --period",
     )  # fmt: skip
     parser.add_argument(
-        "--jobs", metavar="N", type=whole_number(1), default=1,
+        "--jobs", metavar="N", type=whole_number(1),
         help="processes here; default: 1",
     )  # fmt: skip
     add_workers(parser)
@@ -88,11 +95,10 @@ def run(args: argparse.Namespace) -> int:
     """Solve, write the table, and return the exit code."""
     source = Path(args.source)
     output = args.output or Path(f"{source.stem}.nc")
-    if args.from_csv:
+    if args.imports:
         from ..solve.measured import read_orders
 
-        if args.period is None:
-            args.parser.error("argument --from-csv: needs --period, µm")
+        _check_import(args)
         check_outputs([output], [source], "table")
         table = read_orders(source, args.period, superstrate=args.superstrate or 1.0)
     else:
@@ -109,6 +115,16 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {label:<11} {text}")
     save_report(args, {"file": str(output), **table.summary()})
     return 0
+
+
+def _check_import(args: argparse.Namespace) -> None:
+    """Refuse an import without its period, or with options of a solution."""
+    if args.period is None:
+        args.parser.error("argument --import: needs --period, µm")
+    for name in _SOLVED_ONLY:
+        if getattr(args, name) is not None:
+            option = name.replace("_", "-")
+            args.parser.error(f"argument --{option}: is for a solution; --import has efficiencies")
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
@@ -177,15 +193,20 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
 def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
     """Yield the processes that solve, and their number."""
     if on_workers(args):
-        if args.jobs > 1:
+        if args.jobs is not None:
             args.parser.error("argument --jobs: is for this machine; --workers has its own")
+        from ..cluster.workers import check_workers, executor_of
+
         with client_of(args) as client:
-            yield client.get_executor(), max(1, sum(client.nthreads().values()))
+            count = len(check_workers(client, None))
+            with executor_of(client) as workers:
+                yield workers, count
         return
     from ..solve.jobs import processes
 
-    with processes(args.jobs) as pool:
-        yield pool, args.jobs
+    jobs = args.jobs or 1
+    with processes(jobs) as pool:
+        yield pool, jobs
 
 
 def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:

@@ -7,8 +7,8 @@ The file is a long CSV with a header line and the columns
 one line for each propagating order of each light. The light comes from ωi = (sinθ cosφ, sinθ sinφ,
 cosθ), with x along the grating vector and y along the grooves, θ and φ within the superstrate, and
 order m leaves with x = mλ/d − sinθ cosφ. Wavelengths (in vacuum), θ and φ form a regular grid, and
-mirrored φ (φ and −φ) need not be listed. R_s and R_p are shares of the incident light, for light of
-s and of p polarisation.
+mirrored φ (φ and −φ) need not be listed. θ below 0 is light from the other side: φ + 180°. R_s and
+R_p are shares of the incident light, for light of s and of p polarisation.
 """
 
 from __future__ import annotations
@@ -36,13 +36,19 @@ COLUMNS = ("wavelength_nm", "theta_deg", "phi_deg", "order", "R_s", "R_p")
 COUNTS = Counts(12, 8, 4)
 #: Distance from grazing, in p, within which rounding decides whether an order propagates.
 _EDGE = 1e-6
+#: Decimals of s that tell directions apart.
+_DIGITS = 9
 
 
 class _Samples(NamedTuple):
-    """Light of the file in the coordinates of `cells`, (n,) each; efficiencies by order."""
+    """Light of the file in the coordinates of `cells`, (n,) each; efficiencies by order.
+
+    s : x/c, which one direction has at all wavelengths.
+    """
 
     cell: cells.Cell
     w: Real
+    s: Real
     powers: list[dict[int, tuple[float, float]]]
 
 
@@ -52,8 +58,9 @@ def read_orders(
     """Return the table of orders of a file of efficiencies; see the module for its columns.
 
     Where the file has light in the plane across the grooves alone (φ = 0), conical light gets the
-    efficiencies of the in-plane light with the same orders. That is exact for perfect conductors;
-    a warning says so.
+    efficiencies of the in-plane light with the same orders. That is exact for perfect conductors.
+    Directions that the file lacks, all but one perhaps, get the efficiencies of the nearest
+    direction in it, order by order. A warning says either.
 
     Parameters
     ----------
@@ -82,14 +89,19 @@ def read_orders(
     check_outline(period, wavelengths, superstrate)
     samples = _samples(lights, wavelengths, superstrate * period, shown)
     in_plane = all(math.isclose(math.sin(math.radians(phi)), 0, abs_tol=1e-9) for phi in axes[2])
-    if in_plane:
+    last = cells.largest_band(wavelengths, superstrate * period)
+    if _lacks_directions(samples, last):
+        warn(
+            f"{shown} has no light from some directions, which get the efficiencies of the nearest "
+            "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
+        )
+    elif in_plane:
         warn(
             f"{shown} has light across the grooves only (phi = 0): other light gets the same "
             "efficiencies, which is exact for perfect conductors alone"
         )
     counts = Counts(*COUNTS[:2], 1 if in_plane or len(axes[0]) == 1 else COUNTS.w)
-    last = cells.largest_band(wavelengths, superstrate * period)
-    bands = tuple(_band(k, counts, samples, shown) for k in range(last + 1))
+    bands = tuple(_band(k, counts, samples) for k in range(last + 1))
     header = {"solver": f"imported from {Path(path).name}", "material": "unknown",
               "profile": "unknown"}  # fmt: skip
     return OrderTable(period, wavelengths, bands, superstrate, header)
@@ -116,9 +128,9 @@ def _lights(
             raise DiffractionError(
                 f"{shown}, line {number}: expected numbers in {', '.join(COLUMNS)}"
             ) from error
-        if not (0 <= theta < 90 and lam > 0 and order == round(order) and abs(phi) <= 360):
+        if not (abs(theta) < 90 and lam > 0 and order == round(order) and abs(phi) <= 360):
             raise DiffractionError(
-                f"{shown}, line {number}: expected wavelength above 0, theta from 0 to below 90, "
+                f"{shown}, line {number}: expected wavelength above 0, theta between -90 and 90, "
                 f"phi from -360 to 360 and a whole order, got {lam:g}, {theta:g}, {phi:g}, "
                 f"{order:g}"
             )
@@ -162,41 +174,70 @@ def _samples(
                 raise DiffractionError(
                     f"{where}: the orders sum to {sum(values):.4g}, above {LARGEST_SUM}"
                 )
-    return _Samples(cell, w, list(lights.values()))
+    s = np.round(x / np.sqrt(1.0 - y * y), _DIGITS)
+    return _Samples(cell, w, s, list(lights.values()))
 
 
-def _band(k: int, counts: Counts, samples: _Samples, shown: str) -> Band:
-    """Interpolate a band, each segment between kinks from its own samples."""
-    return Band(
-        k,
-        *(
-            _kind(k, kind, counts, samples, shown)
-            for kind in ((cells.A, cells.B) if k else (cells.A,))
-        ),
+def _lacks_directions(samples: _Samples, last: int) -> bool:
+    """Whether some set of orders propagates in no light of the file, though its band is listed."""
+    cell = samples.cell
+    present = set(zip(cell.band.tolist(), cell.kind.tolist(), cell.channel.tolist(), strict=True))
+    return any(
+        (k, kind, j) not in present
+        for k in range(int(cell.band.min()), last + 1)
+        for kind in ((cells.A, cells.B) if k else (cells.A,))
+        for j in range(k + 1 - kind)
     )
 
 
-def _kind(k: int, kind: int, counts: Counts, samples: _Samples, shown: str) -> NDArray[np.float32]:
+def _band(k: int, counts: Counts, samples: _Samples) -> Band:
+    """Interpolate a band, each segment between kinks from its own samples."""
+    kinds = (cells.A, cells.B) if k else (cells.A,)
+    return Band(k, *(_kind(k, kind, counts, samples) for kind in kinds))
+
+
+def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.float32]:
     size, axes = k + 1 - kind, 2 if counts.w == 1 else 3
     grid = np.meshgrid(*(cells.nodes(count) for count in counts), indexing="ij")
     places = np.stack(grid, axis=-1)[..., :axes]
     values = np.zeros((*counts, size, size, 2))
     cell = samples.cell
     coordinates = np.stack([cell.tau, cell.rho, samples.w], axis=-1)[:, :axes]
+    several = len(np.unique(samples.s)) > 1
     for j in range(size):
         here = np.flatnonzero((cell.band == k) & (cell.kind == kind) & (cell.channel == j))
-        if len(here):
-            known = [[samples.powers[n].get(j - q, (0.0, 0.0)) for q in range(size)] for n in here]
-            values[:, :, :, j] = _interpolated(coordinates[here], np.array(known), places)
-        elif k < cell.band.min():
+        if k < cell.band.min():
             # nearer to the grooves' direction than all light of the file: a mirror
             values[:, :, :, j, j] = _mean_sum(samples, int(cell.band.min()))
+        elif len(here) and several:
+            known = [[samples.powers[n].get(j - q, (0.0, 0.0)) for q in range(size)] for n in here]
+            values[:, :, :, j] = _interpolated(coordinates[here], np.array(known), places)
         else:
-            raise DiffractionError(
-                f"{shown} has no light where {size} orders propagate (K from {k} to {k + 1}, kind "
-                f"{'AB'[kind]}, channel {j}); list theta in smaller steps, up to 85° or more"
-            )
+            big_k = k + cells.sine_squared(grid[1])
+            s = cells.from_cell(k, kind, j, grid[0], grid[1], 2e3 / big_k, 1.0).x  # at c = 1
+            for q in range(size):
+                values[:, :, :, j, q] = _of_nearest_direction(samples, j - q, s, big_k)
     return values.astype(np.float32)
+
+
+def _of_nearest_direction(samples: _Samples, order: int, s: Real, big_k: Real) -> Real:
+    """Return the efficiency of an order in the light of the file nearest in s, at the same K.
+
+    s, big_k : of one shape (…). Returns (…, 2), of s and p.
+    """
+    listed = np.unique(samples.s)
+    nearest = np.abs(s[..., None] - listed).argmin(axis=-1)
+    values = np.zeros((*s.shape, 2))
+    for number in np.unique(nearest):
+        light = np.flatnonzero(samples.s == listed[number])
+        light = light[np.argsort(samples.cell.k_continuous[light])]
+        powers = np.array([samples.powers[n].get(order, (0.0, 0.0)) for n in light])
+        here = nearest == number
+        for polarisation in (0, 1):
+            values[here, polarisation] = np.interp(
+                big_k[here], samples.cell.k_continuous[light], powers[:, polarisation]
+            )
+    return values
 
 
 def _mean_sum(samples: _Samples, band: int) -> Real:

@@ -140,7 +140,11 @@ def solve_orders(
             f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
             "tolerance, or fewer wavelengths"
         )
-    header |= {"error_mean": error.mean, "error_worst": error.most}
+    header |= {
+        "error_mean": error.mean,
+        "error_worst": error.most,
+        "processor_seconds": round(work.processor_seconds, 1),
+    }
     return OrderTable(profile.period, how.wavelengths, made, superstrate, header)
 
 

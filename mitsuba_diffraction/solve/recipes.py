@@ -17,12 +17,11 @@ Paths are relative to the recipe.
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import inspect
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -118,26 +117,6 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     if "depth" not in arguments:
         raise DiffractionError(f"profile {name!r} needs its depth in µm")
     return make(**arguments)
-
-
-def refuse_solved(paths: Iterable[Path]) -> None:
-    """Refuse recipes with `method = "solved"`, which are no recipes of a model's table.
-
-    Raises
-    ------
-    DiffractionError
-        If there is one; files that cannot be read are left to their reader.
-    """
-    for path in paths:
-        with contextlib.suppress(tomllib.TOMLDecodeError, DiffractionError):
-            method = tomllib.loads(read_text(path)).get("method")
-            if method == "solved":
-                break
-    else:
-        return
-    raise DiffractionError(
-        f"'{path}' is a recipe of solved orders; run solve instead of precompute"
-    )
 
 
 def _settings(content: Mapping[str, Any]) -> Settings:

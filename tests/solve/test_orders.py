@@ -143,6 +143,27 @@ def test_a_damaged_file_of_efficiencies_is_refused(lines, tmp_path, change, mess
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("theta", "phi"), [(0, 0), (20, 0), (-20, 0), (20, 180)])
+def test_one_direction_gives_its_efficiencies_to_all(theta, phi, tmp_path):
+    """As an efficiency curve over wavelength has them; θ below 0 is light from the other side."""
+    x = -np.sin(np.radians(theta)) * np.cos(np.radians(phi))
+    curve, rows = {-2: 0.03, -1: 0.2, 0: 0.3, 1: 0.4, 2: 0.04}, []
+    for lam in range(520, 641, 20):
+        orders = [m for m in curve if abs(x + m * lam / 800) < 1]
+        rows += [f"{lam},{theta},{phi},{m},{curve[m]},{curve[m] / 2}\n" for m in orders]
+    file = tmp_path / "curve.csv"
+    file.write_text(HEADER + "".join(rows))
+    with pytest.warns(md.DiffractionWarning, match="no light from some directions"):
+        table = md.read_orders(file, 0.8)
+    sine = np.linspace(-0.15, 0.15, 7) + x
+    for m in (order for order in curve if abs(x + order * 0.58 / 0.8) < 1):
+        inside = np.abs(sine + m * 0.58 / 0.8) < 0.99
+        s, p = table.polarised_efficiency(sine[inside], 0.0, 580.0, m).T
+        # polynomials through values that are constant, stored with 16 bits
+        np.testing.assert_allclose(s, curve[m], atol=2e-4)
+        np.testing.assert_allclose(p, curve[m] / 2, atol=2e-4)
+
+
 def test_sums_above_the_incident_light_are_refused(tmp_path):
     file = tmp_path / "bench.csv"
     file.write_text(HEADER + "600,0,0,0,0.6,0.6\n600,0,0,1,0.3,0.5\n600,0,0,-1,0.3,0.5\n")
