@@ -17,7 +17,7 @@ from scipy.linalg import block_diag, toeplitz
 
 from ..errors import DiffractionError
 from .profiles import Profile
-from .stations import LEAST_INNER, Real, Station
+from .stations import LEAST_NORMAL, Real, Station
 
 Complex = NDArray[Any]
 
@@ -251,7 +251,7 @@ class _Side(NamedTuple):
 
     @property
     def _lit(self) -> NDArray[np.bool_]:
-        return np.asarray(self._square > (LEAST_INNER * self.index) ** 2)
+        return np.asarray(self._square > (LEAST_NORMAL * self.index) ** 2)
 
 
 def _toeplitz(n: int, outside: complex, inside: complex, filled: Real) -> Complex:

@@ -33,7 +33,7 @@ from scipy.linalg import solve as solve_linear
 
 from ..errors import DiffractionError
 from .profiles import Profile
-from .stations import LEAST_INNER, Complex, Real, Station
+from .stations import LEAST_NORMAL, Complex, Real, Station
 
 #: Order of the mesh graded towards corners, which gratinglab recommends (Kress 1990).
 GRADING = 4
@@ -227,7 +227,7 @@ class _InnerWaves:
     def __init__(self, boundary: Any, waves: _Waves, k: complex, period: float) -> None:
         self.alpha = waves.inside
         square = k.real**2 - self.alpha**2
-        self._lit = square > (LEAST_INNER * k.real) ** 2
+        self._lit = square > (LEAST_NORMAL * k.real) ** 2
         self._gamma = gamma = np.sqrt(np.where(self._lit, square, k.real**2))
         x, y, nx, ny = (v[:, None] for v in (boundary.x, boundary.y, boundary.nx, boundary.ny))
         self.trace = np.exp(1j * (self.alpha * x + gamma * y))

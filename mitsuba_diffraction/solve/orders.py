@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from .profiles import Profile
 from .resolution import (
     chosen_resolution,
     coarsest,
+    energy_error,
     reciprocity_error,
     resolution_error,
 )
@@ -33,6 +35,8 @@ WORST = 4.0
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
+#: Least index of a thin sheet: orders of light that goes through depend on n − 1.
+LEAST_INDEX = 1.01
 #: Random directions and wavelengths at which the error is measured.
 SAMPLES = 128
 
@@ -87,17 +91,20 @@ def solve_orders(
     material: str | float | complex | Material = "Al",
     *,
     superstrate: float = 1.0,
+    thin: bool = False,
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] | None = None,
 ) -> OrderTable:
-    """Solve the reflected orders of a grating for all directions and wavelengths.
+    """Solve the orders of a grating for all directions and wavelengths.
 
     Parameters
     ----------
     profile : one period of the grooves, from `solve.profiles`.
     material : a name that Mitsuba knows, an index n + ik, or "none" for a perfect conductor.
     superstrate : index of the clear medium above.
+    thin : whether the material is a thin sheet, whose lower side is flat: the table then has the
+        light on both sides (`sheet`). Otherwise it has the reflected orders.
     settings : wavelengths, tolerance, method.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
@@ -110,8 +117,15 @@ def solve_orders(
     """
     how, work = settings or Settings(), jobs or Jobs()
     tell = announce or _silent
-    check_outline(profile.period, how.wavelengths, superstrate)
-    grating = Grating(profile, material_of(material, how.wavelengths), superstrate, how.wavelengths)
+    check_outline(profile.period, how.wavelengths, superstrate, thin)
+    substance = material_of(material, how.wavelengths)
+    index = substance.index(how.wavelengths)
+    if thin and (index is None or index.imag.any() or index.real.min() < LEAST_INDEX):
+        raise DiffractionError(
+            f"material {substance.name}: light goes through a thin sheet of a clear material only; "
+            f"give its index, a real number of {LEAST_INDEX:g} to 5, such as 1.58"
+        )
+    grating = Grating(profile, substance, superstrate, how.wavelengths, thin)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
     coarse = replace(problem, resolution=how.resolution or coarsest(problem))
@@ -127,12 +141,12 @@ def solve_orders(
         "solver": solver_of(problem).name,
         "material": grating.material.name,
         "profile": profile.name,
-        "reciprocity_error": _reciprocity(problem, work, bands),
+        **_checks(problem, work, bands, solved),
         "solver_error": solver_error,
         "tolerance": how.tolerance,
     }
-    made = tuple(_band(band, counts[band], solved) for band in bands)
-    table = OrderTable(profile.period, how.wavelengths, made, superstrate, header)
+    made = tuple(_band(band, counts[band], solved, grating.sides) for band in bands)
+    table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
     error = measured_error(table, problem, work)
     if error.mean > how.tolerance or error.most > WORST * how.tolerance:
         raise DiffractionError(
@@ -145,7 +159,7 @@ def solve_orders(
         "error_worst": error.most,
         "processor_seconds": round(work.processor_seconds, 1),
     }
-    return OrderTable(profile.period, how.wavelengths, made, superstrate, header)
+    return OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
 
 
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
@@ -166,11 +180,14 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     missed, light = np.zeros(SAMPLES), np.zeros(SAMPLES)
     for n, place in enumerate(places):
         j = int(cell.channel[n])
-        truth = solved[place][0, j].mean(axis=0).sum(axis=-1)  # (q,)
-        orders = j - np.arange(len(truth))
-        got = table.efficiency(x[n], y[n], lam[n], orders)
+        side, count = n % table.sides, int(cell.channels[n])  # from above and below by turns
+        truth = solved[place][0, side * count + j].mean(axis=0).sum(axis=-1)  # (ports,)
+        orders = j - np.arange(count)
+        light_of = partial(table.efficiency, x[n], y[n], lam[n], orders, from_below=side == 1)
+        got = np.concatenate([light_of(transmitted=other != side) for other in range(table.sides)])
+        orders = np.tile(orders, table.sides)
         # where order 0 is alone, it is the colour
-        coloured = orders != 0 if len(orders) > 1 else np.array([True])
+        coloured = orders != 0 if count > 1 else np.ones(len(orders), bool)
         missed[n], light[n] = np.abs(got - truth)[coloured].sum(), truth[coloured].sum()
     floor = 0.05 * light.mean()  # directions with hardly any light in orders
     return Measured(
@@ -195,7 +212,13 @@ def _counts(
     # three variables share the tolerance; rarely seen bands may miss more
     shares = _band_shares(problem.grating, len(drawn))
     return {
-        band: _count(of_band, most, solved, tolerance / np.sqrt(3 * len(drawn) * share))
+        band: _count(
+            of_band,
+            most,
+            solved,
+            tolerance / np.sqrt(3 * len(drawn) * share),
+            problem.grating.sides,
+        )
         for (band, of_band), share in zip(drawn.items(), shares, strict=True)
     }
 
@@ -221,7 +244,7 @@ def _diffuse(count: int, wavelengths: tuple[float, float]) -> tuple[Real, Real, 
 
 
 def _count(
-    drawn: Sequence[Line], most: Counts, solved: Mapping[Place, Real], error: float
+    drawn: Sequence[Line], most: Counts, solved: Mapping[Place, Real], error: float, sides: int
 ) -> Counts:
     """Return the numbers of nodes that all lines of a band need."""
     needed = [1 if size == 1 else least for size, least in zip(most, FEWEST, strict=True)]
@@ -230,11 +253,11 @@ def _count(
             continue
         values = [solved[place] for place in line.places]
         if line.axis == 0:
-            values += [reversed_light(value) for value in reversed(values)]
+            values += [reversed_light(value, sides) for value in reversed(values)]
         # (nodes, j, q), unpolarised; order 0 is no colour, and is left out
         along = np.concatenate(values).sum(axis=-1).mean(axis=2)
-        if along.shape[1] > 1:
-            along *= 1.0 - np.eye(along.shape[1])
+        if (channels := along.shape[1] // sides) > 1:
+            along *= 1.0 - np.tile(np.eye(channels), (sides, sides))
         needed[line.axis] = max(needed[line.axis], count_for(along, FEWEST[line.axis], error))
     return Counts(*needed)
 
@@ -251,11 +274,11 @@ def _places(band: int, counts: Counts) -> list[Place]:
     ]
 
 
-def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
+def _band(band: int, counts: Counts, solved: Mapping[Place, Real], sides: int) -> Band:
     """Return the efficiencies of a band from those of its stations."""
     kinds = []
     for kind in (cells.A, cells.B) if band else (cells.A,):
-        size = band + 1 - kind
+        size = sides * (band + 1 - kind)
         values = np.empty((*counts, size, size, 2), np.float32)
         places = iter(place for place in _places(band, counts) if place.kind == kind)
         for n in range((counts.tau + 1) // 2):
@@ -263,7 +286,7 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
                 of_place = solved[next(places)]
                 # (w, j, 2, q, 2) to (w, j, q, 2): the sum over the leaving light's polarisations
                 values[n, m] = of_place.sum(axis=-1).swapaxes(2, 3)
-                back = reversed_light(of_place).sum(axis=-1).swapaxes(2, 3)
+                back = reversed_light(of_place, sides).sum(axis=-1).swapaxes(2, 3)
                 opposite = counts.tau - 1 - n
                 values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
         total = values.sum(axis=-2, keepdims=True)
@@ -276,14 +299,19 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
     return Band(band, *kinds)
 
 
-def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
-    """Return the largest violation of reciprocity in any band; see `resolution`."""
+def _checks(
+    problem: Problem, jobs: Jobs, bands: Iterable[int], solved: Mapping[Place, Real]
+) -> dict[str, float]:
+    """Return the largest violations of reciprocity, in any band, and of a sheet's energy."""
     places = [
         Place(band, kind, 0.5, 0.41, (0.5,))
         for band in bands
         for kind in ((cells.A, cells.B) if band else (cells.A,))
     ]
-    return reciprocity_error(jobs.solve(problem, places, "checking reciprocity"))
+    thin = problem.grating.thin
+    one_way = reciprocity_error(jobs.solve(problem, places, "checking reciprocity"), thin)
+    energy = {"energy_error": energy_error(solved.values())} if thin else {}
+    return {"reciprocity_error": one_way, **energy}
 
 
 def _announce(

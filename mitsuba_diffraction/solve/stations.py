@@ -24,9 +24,9 @@ Number = TypeVar("Number", np.float64, np.complex128)
 #: There solvers lose digits as 1/cosine, and diffuse light has 1e-3 of its power. Stations beyond
 #: have the efficiencies of this cosine.
 LEAST_COSINE = 0.03
-#: Least normal part of a wave vector within a sheet, over the index: solvers lose digits as well,
-#: and such waves have next to no light.
-LEAST_INNER = 0.01
+#: Least normal part of the wave vector of a wave that counts as propagating, over its length; below
+#: that of all channels outside. Of light in less slanted waves it has some 1e-3.
+LEAST_NORMAL = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,11 @@ class Grating:
     def optical_period(self) -> float:
         """Period times the superstrate's index, µm."""
         return self.superstrate * self.profile.period
+
+    @property
+    def sides(self) -> int:
+        """Number of sides with light: 2 of a thin sheet, else 1."""
+        return 2 if self.thin else 1
 
     @property
     def is_perfect(self) -> bool:
