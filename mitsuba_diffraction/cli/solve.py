@@ -239,7 +239,7 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         )
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
-        yield "energy", f"R + T is 1 within {facts['energy_error']:.2g}"
+        yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"
 
 
 def _pair(text: str) -> tuple[float, float]:

@@ -302,7 +302,7 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Real], sides: int) -
 def _checks(
     problem: Problem, jobs: Jobs, bands: Iterable[int], solved: Mapping[Place, Real]
 ) -> dict[str, float]:
-    """Return the largest violations of reciprocity, in any band, and of a sheet's energy."""
+    """Return the largest violation of reciprocity, in any band, and a sheet's of energy."""
     places = [
         Place(band, kind, 0.5, 0.41, (0.5,))
         for band in bands
