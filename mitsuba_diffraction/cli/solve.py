@@ -78,6 +78,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="points on the boundary, or harmonics; default: chosen by convergence",
     )  # fmt: skip
     group.add_argument(
+        "--polarised", action="store_true", default=None,
+        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+    )  # fmt: skip
+    group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
         "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
@@ -150,6 +154,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         for field, value in (
             ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
             ("method", args.solver), ("resolution", args.resolution),
+            ("polarised", args.polarised),
         )
         if value is not None
     }  # fmt: skip
@@ -228,6 +233,8 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
                 f"{facts['error_worst']:.2%} in 95 % of directions"
             ),
         )
+        if table.polarised:
+            yield "", f"{facts['error_polarised']:.2%} with its polarisation"
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
 
 

@@ -41,7 +41,7 @@ def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
 
 
 def test_few_nodes_are_chosen_for_smooth_efficiencies():
-    at = cells.nodes(24)[:, None, None]
+    at = cells.nodes(24)[:, None, None, None]
     smooth, rough = 1 + 0.1 * at**2, 1 + 0.1 / (1 + 900 * (at - 0.4) ** 2)
     assert count_for(smooth, 2, 1e-6) == 3
     assert count_for(rough, 2, 1e-3) > 12
