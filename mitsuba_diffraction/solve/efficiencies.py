@@ -30,6 +30,7 @@ from scipy.io import netcdf_file
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
 from ..files import read_bytes, read_text
+from ..tables.orders.file import is_order_table
 from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
 from .stations import Real
 
@@ -91,6 +92,8 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     """
     shown = repr(os.fspath(path))
     head = read_bytes(path)[: len(_BEGINS_HDF5)]
+    if is_order_table(path):
+        raise DiffractionError(f"{shown} is a table of orders already; use it as it is")
     if head.startswith(b"CDF") or head == _BEGINS_HDF5:
         try:
             variables = _hdf5(path) if head == _BEGINS_HDF5 else _classic(path)
