@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "thin", "wavelength_range", "tolerance", "solver",
-    "resolution", "jobs", "workers", "scheduler",
+    "resolution", "polarised", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -84,10 +84,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="points on the boundary, or harmonics; default: chosen by convergence",
     )  # fmt: skip
     group.add_argument(
+        "--polarised", action="store_true", default=None,
+        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+    )  # fmt: skip
+    group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
-        "more; needs --period",
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
+        "incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
@@ -149,6 +153,10 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
+        if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
+            args.parser.error(
+                f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
+            )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
     changed = {
@@ -156,6 +164,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         for field, value in (
             ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
             ("method", args.solver), ("resolution", args.resolution),
+            ("polarised", args.polarised),
         )
         if value is not None
     }  # fmt: skip
@@ -237,6 +246,8 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
                 f"{facts['error_worst']:.2%} in 95 % of directions"
             ),
         )
+        if table.polarised:
+            yield "", f"{facts['error_polarised']:.2%} with its polarisation"
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
         yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"

@@ -7,6 +7,7 @@
     thin = true                     # light goes through: a sheet of a clear material; default false
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
+    polarised = true                # with Mueller matrices; default false
     output = "tables/cd.nc"
 
     [arguments]                     # of the profile
@@ -34,7 +35,7 @@ from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
     "method", "profile", "material", "superstrate", "thin", "wavelengths", "tolerance", "solver",
-    "resolution", "output", "arguments",
+    "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -123,10 +124,10 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
 
 
 def _flag(content: Mapping[str, Any], name: str) -> bool:
-    """Return a key that is true or false."""
+    """Return a key that is true or false; false without it."""
     value = content.get(name, False)
     if not isinstance(value, bool):
-        raise DiffractionError(f"{name} = {quoted(value)} must be true or false")
+        raise DiffractionError(f"{name} = {quoted(value)}: must be true or false")
     return value
 
 
@@ -138,4 +139,5 @@ def _settings(content: Mapping[str, Any]) -> Settings:
         float(content.get("tolerance", default.tolerance)),
         str(content.get("solver", default.method)),
         content.get("resolution", default.resolution),
+        _flag(content, "polarised"),
     )

@@ -52,7 +52,7 @@ def chosen_resolution(
         excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
         if problem.grating.thin:  # which loses no light either
             excess = energy_error(values.values())
-        one_way = reciprocity_error(values, problem.grating.thin)
+        one_way = reciprocity_error(values, problem.grating.sides)
         allowed = max(_EXCESS, 0.1 * tolerance)
         if error <= tolerance and excess <= allowed and one_way <= 2 * tolerance:
             return Chosen(coarse, error)
@@ -99,14 +99,14 @@ def _test_places(bands: Sequence[int]) -> list[Place]:
     ]
 
 
-def reciprocity_error(solved: Mapping[Place, Real], thin: bool) -> float:
+def reciprocity_error(solved: Mapping[Place, Real], sides: int) -> float:
     """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
 
     They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
     light of one channel, summed over the outgoing ones.
     """
     differences = [
-        np.abs(values - reversed_light(values, 2 if thin else 1))
+        np.abs(values - reversed_light(values, sides))
         for place, values in solved.items()
         if place.tau == 0.5
     ]
