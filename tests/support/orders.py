@@ -10,6 +10,8 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.boundary import jones_matrix, mueller, turn
+from mitsuba_diffraction.optics.fresnel import amplitudes
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions
@@ -61,6 +63,49 @@ def thin_grating(
     )
     header = {"profile": "thin sinusoid"}
     return OrderTable(period, wavelengths, bands, superstrate, header, thin)
+
+
+def fresnel_mirror(
+    index: complex,
+    period: float = 0.6,
+    wavelengths: tuple[float, float] = (500.0, 600.0),
+    counts: Counts = Counts(14, 10, 4),  # noqa: B008 - immutable
+    superstrate: float = 1.0,
+) -> OrderTable:
+    """A polarised table of a flat surface, whose Jones matrices are Fresnel's.
+
+    index : over that of the superstrate.
+    """
+    optical = superstrate * period
+
+    def matrices(k: int, kind: int) -> np.ndarray:
+        channels = np.arange(k + 1 - kind)
+        tau, rho, w = (cells.nodes(n) for n in counts)
+        tau, rho, w = (part[..., None] for part in np.meshgrid(tau, rho, w, indexing="ij"))
+        lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, optical)
+        at = cells.from_cell(k, kind, channels, tau, rho, lam, optical)
+        z = np.sqrt(np.maximum(1.0 - at.x**2 - at.y**2, 0.0))
+        down, up = np.stack([at.x, at.y, -z], axis=-1), np.stack([at.x, at.y, z], axis=-1)
+        s = np.stack([-at.y, at.x, 0.0 * z], axis=-1) / np.hypot(at.x, at.y)[..., None]
+        r_s, r_p = amplitudes(z, index)
+        fresnel = jones_matrix(ss=r_s, sp=0.0 * z, ps=0.0 * z, pp=r_p)
+        turned = turn(groove_axis(up), s, up) @ fresnel @ turn(s, groove_axis(down), down)
+        return mueller(turned)[..., :, None, :, :] * np.eye(len(channels))[:, :, None, None]
+
+    bands = []
+    for k in range(cells.largest_band(wavelengths, optical) + 1):
+        of_kinds = [matrices(k, kind) for kind in ((cells.A, cells.B) if k else (cells.A,))]
+        first = [of_kind[..., 0, :2] for of_kind in of_kinds]
+        powers = [np.stack([m[..., 0] + m[..., 1], m[..., 0] - m[..., 1]], -1) for m in first]
+        singles = [[part.astype(np.float32) for part in parts] for parts in (powers, of_kinds)]
+        bands.append(Band(k, *singles[0], mueller=tuple(singles[1])))
+    return OrderTable(period, wavelengths, tuple(bands), superstrate, {"profile": "flat"})
+
+
+def groove_axis(direction: Array) -> Array:
+    """y made perpendicular to directions (…, 3)."""
+    across = np.array([0.0, 1.0, 0.0]) - direction[..., 1:2] * direction
+    return across / np.linalg.norm(across, axis=-1, keepdims=True)
 
 
 def load(table: Any, **parameters: Any) -> Any:
