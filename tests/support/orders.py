@@ -10,8 +10,7 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.boundary import jones_matrix, mueller, turn
-from mitsuba_diffraction.optics.fresnel import amplitudes
+from mitsuba_diffraction.optics.boundary import mueller, polarisation_axes, small_slope, turn
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions
@@ -65,16 +64,18 @@ def thin_grating(
     return OrderTable(period, wavelengths, bands, superstrate, header, thin)
 
 
-def fresnel_mirror(
+def shallow_grating(
     index: complex,
+    strength: float = 0.0,
+    counts: Counts = Counts(20, 12, 4),  # noqa: B008 - immutable
+    superstrate: float = 1.0,
     period: float = 0.6,
     wavelengths: tuple[float, float] = (500.0, 600.0),
-    counts: Counts = Counts(14, 10, 4),  # noqa: B008 - immutable
-    superstrate: float = 1.0,
 ) -> OrderTable:
-    """A polarised table of a flat surface, whose Jones matrices are Fresnel's.
+    """A polarised table of the first-order small-slope model: a mirror with weak orders ±1.
 
     index : over that of the superstrate.
+    strength : amplitude of orders ±1, over the root of both cosines and the boundary's matrix.
     """
     optical = superstrate * period
 
@@ -82,15 +83,18 @@ def fresnel_mirror(
         channels = np.arange(k + 1 - kind)
         tau, rho, w = (cells.nodes(n) for n in counts)
         tau, rho, w = (part[..., None] for part in np.meshgrid(tau, rho, w, indexing="ij"))
-        lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, optical)
-        at = cells.from_cell(k, kind, channels, tau, rho, lam, optical)
+        big_k = k + cells.sine_squared(rho)
+        lam = cells.wavelength_of(big_k, w, wavelengths, optical)
+        longest = 2e3 * optical / big_k * np.sqrt(1.0 - cells.LEAST_ALONG**2)
+        at = cells.from_cell(k, kind, channels, tau, rho, np.minimum(lam, longest), optical)
         z = np.sqrt(np.maximum(1.0 - at.x**2 - at.y**2, 0.0))
-        down, up = np.stack([at.x, at.y, -z], axis=-1), np.stack([at.x, at.y, z], axis=-1)
-        s = np.stack([-at.y, at.x, 0.0 * z], axis=-1) / np.hypot(at.x, at.y)[..., None]
-        r_s, r_p = amplitudes(z, index)
-        fresnel = jones_matrix(ss=r_s, sp=0.0 * z, ps=0.0 * z, pp=r_p)
-        turned = turn(groove_axis(up), s, up) @ fresnel @ turn(s, groove_axis(down), down)
-        return mueller(turned)[..., :, None, :, :] * np.eye(len(channels))[:, :, None, None]
+        wi, wo = (np.stack([sign * at.x, sign * at.y, z], axis=-1) for sign in (-1.0, 1.0))
+        wi, wo = wi[..., :, None, :], wo[..., None, :, :]
+        jones = groove_matrices(wi, wo, small_slope(wi, wo, index))
+        first = strength * np.sqrt(z[..., :, None] * z[..., None, :])
+        order = np.abs(channels[:, None] - channels)
+        factor = np.select([order == 0, order == 1], [1.0, first], 0.0)
+        return mueller(factor[..., None, None] * jones)
 
     bands = []
     for k in range(cells.largest_band(wavelengths, optical) + 1):
@@ -99,7 +103,13 @@ def fresnel_mirror(
         powers = [np.stack([m[..., 0] + m[..., 1], m[..., 0] - m[..., 1]], -1) for m in first]
         singles = [[part.astype(np.float32) for part in parts] for parts in (powers, of_kinds)]
         bands.append(Band(k, *singles[0], mueller=tuple(singles[1])))
-    return OrderTable(period, wavelengths, tuple(bands), superstrate, {"profile": "flat"})
+    return OrderTable(period, wavelengths, tuple(bands), superstrate, {"profile": "shallow"})
+
+
+def groove_matrices(wi: Array, wo: Array, jones: Array) -> Array:
+    """Jones matrices about the axes of tables, from those about s and p."""
+    s_in, s_out = polarisation_axes(wi, wo)
+    return turn(groove_axis(wo), s_out, wo) @ jones @ turn(s_in, groove_axis(wi), -wi)
 
 
 def groove_axis(direction: Array) -> Array:
