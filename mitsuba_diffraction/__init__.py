@@ -16,6 +16,7 @@ glsl               the realtime renderer
 design             patches from their BRDF, reliefs for given colours
 shader_comparison  comparison of the shaders with the path tracer
 cluster            rendering on many processes and machines
+osl                shaders for Blender's Cycles
 web                pages that show a scene in a browser or a notebook
 spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
@@ -53,7 +54,7 @@ from .tables import DiffractionTable  # noqa: E402
 from .tables.orders import OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
-    from . import cluster
+    from . import cluster, osl
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
@@ -79,6 +80,7 @@ __all__ = [
     "gratings",
     "hologram",
     "maps",
+    "osl",
     "period_fit",
     "profiles",
     "read_orders",
@@ -96,6 +98,7 @@ _ON_DEMAND = {
     "design": "analysis.design",
     "glsl": "realtime.glsl",
     "maps": "analysis.maps",
+    "osl": "osl",
     "period_fit": "thesis.period_fit",
     "profiles": "solve.profiles",
     "shader_comparison": "realtime.shader_comparison",

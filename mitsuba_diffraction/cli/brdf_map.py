@@ -272,7 +272,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
-    from ..plugin.orders.bsdf import DiffractionOrders
+    from ..plugin.orders.sheet import diffraction_orders
     from ..tables.orders.file import is_order_table
 
     parameters = surface_parameters(args)
@@ -285,7 +285,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     source = "table" if solved else "heightfield"
     for name, value in {source: str(args.source), **settings, **parameters}.items():
         props[name] = value
-    return DiffractionOrders(props) if solved else Diffraction(props)
+    return diffraction_orders(props) if solved else Diffraction(props)
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:

@@ -49,10 +49,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Build one table, or those of several recipes, and return the exit code."""
     from ..heights.read import is_recipe
-    from ..solve.recipes import refuse_solved
 
     recipes = [source for source in args.sources if is_recipe(source)]
-    refuse_solved(recipes)
     if not recipes:
         save_report(args, _precompute(args.sources, args))
         return 0

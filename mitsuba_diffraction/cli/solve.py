@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from ..solve.recipes import SolvedRecipe
     from ..tables.orders import OrderTable
 
+#: Options that an imported file does not have.
+_SOLVED_ONLY = (
+    "depth", "duty", "direction", "material", "wavelength_range", "tolerance", "solver",
+    "resolution", "polarised", "jobs", "workers", "scheduler",
+)  # fmt: skip
+
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
@@ -34,7 +40,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "source", metavar="SOURCE",
         help="lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, undercut "
-        "allowed); a recipe (.toml); with --from-csv a file of efficiencies",
+        "allowed); a recipe (.toml); with --import a file of efficiencies",
     )  # fmt: skip
     options.add_output(parser, "the table; default: SOURCE's name with .nc", ".nc")
     group = parser.add_argument_group("the grating")
@@ -72,12 +78,17 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="points on the boundary, or harmonics; default: chosen by convergence",
     )  # fmt: skip
     group.add_argument(
-        "--from-csv", action="store_true",
-        help="SOURCE is a long CSV of wavelength_nm, theta_deg, phi_deg, order, R_s, R_p; needs "
-        "--period",
+        "--polarised", action="store_true", default=None,
+        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+    )  # fmt: skip
+    group.add_argument(
+        "--import", dest="imports", action="store_true",
+        help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
+        "incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
-        "--jobs", metavar="N", type=whole_number(1), default=1,
+        "--jobs", metavar="N", type=whole_number(1),
         help="processes here; default: 1",
     )  # fmt: skip
     add_workers(parser)
@@ -88,11 +99,10 @@ def run(args: argparse.Namespace) -> int:
     """Solve, write the table, and return the exit code."""
     source = Path(args.source)
     output = args.output or Path(f"{source.stem}.nc")
-    if args.from_csv:
+    if args.imports:
         from ..solve.measured import read_orders
 
-        if args.period is None:
-            args.parser.error("argument --from-csv: needs --period, µm")
+        _check_import(args)
         check_outputs([output], [source], "table")
         table = read_orders(source, args.period, superstrate=args.superstrate or 1.0)
     else:
@@ -111,6 +121,16 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _check_import(args: argparse.Namespace) -> None:
+    """Refuse an import without its period, or with options of a solution."""
+    if args.period is None:
+        args.parser.error("argument --import: needs --period, µm")
+    for name in _SOLVED_ONLY:
+        if getattr(args, name) is not None:
+            option = name.replace("_", "-")
+            args.parser.error(f"argument --{option}: is for a solution; --import has efficiencies")
+
+
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     """Return what to solve, from a recipe and the options that override it."""
     from ..solve.orders import Settings
@@ -127,6 +147,10 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
+        if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
+            args.parser.error(
+                f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
+            )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, Settings(), Path(f"{source.stem}.nc"))
     changed = {
@@ -134,6 +158,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         for field, value in (
             ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
             ("method", args.solver), ("resolution", args.resolution),
+            ("polarised", args.polarised),
         )
         if value is not None
     }  # fmt: skip
@@ -177,15 +202,20 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
 def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
     """Yield the processes that solve, and their number."""
     if on_workers(args):
-        if args.jobs > 1:
+        if args.jobs is not None:
             args.parser.error("argument --jobs: is for this machine; --workers has its own")
+        from ..cluster.workers import check_workers, executor_of
+
         with client_of(args) as client:
-            yield client.get_executor(), max(1, sum(client.nthreads().values()))
+            count = len(check_workers(client, None))
+            with executor_of(client) as workers:
+                yield workers, count
         return
     from ..solve.jobs import processes
 
-    with processes(args.jobs) as pool:
-        yield pool, args.jobs
+    jobs = args.jobs or 1
+    with processes(jobs) as pool:
+        yield pool, jobs
 
 
 def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
@@ -207,6 +237,8 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
                 f"{facts['error_worst']:.2%} in 95 % of directions"
             ),
         )
+        if table.polarised:
+            yield "", f"{facts['error_polarised']:.2%} with its polarisation"
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
 
 

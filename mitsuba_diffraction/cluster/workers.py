@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, Executor
 from typing import Any
 
 from ..errors import DiffractionError, one_line
@@ -23,6 +23,10 @@ VARIABLE = "DASK_SCHEDULER_ADDRESS"
 PATIENCE = 60.0
 #: Seconds between counts of the workers.
 COUNT_EVERY = 2.0
+GONE = (
+    "the scheduler is gone; start it and its workers, and run the same command again, which goes "
+    "on from what is kept"
+)
 
 
 @contextlib.contextmanager
@@ -47,7 +51,8 @@ def connect(
         If Dask is not installed, or nobody answers at the address.
     """
     distributed = optional("distributed")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # ours are the words
+    for name in ("distributed", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # ours are the words
     if count is not None:
         import dask
 
@@ -132,6 +137,27 @@ def workers_of(client: Any) -> dict[str, Any]:
         return {}
 
 
+@contextlib.contextmanager
+def executor_of(client: Any) -> Iterator[Executor]:
+    """Yield the client's workers as an executor, whose tasks another worker repeats if one dies.
+
+    Raises
+    ------
+    DiffractionError
+        If several workers die of the same task, or the scheduler is gone.
+    """
+    distributed = optional("distributed")
+    try:
+        yield client.get_executor()
+    except distributed.scheduler.KilledWorker as error:
+        raise DiffractionError(
+            f"worker {error.last_worker.address} died, as did those before that had the same task; "
+            "a worker may lack memory, see docs/cluster.md"
+        ) from error
+    except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
+        raise DiffractionError(GONE) from error
+
+
 class Headcount:
     """Number of workers, counted every `COUNT_EVERY` seconds.
 
@@ -181,10 +207,7 @@ def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
     end = time.monotonic() + PATIENCE
     while client.status != "running" and not (stop and stop.asked):
         if client.status == "closed" or time.monotonic() > end:
-            raise DiffractionError(
-                "the scheduler is gone; start it and its workers, and run the same command again, "
-                "which goes on from what is kept"
-            )
+            raise DiffractionError(GONE)
         time.sleep(0.1)
 
 

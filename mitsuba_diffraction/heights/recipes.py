@@ -17,6 +17,7 @@ import difflib
 import inspect
 import json
 import os
+import shlex
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -35,6 +36,8 @@ from .read import LoadOptions, is_recipe, read_heights, treat
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
+#: `method` of recipes of solved orders, which the room `solve` reads.
+SOLVED = "solved"
 # Options of files, refused beside a generator.
 _SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
 
@@ -61,11 +64,17 @@ class Recipe:
         ------
         DiffractionError
             If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
-            contradicted by another, or names a generator that does not exist.
+            contradicted by another, or names a generator that does not exist; if it is a recipe of
+            solved orders, which `mitsuba-diffraction solve` takes.
         """
         file = Path(path)
         shown = repr(str(file))
         content = _parse(file, shown)
+        if content.get("method") == SOLVED:
+            raise DiffractionError(
+                f"{shown} is a recipe of solved orders: run 'mitsuba-diffraction solve "
+                f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
+            )
         for key in content:
             if key not in _KEYS:
                 near = difflib.get_close_matches(key, _KEYS, 1)

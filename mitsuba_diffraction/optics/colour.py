@@ -20,6 +20,13 @@ ILLUMINANTS = ("D65", "E")
 #: Where the observer's tables begin and end, nm.
 SHORTEST, LONGEST = 360.0, 830.0
 
+#: Working spaces of Blender, by its names, and colour-science's names of their primaries.
+WORKING_SPACES = {
+    "Linear Rec.709": "sRGB",
+    "Linear Rec.2020": "ITU-R BT.2020",
+    "ACEScg": "ACEScg",
+}
+
 _OBSERVER = "CIE 1931 2 Degree Standard Observer"
 
 
@@ -73,6 +80,14 @@ def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[n
     """
     check_illuminant(illuminant)
     return xyz @ _matrix(illuminant).astype(xyz.dtype)
+
+
+def linear_in(space: str, xyz: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear RGB of X, Y, Z under D65 in one of `WORKING_SPACES`, shape (..., 3)."""
+    import colour
+
+    matrix = colour.matrix_RGB_to_RGB("sRGB", WORKING_SPACES[space], "Bradford")
+    return linear_srgb(xyz) @ matrix.T.astype(xyz.dtype)
 
 
 def metal_tint(

@@ -12,7 +12,9 @@ import sys
 import mitsuba as mi
 
 # Base classes first: the plugins inherit from `surface`
-_MODULES = ("surface", "bsdf", "transmission.bsdf", "orders.bsdf", "blended_patches")
+_MODULES = (
+    "surface", "bsdf", "transmission.bsdf", "orders.bsdf", "orders.sheet", "blended_patches",
+)  # fmt: skip
 
 
 def register(old: str | None, new: str | None) -> None:

@@ -47,6 +47,7 @@ class CoupledWaves:
         levels = np.unique(profile.z)
         edges = levels if _has_walls(profile) else np.linspace(levels[0], levels[-1], harmonics + 1)
         edges = edges[::-1]
+        self._top = float(edges[0])
         #: Layers from the top: thickness in µm, and ends (n, 2) of the intervals of material.
         self.layers = [
             (float(above - below), _intervals(profile, float(0.5 * (above + below))))
@@ -58,8 +59,8 @@ class CoupledWaves:
         """Name and settings."""
         return f"coupled waves, {2 * self.harmonics + 1} harmonics, {len(self.layers)} layers"
 
-    def efficiencies(self, station: Station) -> Real:
-        """Return the efficiencies of every pair of channels; see `stations.Solver`."""
+    def amplitudes(self, station: Station) -> Complex:
+        """Return the amplitudes between all channels; see `stations.Solver`."""
         if station.indices is None:
             raise DiffractionError(
                 "coupled waves need a material with an index; use method='integral' for a perfect "
@@ -68,8 +69,8 @@ class CoupledWaves:
         pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
         return np.stack([self._solve(station, *pair) for pair in pairs])
 
-    def _solve(self, station: Station, wavelength: float, index: complex, y: float) -> Real:
-        """Return the efficiencies at one wavelength.
+    def _solve(self, station: Station, wavelength: float, index: complex, y: float) -> Complex:
+        """Return the amplitudes at one wavelength.
 
         The reflection matrix R of tangential E is carried up from the material: with modes W, V of
         a layer above an interface and those below it, A = W⁻¹W'(1 + R'), B = V⁻¹V'(1 − R'),
@@ -88,7 +89,11 @@ class CoupledWaves:
             reflection = through[:, None] * reflection * through
             below = above
         reflection = _across(_uniform(x, y, 1.0), below, reflection)
-        return _efficiencies(reflection, x, y, np.arange(station.channels) - first)
+        places = np.arange(station.channels) - first
+        # from the top of the profile to z = 0
+        height = np.sqrt(1.0 - y**2 - x[places] ** 2) * self._top / wavelength
+        phase = np.exp(-2j * np.pi * height)[:, None]
+        return phase[..., None, None] * _amplitudes(reflection, x, y, places) * phase
 
 
 class _Modes(NamedTuple):
@@ -143,11 +148,11 @@ def _across(above: _Modes, below: _Modes, reflection: Complex) -> Complex:
     return np.asarray(np.linalg.solve((a + b).T, (a - b).T).T)
 
 
-def _efficiencies(reflection: Complex, x: Real, y: float, places: NDArray[np.int64]) -> Real:
-    """Return efficiencies (j, 2, q, 2) between waves that propagate, from R of tangential E.
+def _amplitudes(reflection: Complex, x: Real, y: float, places: NDArray[np.int64]) -> Complex:
+    """Return amplitudes (j, 2, q, 2) between waves that propagate, from R of tangential E.
 
     With c² = 1 − y², a wave whose E lies along the grooves has E = (−xy, c², …)/c, and one whose B
-    does (∓z, 0, x)/c, with the upper sign for light that goes down.
+    does (±z, 0, −x)/c, with the upper sign for light that goes down.
     """
     n, c = len(x), np.sqrt(1.0 - y * y)
     sines, count = x[places], len(places)
@@ -156,12 +161,13 @@ def _efficiencies(reflection: Complex, x: Real, y: float, places: NDArray[np.int
     channels = np.arange(count)
     incident[places, 0, channels] = -sines * y / c
     incident[n + places, 0, channels] = c
-    incident[places, 1, channels] = -z / c
+    incident[places, 1, channels] = z / c
     fields = np.tensordot(reflection, incident, 1)
     e = fields[n + places] / c
-    b = (fields[places] * c + e * (sines * y)[:, None, None]) / z[:, None, None]
-    power = np.abs(np.stack([e, b], axis=-1)) ** 2 * z[:, None, None, None]
-    return np.asarray(power.transpose(2, 1, 0, 3) / z[:, None, None, None])
+    b = -(fields[places] * c + e * (sines * y)[:, None, None]) / z[:, None, None]
+    flux = np.sqrt(z[:, None, None, None])
+    fields = flux * np.stack([e, b], axis=-1)
+    return np.asarray(fields.transpose(2, 1, 0, 3) / flux)
 
 
 def _toeplitz(n: int, outside: complex, inside: complex, filled: Real) -> Complex:

@@ -24,15 +24,11 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve as solve_linear
 
 from ..errors import DiffractionError
 from .profiles import Profile
-from .stations import Station
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from .stations import Complex, Station
 
 #: Order of the mesh graded towards corners, which gratinglab recommends (Kress 1990).
 GRADING = 4
@@ -79,15 +75,8 @@ class IntegralSolver:
         version = importlib.metadata.version("gratinglab")
         return f"gratinglab {version}, integral method, {self.points} points"
 
-    def efficiencies(self, station: Station) -> Real:
-        """Efficiencies of every pair of channels.
-
-        Returns
-        -------
-        (wavelengths, channels in, 2, channels out, 2) : reflected power over incident power. The
-            polarisations are E and B along the grooves, of unit power each. A perfect conductor has
-            one wavelength, which stands for all.
-        """
+    def amplitudes(self, station: Station) -> Complex:
+        """Return the amplitudes between all channels; see `stations.Solver`."""
         self._assembler.clear()
         waves = _Waves(self._boundary, station, self.period)
         with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -117,7 +106,7 @@ class IntegralSolver:
         wavelength: float,
         index: complex,
         along: float,
-    ) -> Real:
+    ) -> Complex:
         from gratinglab.solvers.integral import _nystrom
 
         v_above, k_above = above
@@ -149,10 +138,10 @@ class IntegralSolver:
         e = waves.reflected(e_normal, trace @ w)
         b = waves.reflected(b_normal, trace @ tau)
         # (out, 2, channels in) to (in, 2, out, 2)
-        power = np.abs(np.stack([e, b])).reshape(2, channels, 2, channels) ** 2
-        return waves.flux[:, None, :, None] * power.transpose(3, 2, 1, 0)
+        fields = np.stack([e, b]).reshape(2, channels, 2, channels)
+        return waves.flux[:, None, :, None] * fields.transpose(3, 2, 1, 0)
 
-    def _perfect(self, waves: _Waves) -> Real:
+    def _perfect(self, waves: _Waves) -> Complex:
         """A perfect conductor: E vanishes on it, and so does the normal derivative of B."""
         from gratinglab.solvers.integral import _nystrom
 
@@ -163,10 +152,10 @@ class IntegralSolver:
         none = np.zeros_like(incident)
         e = waves.reflected(solve_linear(single, -incident), none)
         b = waves.reflected(none, solve_linear(double, incident))
-        efficiency = np.zeros((len(waves.alpha), 2, len(waves.alpha), 2))
-        for n, amplitudes in enumerate((e, b)):
-            efficiency[:, n, :, n] = waves.flux * np.abs(amplitudes.T) ** 2
-        return efficiency
+        result = np.zeros((len(waves.alpha), 2, len(waves.alpha), 2), complex)
+        for n, fields in enumerate((e, b)):
+            result[:, n, :, n] = waves.flux * fields.T
+        return result
 
     def _options(self, k: complex, alpha: float) -> dict[str, Any]:
         return {
@@ -195,8 +184,8 @@ class _Waves:
         direction = (self.alpha / gamma)[:, None] * boundary.nx + boundary.ny
         self._single = weighted / (2j * period * gamma[:, None])
         self._double = weighted * direction / (2 * period)
-        #: Ratio of cosines of the outgoing (column) and the incident (row) channel.
-        self.flux = gamma[None, :] / gamma[:, None]
+        #: Root of the ratio of cosines of the outgoing (column) and the incident (row) channel.
+        self.flux = np.sqrt(gamma[None, :] / gamma[:, None])
 
     def reflected(self, normal: Complex, trace: Complex) -> Complex:
         """Amplitudes (channels, n) of fields with this normal derivative and trace, (points, n)."""

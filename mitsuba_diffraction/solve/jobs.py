@@ -8,12 +8,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
+from typing import NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
 from .profiles import Profile
-from .stations import Grating, Real, Solver
+from .stations import Complex, Grating, Real, Solver
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
@@ -55,7 +57,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     """
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    content = hashlib.sha256(repr((method, grating.superstrate, grating.wavelengths)).encode())
+    content = hashlib.sha256(
+        repr(("amplitudes", method, grating.superstrate, grating.wavelengths)).encode()
+    )
     profile, material = grating.profile, grating.material
     content.update(repr(profile.period).encode())
     for array in (profile.x, profile.z, material.wavelengths, material.values):
@@ -69,12 +73,28 @@ def solver_of(problem: Problem) -> Solver:
     return METHODS[problem.method](problem.grating.profile, problem.resolution)
 
 
-def solve_place(problem: Problem, place: Place) -> Real:
-    """Return efficiencies (w, j, 2, q, 2) at a place; see `stations.Solver`."""
-    grating = problem.grating
+class Solved(NamedTuple):
+    """Amplitudes of a place, and the processor seconds that they took.
+
+    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision.
+    """
+
+    values: Complex
+    seconds: float
+
+
+def solve_place(problem: Problem, place: Place) -> Solved:
+    """Solve a place.
+
+    Values are rounded as they are stored, so that a table is the same whether or not it was
+    interrupted.
+    """
+    solver = solver_of(problem)
+    start, grating = time.thread_time(), problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
     station = grating.station(place.band, place.kind, place.tau, place.rho, w)
-    return solver_of(problem).efficiencies(station)
+    values = solver.amplitudes(station).astype(np.complex64).astype(np.complex128)
+    return Solved(values, time.thread_time() - start)
 
 
 @dataclass
@@ -91,28 +111,48 @@ class Jobs:
     folder: Path | None = None
     executor: Executor | None = None
     progress: Progress = silent
+    _seconds: dict[tuple[str, int, Place], float] = field(default_factory=dict, init=False)
 
     def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
-        """Return the efficiencies at all places, of which those in the folder are read.
+        """Return the efficiencies at all places; see `amplitudes`."""
+        known = self.amplitudes(problem, places, text)
+        return {place: np.abs(values) ** 2 for place, values in known.items()}
+
+    def amplitudes(
+        self, problem: Problem, places: Sequence[Place], text: str
+    ) -> dict[Place, Complex]:
+        """Return the amplitudes at all places, of which those in the folder are read.
 
         An exception or Ctrl-C leaves in the folder what is done by then.
+
+        Raises
+        ------
+        DiffractionError
+            If the folder cannot be written.
         """
         files = {place: self._file(problem, place) for place in places}
         results = {place: _read(file) for place, file in files.items()}
-        known = {place: values for place, values in results.items() if values is not None}
+        known = {place: solved for place, solved in results.items() if solved is not None}
         missing = [place for place in files if place not in known]
         if self.folder is not None and missing:
             _make(self.folder)
         done = len(known)
         self.progress(done, len(files), text)
-        for place, values in self._solved(problem, missing):
-            known[place] = values
+        for place, solved in self._solved(problem, missing):
+            known[place] = solved
             if (file := files[place]) is not None:
                 with atomic_path(file) as temporary:
-                    np.save(temporary, values.astype(np.float32))
+                    np.savez(temporary, values=np.complex64(solved.values), seconds=solved.seconds)
             done += 1
             self.progress(done, len(files), text)
-        return known
+        for place, solved in known.items():
+            self._seconds[problem.digest, problem.resolution, place] = solved.seconds
+        return {place: solved.values for place, solved in known.items()}
+
+    @property
+    def processor_seconds(self) -> float:
+        """Processor seconds of all solutions so far, those of the folder included."""
+        return sum(self._seconds.values())
 
     def seconds(self, problem: Problem, place: Place) -> float:
         """Return the seconds that a place takes."""
@@ -120,7 +160,7 @@ class Jobs:
             return timed(problem, place)
         return float(self.executor.submit(timed, problem, place).result())
 
-    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Real]]:
+    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Solved]]:
         if self.executor is None:
             for place in places:
                 yield place, solve_place(problem, place)
@@ -137,7 +177,7 @@ class Jobs:
         if self.folder is None:
             return None
         key = hashlib.sha256(repr((problem.digest, problem.resolution, tuple(place))).encode())
-        return self.folder / f"{key.hexdigest()[:24]}.npy"
+        return self.folder / f"{key.hexdigest()[:24]}.npz"
 
 
 def timed(problem: Problem, place: Place) -> float:
@@ -150,12 +190,23 @@ def timed(problem: Problem, place: Place) -> float:
 
 @contextmanager
 def processes(count: int) -> Iterator[Executor]:
-    """Yield a pool of processes with one thread of linear algebra each."""
+    """Yield a pool of processes with one thread of linear algebra each.
+
+    Raises
+    ------
+    DiffractionError
+        If one of them is killed.
+    """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
     try:
         yield pool
+    except BrokenExecutor as error:
+        raise DiffractionError(
+            "a process that solves was killed, maybe for lack of memory; use fewer of them, and "
+            "run the same command again, which goes on from what is kept"
+        ) from error
     except BaseException:
         # Ctrl-C does not wait for stations in progress
         for process in active_children():
@@ -193,10 +244,11 @@ def _make(folder: Path) -> None:
         ) from error
 
 
-def _read(file: Path | None) -> Real | None:
+def _read(file: Path | None) -> Solved | None:
     if file is None or not file.is_file():
         return None
     try:
-        return np.load(file).astype(np.float64)
-    except (OSError, ValueError, EOFError):
+        with np.load(file) as stored:
+            return Solved(stored["values"].astype(np.complex128), float(stored["seconds"]))
+    except (OSError, ValueError, EOFError, KeyError, BadZipFile):
         return None  # solved again

@@ -6,6 +6,7 @@
     superstrate = 1.58              # index of the clear medium above; default 1
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
+    polarised = true                # with Mueller matrices; default false
     output = "tables/cd.nc"
 
     [arguments]                     # of the profile
@@ -17,12 +18,11 @@ Paths are relative to the recipe.
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import inspect
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
     "method", "profile", "material", "superstrate", "wavelengths", "tolerance", "solver",
-    "resolution", "output", "arguments",
+    "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -120,26 +120,6 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     return make(**arguments)
 
 
-def refuse_solved(paths: Iterable[Path]) -> None:
-    """Refuse recipes with `method = "solved"`, which are no recipes of a model's table.
-
-    Raises
-    ------
-    DiffractionError
-        If there is one; files that cannot be read are left to their reader.
-    """
-    for path in paths:
-        with contextlib.suppress(tomllib.TOMLDecodeError, DiffractionError):
-            method = tomllib.loads(read_text(path)).get("method")
-            if method == "solved":
-                break
-    else:
-        return
-    raise DiffractionError(
-        f"'{path}' is a recipe of solved orders; run solve instead of precompute"
-    )
-
-
 def _settings(content: Mapping[str, Any]) -> Settings:
     default = Settings()
     low, high = content.get("wavelengths", default.wavelengths)
@@ -148,4 +128,5 @@ def _settings(content: Mapping[str, Any]) -> Settings:
         float(content.get("tolerance", default.tolerance)),
         str(content.get("solver", default.method)),
         content.get("resolution", default.resolution),
+        bool(content.get("polarised", default.polarised)),
     )

@@ -7,7 +7,7 @@ share what is expensive in a solver. A station has several wavelengths w at the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,8 @@ from .materials import Material
 from .profiles import Profile
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Number = TypeVar("Number", np.float64, np.complex128)
 
 #: Least c = √(1 − y²), and least |cosine| of any order across the grooves: 1.7° from grazing.
 #: There solvers lose digits as 1/cosine, and diffuse light has 1e-3 of its power. Stations beyond
@@ -109,22 +111,25 @@ class Solver(Protocol):
     def name(self) -> str:
         """Name, version and settings, for the header of tables."""
 
-    def efficiencies(self, station: Station) -> Real:
-        """Return the efficiencies of every pair of channels.
+    def amplitudes(self, station: Station) -> Complex:
+        """Return the amplitudes between all channels, whose |·|² are efficiencies.
+
+        Light along d is a sum of E along e and E along d × e, with e the direction of the grooves
+        (y) made perpendicular to d: its E, or its B, lies along the grooves, as far as it can. In
+        the plane across the grooves they are s and p. Time is exp(−iωt), and phases are those at
+        z = 0 of the profile.
 
         Returns
         -------
-        (wavelengths, channels in, 2, channels out, 2) : reflected power over incident power. The
-            polarisations are the fields whose E, and whose B, lies along the grooves: s and p in
-            the plane across the grooves. A perfect conductor has one wavelength, for all.
+        (wavelengths, channels in, 2, channels out, 2) : outgoing over incident field, of waves that
+            carry unit power through the surface. A perfect conductor has one wavelength, for all.
         """
 
 
-def reversed_light(efficiencies: Real) -> Real:
-    """Return the efficiencies of the reversed light, at 1 − t, of what a solver returned.
+def reversed_light(values: NDArray[Number]) -> NDArray[Number]:
+    """Return the amplitudes, or efficiencies, of the reversed light, at 1 − t, by reciprocity.
 
-    Reciprocity: the share that goes from channel j and polarisation a to q and b is the share that
-    goes from last − q and b to last − j and a (Petit 1980, "Electromagnetic theory of gratings",
-    section 1.4).
+    The amplitude from channel j and polarisation a to q and b is the amplitude from last − q and b
+    to last − j and a (Petit 1980, "Electromagnetic theory of gratings", section 1.4).
     """
-    return np.asarray(np.flip(efficiencies, (1, 3)).transpose(0, 3, 4, 1, 2))
+    return np.flip(values, (1, 3)).transpose(0, 3, 4, 1, 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -14,6 +15,8 @@ from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions
 
 PERIOD = 1.6  # µm
+#: Light of a thin sheet from above (first row) and below that stays above (first column) or below.
+SHARES = np.array([[0.3, 0.7], [0.7, 0.2]])
 
 
 def thin_grating(
@@ -23,11 +26,13 @@ def thin_grating(
     wavelengths: tuple[float, float] = (380.0, 780.0),
     counts: Counts = Counts(6, 5, 3),  # noqa: B008 - immutable
     superstrate: float = 1.0,
+    thin: bool = False,
 ) -> OrderTable:
     """A sinusoidal phase grating: J_m² of its phase, which is reciprocal, times a reflectance.
 
     The phase of order m is π depth (cosθ_j + cosθ_q)/λ, the mean of both directions': sums over
-    orders are about 1, below the reflectance's headroom.
+    orders are about 1, below the reflectance's headroom. A thin sheet divides the light
+    by `SHARES`.
     """
     optical = superstrate * period
 
@@ -46,18 +51,30 @@ def thin_grating(
         grazing = cosine[..., :, None] * cosine[..., None, :]
         power = reflectance * jv(order, phase) ** 2 * (1.0 - np.exp(-20.0 * grazing))
         values = np.where(order == 0, reflectance * jv(0, phase) ** 2, power)
+        if thin:
+            values = np.kron(SHARES, values)
         return np.repeat(values[..., None], 2, axis=-1).astype(np.float32)
 
     bands = tuple(
         Band(k, kind(k, cells.A), kind(k, cells.B) if k else None)
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
-    return OrderTable(period, wavelengths, bands, superstrate, {"profile": "thin sinusoid"})
+    header = {"profile": "thin sinusoid"}
+    return OrderTable(period, wavelengths, bands, superstrate, header, thin)
 
 
 def load(table: Any, **parameters: Any) -> Any:
     """A table or heights as a BSDF of the current variant."""
     return mi.load_dict(md.bsdf_dict(table, **parameters))
+
+
+def on_all_sides(wi: Array, wo: Array) -> tuple[Array, Array]:
+    """Pairs with ωi and ωo above or below by turns."""
+    n = np.arange(len(wi))
+    wi, wo = wi.copy(), wo.copy()
+    wi[:, 2] *= np.where(n % 2, -1.0, 1.0)
+    wo[:, 2] *= np.where(n // 2 % 2, -1.0, 1.0)
+    return wi, wo
 
 
 def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
@@ -74,3 +91,11 @@ def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
             squared = (tangential**2).sum()
         wo[row] = [*tangential, np.sqrt(1.0 - squared)]
     return wi, as_single(wo), rng.random((n, 3)), wavelength
+
+
+def digest_in_file(table: OrderTable, folder: Path) -> str:
+    """Return the digest of a table's file: rounded to 16 bits, past what BLAS adds in any order."""
+    table.save(folder / "digest.nc")
+    digest = OrderTable.load(folder / "digest.nc").digest()
+    (folder / "digest.nc").unlink()
+    return digest

@@ -70,8 +70,8 @@ class Chandezon:
         """Name and settings."""
         return f"Chandezon's method, {2 * self.harmonics + 1} harmonics"
 
-    def efficiencies(self, station: Station) -> Real:
-        """Return the efficiencies of every pair of channels; see `stations.Solver`.
+    def amplitudes(self, station: Station) -> Complex:
+        """Return the amplitudes between all channels; see `stations.Solver`.
 
         Raises
         ------
@@ -90,13 +90,13 @@ class Chandezon:
         down = self._plane_waves(alpha, places, -beta)
         above = self._modes(alpha, k**2, 1.0)
         pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
-        flux = beta / beta[:, None]
+        flux = np.sqrt(beta / beta[:, None])
         results = []
         for wavelength, index, y in pairs:
             squared = (2.0 * np.pi / wavelength) ** 2 * (index**2 - y**2)
             below = self._modes(alpha, squared, -1.0)
-            power = _powers(above, below, down, alpha * y, index**2, k**2 / squared)
-            results.append(flux[:, None, :, None] * power)
+            fields = _reflected(above, below, down, alpha * y, index**2, k**2 / squared)
+            results.append(flux[:, None, :, None] * fields)
         return np.stack(results)
 
     def _modes(self, alpha: Real, squared: complex, sign: float) -> _Waves:
@@ -152,19 +152,19 @@ class _Waves(NamedTuple):
     normal: Complex
 
 
-def _powers(
+def _reflected(
     above: _Waves, below: _Waves, down: _Waves, along: Real, epsilon: complex, ratio: complex
-) -> Real:
-    """Return |amplitude|² (j, 2, q, 2) of the last waves above, in light of the waves `down`.
+) -> Complex:
+    """Return the fields (j, 2, q, 2) of the last waves above, in light of the waves `down`.
 
     along : α y. ratio : k² above over that below.
 
-    Unknowns are E and B on the surface. Those across the grooves are
-    (iky ∂_u E − ik₀ ∂_n B)/k² and (iky ∂_u B + ik₀ε ∂_n E)/k² in each medium.
+    Unknowns are E and B on the surface, along −y: that of light whose E is along d × y. Those
+    across the grooves are (ik₀y ∂_u E + ik₀ ∂_n B)/k² and (ik₀y ∂_u B − ik₀ε ∂_n E)/k².
     """
     upper = np.linalg.solve(above.field.T, above.normal.T).T
     lower = ratio * np.linalg.solve(below.field.T, below.normal.T).T
-    turn = np.diag(1j * along * (1.0 - ratio))
+    turn = np.diag(-1j * along * (1.0 - ratio))
     system = np.block([[turn, lower - upper], [upper - epsilon * lower, turn]])
     source = down.normal - upper @ down.field
     none, count = np.zeros_like(source), source.shape[1]
@@ -172,7 +172,7 @@ def _powers(
     incident = np.block([[down.field, none], [none, down.field]])
     e, b = np.split(surface - incident, 2)
     waves = np.stack([np.linalg.solve(above.field, part)[-count:] for part in (e, b)], axis=1)
-    return np.asarray((np.abs(waves) ** 2).reshape(count, 2, 2, count).transpose(3, 2, 0, 1))
+    return np.asarray(waves.reshape(count, 2, 2, count).transpose(3, 2, 0, 1))
 
 
 def _smooth(x: Real, z: Real) -> _Curve:

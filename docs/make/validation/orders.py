@@ -206,7 +206,7 @@ class Case:
 
 def _orders(solver: Solver, station: Station, channel: int) -> dict[int, float]:
     """Return the efficiencies of all orders, for light through a channel."""
-    power = solver.efficiencies(station)[0, channel].mean(axis=0).sum(axis=-1)
+    power = (np.abs(solver.amplitudes(station)[0, channel]) ** 2).mean(axis=0).sum(axis=-1)
     return {channel - q: float(value) for q, value in enumerate(power)}
 
 

@@ -47,7 +47,7 @@ class Published(NamedTuple):
 
     def solved(self, solver: Solver) -> dict[tuple[int, str], float]:
         """Return the efficiencies that are printed, by a solver."""
-        powers = solver.efficiencies(self.station)[0, 0].sum(axis=-1)
+        powers = (np.abs(solver.amplitudes(self.station)[0, 0]) ** 2).sum(axis=-1)
         return {(m, name): float(powers["sp".index(name), -m]) for m, name in self.printed}
 
 

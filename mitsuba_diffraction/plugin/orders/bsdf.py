@@ -32,6 +32,10 @@ powers. RGB variants sum f over daylight. Efficiencies are those of unpolarised 
 variants depolarise it, and warn once. Wavelengths outside the table have the efficiencies of the
 nearest in it. f is reciprocal as far as the table is, at the centres of lobes.
 
+A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
+normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
+is the reflection, component 1 the transmission.
+
 XML and the same in Python:
 
     <bsdf type="diffraction_orders">
@@ -83,7 +87,7 @@ from ..types import (
     Vector3f,
 )
 from .lobes import lobes_of
-from .parameters import read_parameters
+from .parameters import Parameters
 
 
 class DiffractionOrders(mi.BSDF):
@@ -98,11 +102,10 @@ class DiffractionOrders(mi.BSDF):
     """
 
     #: Feature that shaders do not support.
-    not_in_shaders = "solved orders"
+    not_in_shaders: str | None = None
 
-    def __init__(self, props: Properties) -> None:
+    def __init__(self, props: Properties, read: Parameters) -> None:
         super().__init__(props)
-        read = read_parameters(props)
         self.table, self.orientation = read.table, read.orientation
         self.coherence_width, self._wavelength = read.coherence_width, read.wavelength
         self._lobes = lobes_of(self.table, self.coherence_width, self._wavelength)
@@ -149,13 +152,19 @@ class DiffractionOrders(mi.BSDF):
 
     def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """Draw an order by its efficiency, and a direction in its lobe; see `Nesting.draw`."""
+        return self._drawn(si, sample1, sample2, active)[0]
+
+    def _drawn(
+        self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask
+    ) -> tuple[Vector3f, Mask]:
+        """Return a direction mirrored to above, z below 0 if invalid, and whether it is below."""
         frame = self._frame(si, active)
         incident = dr.detach(frame.turned(si.wi))
         cos_i = mi.Frame3f.cos_theta(si.wi)
         drawn = self._lobes.draw(incident, cos_i, si, sample1, sample2)
         direction = direction_of(frame.from_table(drawn.uv) - mi.Vector2f(si.wi.x, si.wi.y))
         direction.z = dr.select(drawn.valid, direction.z, -1.0)
-        return dr.detach(direction)
+        return dr.detach(direction), drawn.below
 
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """See `Nesting.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
@@ -233,6 +242,3 @@ def _warn_of_polarisation() -> None:
             "diffraction_orders has efficiencies of unpolarised light: in this polarised variant "
             "it depolarises the light that it reflects"
         )
-
-
-mi.register_bsdf("diffraction_orders", DiffractionOrders)

@@ -50,17 +50,26 @@ class Reflected(NamedTuple):
 
 
 class Draw(NamedTuple):
-    """Tangential part of ωi + ωo in the patch's frame, drawn, and whether there is any."""
+    """Tangential part of ωi + ωo in the patch's frame, drawn.
+
+    below : whether ωo lies below a sheet.
+    valid : whether there is any light.
+    """
 
     uv: Vector2f
+    below: Mask
     valid: Mask
 
 
 class Lobes(Protocol):
     """Light of all orders in the variant's channels, and directions drawn by it."""
 
-    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
-        """Return value and density of a pair."""
+    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
+        """Return value and density of a pair.
+
+        below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
+            sheet.
+        """
 
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
@@ -68,7 +77,7 @@ class Lobes(Protocol):
         """Draw a direction for light from ωi, given by its tangential part and cosine."""
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """Return the sum of the orders' efficiencies."""
+        """Return the sum of the orders' efficiencies, of all sides."""
 
 
 class _Window:
@@ -101,11 +110,11 @@ class _Window:
 
     def drawn(self, row: Row, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
         """Draw an order of a row, and a direction in its lobe."""
-        order, valid = self.lookup.draw(row, sample1)
+        drawn = self.lookup.draw(row, sample1)
         wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
         spread = mi.warp.square_to_std_normal(dr.minimum(sample2, BELOW_ONE)) * wide
-        centre = mi.Vector2f(order * wavelength * (1e-3 / self.period), 0.0)
-        return Draw(centre + mi.Vector2f(spread), valid)
+        centre = mi.Vector2f(drawn.order * wavelength * (1e-3 / self.period), 0.0)
+        return Draw(centre + mi.Vector2f(spread), drawn.below, drawn.valid)
 
 
 class SpectralLobes(_Window):
@@ -119,7 +128,7 @@ class SpectralLobes(_Window):
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
+    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
         """See `Lobes.reflected`; the density is the mean over wavelengths."""
         values, density = [], mi.Float(0.0)
         wavelengths = self._wavelengths(si)
@@ -129,7 +138,7 @@ class SpectralLobes(_Window):
             light, chance, near = mi.Float(0.0), mi.Float(0.0), mi.Mask(False)
             for order in self.orders(position.x):
                 lobe = self.lobe(position, order)
-                share = self.lookup.order(row, order, lobe > 0.0)
+                share = self.lookup.order(row, order, lobe > 0.0, below)
                 near |= lobe > 0.0
                 light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
@@ -179,11 +188,11 @@ class DaylightLobes(_Window):
         self._bins = len(weights.cumulative) - 1
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
-    def reflected(self, pair: Pair, si: Interaction) -> Reflected:
+    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
         """See `Lobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
         # before the loops: a cached property that a loop computed would belong to it
-        shares = functools.partial(self._shares, pair.incident, pair.cos_i)
+        shares = functools.partial(self._shares, pair.incident, pair.cos_i, below)
         total = self._zeroth(shares, radius)
         total = [a + b for a, b in zip(total, self._others(shares, pair.uv, radius), strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
@@ -208,11 +217,16 @@ class DaylightLobes(_Window):
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 
     def _shares(
-        self, incident: Vector2f, cos_i: Float, wavelength: Float, order: Float
+        self,
+        incident: Vector2f,
+        cos_i: Float,
+        below: Mask | None,
+        wavelength: Float,
+        order: Float,
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
         row = self.lookup.row(incident, cos_i, wavelength)
-        share, total = self.lookup.order(row, order), self.lookup.total(row)
+        share, total = self.lookup.order(row, order, True, below), self.lookup.total(row)
         return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _LEAST))
 
     def _zeroth(self, shares: Shares, radius: Float) -> list[Float]:

@@ -27,9 +27,9 @@ class Row:
 
     Attributes
     ----------
-    start : record of channel 0.
+    start : record of port 0.
     channel : j of the incident light.
-    channels : number of channels.
+    channels : number of channels of a side.
     weights : of the eight corners of a cell.
     incident, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
@@ -57,6 +57,14 @@ class Share(NamedTuple):
     chance: Float
 
 
+class Drawn(NamedTuple):
+    """Order that is drawn; whether it leaves below a sheet; and whether there is any."""
+
+    order: Float
+    below: Mask
+    valid: Mask
+
+
 class OrderLookup:
     """Rows of efficiencies for directions in the patch's frame and wavelengths.
 
@@ -76,6 +84,7 @@ class OrderLookup:
         self._steps = 1e-3 / table.period
         self._index, self._least_c = table.superstrate, least_c(table.superstrate)
         self._parts = records.values.shape[1] // 8
+        self._sides = table.sides
 
     @property
     def coated(self) -> bool:
@@ -85,7 +94,8 @@ class OrderLookup:
     def row(self, incident: Vector2f, cos_i: Float, wavelength: Float) -> Row:
         """Return the row of light from ωi.
 
-        incident, cos_i : tangential part of ωi in the patch's frame, and its cosine.
+        incident, cos_i : tangential part of ωi in the patch's frame, and its cosine, below 0 for
+            light from below a sheet.
         wavelength : in vacuum, nm.
         """
         vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
@@ -112,18 +122,28 @@ class OrderLookup:
             weights = [
                 part for weight in weights for part in (weight - weight * share, weight * share)
             ]
-        row = cell * channels + mi.UInt32(channel)
-        start = read(mi.UInt32, self._starts, kind) + row * (channels + 1)
+        ports, port = channels * self._sides, mi.UInt32(channel)
+        if self._sides == 2:
+            port += dr.select(cos_i < 0.0, channels, 0)
+        row = cell * ports + port
+        start = read(mi.UInt32, self._starts, kind) + row * (ports + 1)
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
         return Row(start, mi.UInt32(channel), channels, weights, incident, vacuum, face)
 
-    def order(self, row: Row, order: Float, active: Mask = True) -> Share:
-        """Return the light of an order, a whole number; 0 if it does not propagate or inactive."""
+    def order(
+        self, row: Row, order: Float, active: Mask = True, below: Mask | None = None
+    ) -> Share:
+        """Return the light of an order, a whole number; 0 if it does not propagate or inactive.
+
+        below : whether it leaves below a sheet; None without a sheet.
+        """
         q = mi.Float(row.channel) - order
         propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
         q = mi.UInt32(dr.select(propagates, q, 0.0))
+        if below is not None:
+            q += dr.select(below, row.channels, 0)
         if not self.coated:
             efficiency = dr.select(propagates, self._between(row, q, 0, propagates), 0.0)
             return Share(efficiency, efficiency)
@@ -140,25 +160,30 @@ class OrderLookup:
 
     def total(self, row: Row, active: Mask = True) -> Float:
         """Return the sum of all orders' chances, rounded up; meaningless where inactive."""
-        value = self._between(row, row.channels, self._parts - 1, active)
+        value = self._between(row, row.channels * self._sides, self._parts - 1, active)
         if self.coated:
             value = self._outside(row, value, row.face)
         return value * _RAISED
 
-    def draw(self, row: Row, sample: Float) -> tuple[Float, Mask]:
-        """Return an order drawn by its efficiency over `total`, and whether there is one."""
-        target, channels = sample * self.total(row), mi.UInt32(row.channels)
+    def draw(self, row: Row, sample: Float) -> Drawn:
+        """Return an order drawn by its efficiency over `total`."""
+        target, ports = sample * self.total(row), mi.UInt32(row.channels) * self._sides
 
-        def body(q: Index, reached: Float) -> tuple[Index, Float]:
-            order = mi.Float(row.channel) - mi.Float(q)
-            reached = reached + self.order(row, order).chance
-            return q + 1, reached
+        def at(port: Index) -> tuple[Float, Mask]:
+            below = port >= row.channels
+            q = port if self._sides == 1 else port - dr.select(below, row.channels, 0)
+            return mi.Float(row.channel) - mi.Float(q), below
 
-        def further(q: Index, reached: Float) -> Mask:
-            return (reached <= target) & (q < channels)
+        def body(port: Index, reached: Float) -> tuple[Index, Float]:
+            order, below = at(port)
+            share = self.order(row, order, True, below if self._sides == 2 else None)
+            return port + 1, reached + share.chance
 
-        q, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
-        return mi.Float(row.channel) - mi.Float(q) + 1.0, reached > target
+        def further(port: Index, reached: Float) -> Mask:
+            return (reached <= target) & (port < ports)
+
+        port, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
+        return Drawn(*at(port - 1), reached > target)
 
     def _between(self, row: Row, q: Index, part: int, active: Mask) -> Float:
         """Interpolate a channel between the corners of a cell.

@@ -12,6 +12,7 @@ from ...settings import checked
 from ...tables.orders import OrderTable
 from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
+from ..properties import kind_of
 from ..surface_parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..textures import Orientation
 from ..types import BSDF, Properties
@@ -52,6 +53,11 @@ def read_parameters(props: Properties) -> Parameters:
     """
     nested = nested_of(props, ORDERS)
     table = _table(props)
+    if table.thin and nested is not None:
+        raise DiffractionError(
+            f"the table is that of a thin sheet, beneath which no BSDF ({kind_of(nested)}) lies; "
+            "put a surface behind the sheet instead"
+        )
     return Parameters(
         table=table,
         coherence_width=_coherence_width(props, table),

@@ -25,6 +25,9 @@ efficiencies do not depend on w (the conical mount is the classical one at s and
 "Electromagnetic theory of gratings", section 1.2).
 
 Reversed light enters through channel k − q of kind A, or k − 1 − q of kind B, at 1 − t.
+
+A thin sheet has the same medium on both sides, hence the same channels. Its *ports* are the n
+channels of light above the sheet, then the n of light below it: a side has the ports side·n + j.
 """
 
 from __future__ import annotations
@@ -155,6 +158,11 @@ def w_of(
 def largest_band(wavelengths: tuple[float, float], optical_period: float) -> int:
     """Return the band of in-plane light of the shortest wavelength, the last of a table."""
     return int(np.floor(2e3 * optical_period / wavelengths[0]))
+
+
+def reversed_ports(ports: int, sides: int) -> Whole:
+    """Return the port of the reversed light of each port, (ports,); sides : 2 of a sheet, or 1."""
+    return np.asarray(np.flip(np.arange(ports).reshape(sides, -1), 1).ravel())
 
 
 def nodes(count: int) -> Array:

@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from . import cells
 from .cells import Array, B, largest_band, nodes
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
 LARGEST_SUM = 1.001
+#: Largest difference between M₀₀ ± M₀₁ and efficiencies: packing in 16 bits, and sums above 1.
+ROUNDING = 2e-3
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
 #: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
@@ -41,13 +44,17 @@ class Band:
     a : (τ, ρ, w, k + 1, k + 1, 2) float32, kind A: share of the light incident through channel j
         (fourth axis) that leaves through channel q (fifth), for incident light whose E, or B, lies
         along the grooves (last; s, or p, in light across them), summed over the polarisations of
-        the leaving light. Nodes are `cells.nodes`.
+        the leaving light. Nodes are `cells.nodes`. A sheet has ports instead of channels, twice as
+        many.
     b : (τ, ρ, w, k, k, 2) of kind B, with the same nodes; None for k = 0.
+    mueller : of a polarised table, the Mueller matrices (τ, ρ, w, j, q, 4, 4) of each kind, about
+        the axes of `polarised`, where M₀₀ ± M₀₁ are the efficiencies; else None.
     """
 
     k: int
     a: NDArray[np.float32]
     b: NDArray[np.float32] | None = None
+    mueller: tuple[NDArray[np.float32], ...] | None = field(default=None, kw_only=True)
 
     @property
     def counts(self) -> Counts:
@@ -73,10 +80,15 @@ class Band:
         """Efficiencies of kind A and, but for band 0, of kind B."""
         return (self.a,) if self.b is None else (self.a, self.b)
 
+    @property
+    def arrays(self) -> tuple[NDArray[np.float32], ...]:
+        """Efficiencies, then Mueller matrices, of all kinds."""
+        return self.kinds + (self.mueller or ())
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OrderTable:
-    """Efficiencies of the reflected orders of a periodic profile, at nodes of smooth coordinates.
+    """Efficiencies of the orders of a periodic profile, at nodes of smooth coordinates.
 
     x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
     are those of `cells`.
@@ -92,6 +104,8 @@ class OrderTable:
     header : facts for people and programs, JSON: `solver`, `solver_version`, `settings`,
         `material`, `profile`; `error_mean` and `error_worst`, the measured error of interpolation
         as a share of the incident light.
+    thin : whether the profile is the upper side of a thin sheet, whose lower side is flat. The
+        table then has the light on both sides, at the ports of `cells`.
 
     Raises
     ------
@@ -105,15 +119,17 @@ class OrderTable:
     bands: tuple[Band, ...]
     superstrate: float = 1.0
     header: Mapping[str, Any] = field(default_factory=dict)
+    thin: bool = False
 
     # Set by the package, since look-ups and files build on this class
     efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
     polarised_efficiency: ClassVar[Callable[..., Array]]  #: `lookup.polarised_efficiency`
+    mueller: ClassVar[Callable[..., Array]]  #: matrices of an order: `lookup.mueller`
     load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 
     def __post_init__(self) -> None:
-        check_outline(self.period, self.wavelengths, self.superstrate)
+        check_outline(self.period, self.wavelengths, self.superstrate, self.thin)
         expected = self.last_band + 1
         if [band.k for band in self.bands] != list(range(expected)):
             raise DiffractionError(
@@ -122,7 +138,7 @@ class OrderTable:
                 f"{self.superstrate:g}"
             )
         for band in self.bands:
-            _check_band(band)
+            _check_band(band, self.sides)
 
     @classmethod
     def mirror(
@@ -151,6 +167,16 @@ class OrderTable:
         return self.superstrate * self.period
 
     @property
+    def sides(self) -> int:
+        """Number of sides with light: 2 of a thin sheet, else 1."""
+        return 2 if self.thin else 1
+
+    @property
+    def polarised(self) -> bool:
+        """Whether the table has Mueller matrices."""
+        return all(band.mueller is not None for band in self.bands)
+
+    @property
     def last_band(self) -> int:
         """Band of in-plane light of the shortest wavelength."""
         return largest_band(self.wavelengths, self.optical_period)
@@ -171,20 +197,21 @@ class OrderTable:
             for values in band.kinds:
                 unpolarised = values.mean(axis=-1)
                 # t becomes 1 − t, and channel j → q becomes last − q → last − j
-                reverse = np.flip(unpolarised, (0, 3, 4)).swapaxes(3, 4)
+                ports = cells.reversed_ports(values.shape[3], self.sides)
+                reverse = np.flip(unpolarised[..., ports, :][..., ports], 0).swapaxes(3, 4)
                 residuals.append(float(np.abs(unpolarised - reverse).max()))
         return max(residuals)
 
     @property
     def albedo(self) -> float:
-        """Mean over nodes and channels of the sum over orders, unpolarised."""
+        """Mean over nodes and channels of the sum over orders of all sides, unpolarised."""
         sums = [kind.sum(axis=-2).mean() for band in self.bands for kind in band.kinds]
         return float(np.mean(sums))
 
     @property
     def nbytes(self) -> int:
-        """Size of the efficiencies in memory."""
-        return sum(kind.nbytes for band in self.bands for kind in band.kinds)
+        """Size of the numbers in memory."""
+        return sum(part.nbytes for band in self.bands for part in band.arrays)
 
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of the header."""
@@ -192,12 +219,12 @@ class OrderTable:
 
     @cached_property
     def _digest(self) -> str:
-        outline = [self.period, self.wavelengths, self.superstrate]
+        outline = [self.period, self.wavelengths, self.superstrate, self.thin]
         shapes = [kind.shape for band in self.bands for kind in band.kinds]
         content = hashlib.sha256(json.dumps([outline, shapes]).encode())
         for band in self.bands:
-            for kind in band.kinds:
-                content.update(np.ascontiguousarray(kind).data)
+            for part in band.arrays:
+                content.update(np.ascontiguousarray(part).data)
         return content.hexdigest()
 
     def summary(self) -> dict[str, Any]:
@@ -206,6 +233,8 @@ class OrderTable:
             "period_um": self.period,
             "wavelength_range_nm": list(self.wavelengths),
             "superstrate_index": self.superstrate,
+            "thin_sheet": self.thin,
+            "polarised": self.polarised,
             "bands": len(self.bands),
             "nodes": sorted({" x ".join(map(str, band.counts)) for band in self.bands}),
             "mean_albedo": round(self.albedo, 4),
@@ -217,13 +246,17 @@ class OrderTable:
     def __repr__(self) -> str:
         low, high = self.wavelengths
         medium = "" if self.superstrate == 1.0 else f" under index {self.superstrate:g}"
+        medium = ", thin sheet" if self.thin else medium
+        medium += ", polarised" if self.polarised else ""
         return (
             f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
             f"{self.nbytes / 1e6:.1f} MB)"
         )
 
 
-def check_outline(period: float, wavelengths: Sequence[float], superstrate: float) -> None:
+def check_outline(
+    period: float, wavelengths: Sequence[float], superstrate: float, thin: bool = False
+) -> None:
     """Refuse a period, wavelengths or index of which there can be no table.
 
     Raises
@@ -241,6 +274,11 @@ def check_outline(period: float, wavelengths: Sequence[float], superstrate: floa
         )
     if not 1.0 <= superstrate <= 5.0:
         raise DiffractionError(f"superstrate={superstrate:g} must be an index of 1 to 5")
+    if thin and superstrate != 1.0:
+        raise DiffractionError(
+            f"superstrate={superstrate:g}: a thin sheet has the same medium on both sides; leave "
+            "the superstrate out, and give the sheet's index relative to that medium"
+        )
     if largest_band((low, high), superstrate * period) >= MOST_BANDS:
         raise DiffractionError(
             f"a period of {period:g} µm has over {MOST_BANDS} orders at {low:g} nm; solve orders "
@@ -248,7 +286,7 @@ def check_outline(period: float, wavelengths: Sequence[float], superstrate: floa
         )
 
 
-def _check_band(band: Band) -> None:
+def _check_band(band: Band, sides: int) -> None:
     tau, rho, w = band.counts
     if not 1 <= min(tau, rho, w) <= max(tau, rho, w) <= MOST_NODES:
         raise DiffractionError(
@@ -256,8 +294,11 @@ def _check_band(band: Band) -> None:
         )
     if (band.b is None) != (band.k == 0):
         raise DiffractionError(f"band {band.k}: kind B must be there for all bands but band 0")
+    if band.mueller is not None:
+        _check_mueller(band)
     for name, values, channels in zip("AB", band.kinds, (band.k + 1, band.k), strict=False):
-        expected = (tau, rho, w, channels, channels, 2)
+        ports = sides * channels
+        expected = (tau, rho, w, ports, ports, 2)
         if values.shape != expected or values.dtype != np.float32:
             raise DiffractionError(
                 f"band {band.k}, kind {name}: {values.dtype} of shape {values.shape}, expected "
@@ -274,4 +315,25 @@ def _check_band(band: Band) -> None:
             raise DiffractionError(
                 f"band {band.k}, kind {name}: efficiencies sum to {largest:.4g} over the orders; "
                 f"at most {LARGEST_SUM} is allowed: use more points or modes in the solver"
+            )
+
+
+def _check_mueller(band: Band) -> None:
+    assert band.mueller is not None
+    shapes = [values.shape for values in band.mueller]
+    expected = [(*values.shape[:-1], 4, 4) for values in band.kinds]
+    if shapes != expected:
+        raise DiffractionError(
+            f"band {band.k}: Mueller matrices of shapes {shapes}, expected {expected}"
+        )
+    for values, matrices in zip(band.kinds, band.mueller, strict=True):
+        first = matrices[..., 0, :2]
+        efficiencies = np.stack([first.sum(axis=-1), first[..., 0] - first[..., 1]], axis=-1)
+        limit = matrices[..., :1, :1] + ROUNDING
+        # also refuses NaN
+        if not (np.all(np.abs(matrices) <= limit) and
+                np.all(np.abs(efficiencies - values) <= ROUNDING)):  # fmt: skip
+            raise DiffractionError(
+                f"band {band.k}: Mueller matrices are not those of its efficiencies; solve the "
+                "table again"
             )

@@ -1,0 +1,70 @@
+"""Blender as a separate process: the package and bpy need different versions of NumPy."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from mitsuba_diffraction.errors import DiffractionError
+
+#: Variable that names a Python with bpy, or a `blender` executable.
+VARIABLE = "MITSUBA_DIFFRACTION_BLENDER"
+#: Interpreter of `make blender`.
+DEFAULT = Path(__file__).parents[3] / ".venv/blender/bin/python"
+
+
+class Seconds(NamedTuple):
+    """Time of a render in seconds: of the clock, and of the processor."""
+
+    clock: float
+    processor: float
+
+
+@functools.cache
+def find_blender() -> Path:
+    """Return a Python with bpy, or a `blender` executable.
+
+    Raises
+    ------
+    DiffractionError
+        If there is none, or if it does not start.
+    """
+    named = os.environ.get(VARIABLE)
+    file = Path(named) if named else DEFAULT
+    if not file.exists():
+        raise DiffractionError(
+            f"no Blender at '{file}': run 'make blender', or name a Python with bpy, or a blender "
+            f"executable, in {VARIABLE}"
+        )
+    return file
+
+
+def run_in_blender(script: Path, words: Sequence[str | Path]) -> str:
+    """Run a script in Blender without a window and return what it prints.
+
+    Raises
+    ------
+    DiffractionError
+        If it fails, with the last line of its output.
+    """
+    blender = find_blender()
+    if blender.name.startswith("blender"):
+        command = [blender, "--background", "--python-exit-code", "1", "--python", script, "--"]
+    else:
+        command = [blender, "-W", "ignore", script]
+    finished = subprocess.run([*command, *words], capture_output=True, text=True, check=False)
+    if finished.returncode != 0:
+        said = (finished.stderr.strip() or finished.stdout.strip() or "no output").splitlines()
+        raise DiffractionError(f"'{script.name}' failed in Blender ({blender}): {said[-1]}")
+    return finished.stdout
+
+
+def seconds(output: str) -> list[Seconds]:
+    """Return the times of the renders that `inside.py` printed."""
+    lines = re.findall(r"^seconds (\S+) processor (\S+)$", output, re.MULTILINE)
+    return [Seconds(float(clock), float(processor)) for clock, processor in lines]

@@ -1,0 +1,264 @@
+"""Add the diffracting material of this folder to a Blender file (Cycles, Open Shading Language).
+
+In Blender: open this file in the Text editor and run it. From a terminal:
+
+    blender file.blend --python blender_material.py -- --object Disc
+
+or with Python and the package `bpy`, which needs an output file:
+
+    python blender_material.py --output disc.blend
+
+The script switches Cycles and OSL on and adds a node group with labelled inputs, and a material
+that uses it. Run it again after a new export: materials that use the group change with it.
+Blender 5.0 or newer; nothing beside Blender is needed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+try:
+    import bpy
+except ModuleNotFoundError:  # `main` says so
+    bpy = None
+
+#: Folder of the exported shader, if this text was pasted and not opened as a file.
+FOLDER = ""
+#: Oldest Blender whose closures and node groups the shader was tested with.
+OLDEST = (5, 0)
+#: Name and axis of each choice of --tangent.
+TANGENTS = {"uv": ("UV_MAP", "Z")} | {f"radial-{axis.lower()}": ("RADIAL", axis) for axis in "XYZ"}
+
+
+class MaterialError(Exception):
+    """The material cannot be added; the message is one line."""
+
+
+def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str = "uv") -> Any:
+    """Return a new material that shows the shader of an exported folder.
+
+    Parameters
+    ----------
+    folder : exported folder: a shader (`.osl`), its sockets (`.json`) and its textures.
+    name : of the material and its node group; by default that of the shader. A group and a
+        material of that name are rebuilt.
+    tangent : key of `TANGENTS`: direction of the patch's x axis before Rotation. `uv` is along
+        the first texture coordinate, `radial-z` runs around the object's z axis.
+    """
+    check_blender()
+    exported = read_folder(Path(folder))
+    name = name or exported["shader"].stem.replace("_", " ")
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.shading_system = True
+    group = _group(exported, name)
+    material = bpy.data.materials.get(name) or bpy.data.materials.new(name)
+    if bpy.app.version < (6, 0):  # later versions have nodes always
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    surface = _node(nodes, "ShaderNodeGroup", (0, 0))
+    surface.node_tree = group
+    surface.label, surface.width = name, 240
+    _link_tangent(nodes, links, surface, tangent)
+    links.new(surface.outputs[0], _node(nodes, "ShaderNodeOutputMaterial", (320, 0)).inputs[0])
+    return material
+
+
+def check_blender() -> None:
+    """Check that this is a Blender that runs the shader.
+
+    Raises
+    ------
+    MaterialError
+        Outside Blender, in an older Blender, and in a Blender without OSL.
+    """
+    if bpy is None:
+        raise MaterialError(
+            "this Python has no module bpy; run this file in Blender's Text editor, by "
+            "'blender --python', or after 'pip install bpy'"
+        )
+    if bpy.app.version < OLDEST:
+        raise MaterialError(
+            f"Blender {bpy.app.version_string} is too old; the shader needs Blender "
+            f"{OLDEST[0]}.{OLDEST[1]} or newer"
+        )
+    try:
+        import _cycles
+
+        with_osl = _cycles.with_osl
+    except ModuleNotFoundError:
+        with_osl = False
+    if not with_osl:
+        raise MaterialError(
+            f"this Blender {bpy.app.version_string} was built without Open Shading Language; "
+            "use a Blender from blender.org, or 'pip install bpy'"
+        )
+
+
+def read_folder(folder: Path) -> dict[str, Any]:
+    """Return the document of an exported folder, with absolute paths of its files."""
+    documents = sorted(file for file in folder.glob("*.json") if file.with_suffix(".osl").exists())
+    if len(documents) != 1:
+        raise MaterialError(
+            f"expected one shader (.osl with .json) in '{folder}', got {len(documents)}; name the "
+            "folder that 'mitsuba-diffraction export-osl' wrote"
+        )
+    try:
+        exported = json.loads(documents[0].read_text(encoding="utf-8"))
+        exported["shader"] = (folder / exported["shader"]).resolve()
+        exported["textures"] = {
+            key: (folder / file).resolve() for key, file in exported["textures"].items()
+        }
+        inputs = [(entry["identifier"], entry["label"]) for entry in exported["inputs"]]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise MaterialError(
+            f"cannot read '{documents[0]}' ({error}); export the shader again"
+        ) from error
+    missing = [file for file in exported["textures"].values() if not file.exists()]
+    if missing or not inputs:
+        raise MaterialError(f"'{folder}' is incomplete; export the shader again")
+    return dict(exported)
+
+
+def _group(exported: dict[str, Any], name: str) -> Any:
+    """Return the node group around a script node, with an input for each that artists set."""
+    group = bpy.data.node_groups.get(name) or bpy.data.node_groups.new(name, "ShaderNodeTree")
+    group.nodes.clear()
+    group.interface.clear()
+    shader = exported["shader"]
+    script = _node(group.nodes, "ShaderNodeScript", (0, 0))
+    script.mode, script.label, script.width = "EXTERNAL", shader.name, 240
+    _find_oslquery()
+    script.filepath = str(shader)  # compiles, and makes the sockets
+    if not script.outputs:
+        raise MaterialError(f"Blender could not compile '{shader}'; its console says why")
+    inside = _node(group.nodes, "NodeGroupInput", (-280, 0))
+    outside = _node(group.nodes, "NodeGroupOutput", (320, 0))
+    fixed = {key: str(file) for key, file in exported["textures"].items()}
+    fixed["WorkingSpace"] = bpy.data.colorspace.working_space
+    for entry in exported["inputs"]:
+        socket = script.inputs[entry["label"]]
+        if entry["identifier"] in fixed:
+            socket.default_value = fixed[entry["identifier"]]
+        else:
+            outer = group.interface.new_socket(
+                entry["label"], in_out="INPUT", socket_type=socket.bl_idname
+            )
+            _describe(outer, socket, entry)
+            group.links.new(inside.outputs[entry["label"]], socket)
+    group.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    group.links.new(script.outputs[0], outside.inputs["BSDF"])
+    return group
+
+
+def _find_oslquery() -> None:
+    """Let Python find `oslquery`, which the package bpy brings but does not put on the path."""
+    version = "python{}.{}".format(*sys.version_info[:2])
+    site = Path(bpy.utils.resource_path("LOCAL"), "python/lib", version, "site-packages")
+    if site.is_dir() and str(site) not in sys.path:
+        sys.path.append(str(site))
+
+
+def _describe(outer: Any, socket: Any, entry: dict[str, Any]) -> None:
+    """Give an input of a group the default, range and tooltip of its parameter."""
+    outer.description = entry["help"]
+    outer.hide_value = socket.hide_value
+    for key in ("min_value", "max_value"):
+        if entry.get(key) is not None:
+            setattr(outer, key, entry[key])
+    if not socket.hide_value:
+        outer.default_value = socket.default_value
+
+
+def _link_tangent(nodes: Any, links: Any, surface: Any, tangent: str) -> None:
+    """Link a Tangent node, whose direction an artist can change, to a group that takes it."""
+    if "Tangent" in surface.inputs:
+        node = _node(nodes, "ShaderNodeTangent", (-240, -120))
+        node.direction_type, node.axis = TANGENTS[tangent]
+        links.new(node.outputs[0], surface.inputs["Tangent"])
+
+
+def _node(nodes: Any, kind: str, location: tuple[float, float]) -> Any:
+    node = nodes.new(kind)
+    node.location = location
+    return node
+
+
+def _folders() -> list[Path]:
+    """Return where the shader may be: FOLDER, beside this file, beside texts of the .blend."""
+    if FOLDER:
+        return [Path(FOLDER)]
+    texts = [bpy.path.abspath(text.filepath) for text in bpy.data.texts if text.filepath]
+    return [Path(file).parent for file in (__file__, *texts)]
+
+
+def _arguments(words: Sequence[str]) -> argparse.Namespace:
+    """Parse the command line, of which Blender's part ends with `--`."""
+    parser = argparse.ArgumentParser(prog="blender_material.py", description=__doc__.split("\n")[0])
+    parser.add_argument("--folder", type=Path, help="exported folder; default: that of this file")
+    parser.add_argument("--name", default="", help="of the material; default: that of the shader")
+    parser.add_argument("--object", help="mesh object that gets the material")
+    parser.add_argument(
+        "--tangent", choices=TANGENTS, default="uv", help="direction of the patch's x axis"
+    )
+    parser.add_argument("--output", type=Path, help=".blend file to write")
+    return parser.parse_args(words)
+
+
+def run(words: Sequence[str]) -> None:
+    """Add the material to the open file as the command line says."""
+    arguments = _arguments(words)
+    check_blender()
+    folders = [arguments.folder] if arguments.folder else _folders()
+    folder = next((path for path in folders if any(path.glob("*.osl"))), folders[0])
+    material = add_material(folder, name=arguments.name, tangent=arguments.tangent)
+    if arguments.object:
+        target = bpy.data.objects.get(arguments.object)
+        if target is None or target.type != "MESH":
+            meshes = ", ".join(o.name for o in bpy.data.objects if o.type == "MESH") or "none"
+            raise MaterialError(f"no mesh object '{arguments.object}'; the file has {meshes}")
+        target.data.materials.clear()
+        target.data.materials.append(material)
+        target.material_slots[0].material = material
+    else:
+        material.use_fake_user = True  # kept in the file while no object has it
+    if arguments.output:
+        _save(arguments.output)
+    print(f"added the material '{material.name}' of {folder}")
+
+
+def _save(output: Path) -> None:
+    if not output.parent.is_dir():
+        raise MaterialError(f"cannot write '{output}': its folder does not exist")
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve()), check_existing=False)
+    except RuntimeError as error:
+        raise MaterialError(f"cannot write '{output}': {str(error).strip()}") from error
+
+
+def main() -> None:
+    """Run, and report an error in one line: in a popup of Blender's window, or on stderr."""
+    words = sys.argv[1:]
+    if os.path.basename(sys.argv[0]) != os.path.basename(__file__):  # Blender's own words
+        words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    try:
+        run(words)
+    except MaterialError as error:
+        message = f"blender_material.py: error: {error}"
+        print(message, file=sys.stderr)
+        if bpy is None or bpy.app.background:
+            sys.exit(1)
+        bpy.context.window_manager.popup_menu(
+            lambda menu, _: menu.layout.label(text=message), title="Material", icon="ERROR"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,259 @@
+"""Export of a surface to Blender: a shader in Open Shading Language (OSL) and its textures."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError, one_line, quoted
+from ..optics.colour import RGB_WAVELENGTHS, WORKING_SPACES
+from .orders import interpolation_error, order_constants, order_texture
+from .patch import check_patch, mean_transmittance, patch_constants, patch_error, patch_textures
+from .sockets import (
+    Socket,
+    array_parameter,
+    common_sockets,
+    height_socket,
+    window_socket,
+)
+from .spectrum import NODES, drawn_spectrum
+
+#: Script that adds the material to a .blend file, copied into the folder.
+SCRIPT = "blender_material.py"
+
+_HEAD = "// {surface}; made by mitsuba_diffraction {version}.\n"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Files of an exported surface.
+
+    Attributes
+    ----------
+    shader, document : the shader (.osl), and its sockets for the script (.json).
+    textures : files by the identifier of the socket that names them.
+    surface : description in a few words.
+    error : figures of the textures' error, for people.
+    """
+
+    shader: Path
+    document: Path
+    textures: dict[str, Path]
+    surface: str
+    error: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Shader:
+    """Shader of a surface before it is written.
+
+    Attributes
+    ----------
+    source : name of the file in `shaders`.
+    constants : macros.
+    arrays : declarations of parameters that are constant arrays.
+    sockets : inputs.
+    textures : pixels (height, width, 4), by the identifier of the socket that names the file.
+    surface, error : see `Exported`.
+    """
+
+    source: str
+    constants: Mapping[str, Any]
+    arrays: Sequence[str]
+    sockets: Sequence[Socket]
+    textures: Mapping[str, NDArray[Any]]
+    surface: str
+    error: dict[str, float]
+
+
+def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction") -> Exported:
+    """Write `NAME.osl`, its textures (EXR), `NAME.json` and `blender_material.py` into a folder.
+
+    Parameters
+    ----------
+    bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`, without
+        coat, film or nested BSDF.
+    folder : made if it is missing.
+    name : of the shader and its files; letters, digits and underscores.
+
+    Raises
+    ------
+    DiffractionError
+        If the surface has features that the shader lacks, or the folder cannot be written.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise DiffractionError(
+            f"name={quoted(name)} must be letters, digits and underscores, a letter first: it is "
+            "the name of a shader"
+        )
+    shader = _shader(bsdf)
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot write into '{path}': {error.strerror}; choose a folder that can be made"
+        ) from error
+    files = {
+        key: path / f"{name}_{key.removesuffix('File').lower()}.exr" for key in shader.textures
+    }
+    for key, pixels in shader.textures.items():
+        _save_texture(files[key], pixels)
+    textures = [
+        Socket(key, key.removesuffix("File") + " Texture", "string", file.resolve().as_posix(),
+               "File of the export, beside the shader")
+        for key, file in files.items()
+    ]  # fmt: skip
+    sockets = [*shader.sockets, *textures]
+    exported = Exported(
+        path / f"{name}.osl", path / f"{name}.json", files, shader.surface, shader.error
+    )
+    _save_text(exported.shader, _source(shader, sockets, name))
+    document = {
+        "generator": f"mitsuba_diffraction {version('mitsuba_diffraction')}",
+        "surface": shader.surface,
+        "shader": exported.shader.name,
+        "inputs": [socket.document() for socket in sockets],
+        "output": "BSDF",
+        "textures": {key: file.name for key, file in files.items()},
+    }
+    _save_text(exported.document, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    script = resources.files(__package__).joinpath(SCRIPT)
+    if script.is_file():
+        _save_text(path / SCRIPT, script.read_text(encoding="utf-8"))
+    return exported
+
+
+def _shader(bsdf: Any) -> Shader:
+    """Return the shader of a BSDF, or refuse it."""
+    from ..plugin.bsdf import Diffraction  # which only a variant has
+    from ..plugin.orders.bsdf import DiffractionOrders
+
+    if not isinstance(bsdf, DiffractionOrders | Diffraction):
+        raise DiffractionError(
+            f"bsdf={type(bsdf).__name__} cannot be shown in OSL: give a BSDF of type 'diffraction' "
+            "or 'diffraction_orders', for instance mi.load_dict(md.bsdf_dict(...))"
+        )
+    if bsdf.nested is not None:
+        raise DiffractionError(
+            "a BSDF beneath the surface is not exported: leave it out, and set the colour as "
+            "Pigment in Blender"
+        )
+    turn = getattr(bsdf.orientation, "degrees", None)
+    if turn is None:
+        raise DiffractionError(
+            "orientation is a texture, which OSL does not read: export a number, and link a "
+            "texture to Rotation or Tangent in Blender"
+        )
+    common = common_sockets(float(turn[0]))
+    return _orders(bsdf, common) if isinstance(bsdf, DiffractionOrders) else _patch(bsdf, common)
+
+
+def _orders(bsdf: Any, common: Sequence[Socket]) -> Shader:
+    if bsdf.table.thin:
+        raise DiffractionError(
+            "the table is of a thin sheet, which lets light through, and OSL shows reflection "
+            "alone: export a table of the reflecting side, or render it with Mitsuba"
+        )
+    texture = order_texture(bsdf.table)
+    error = interpolation_error(bsdf.table, texture)
+    return Shader(
+        "orders.osl",
+        order_constants(bsdf.table, texture),
+        [array_parameter("int", "Starts", texture.starts)],
+        [window_socket(bsdf.coherence_width), *common],
+        {"OrdersFile": texture.pixels},
+        str(bsdf.table),
+        {"mean": error.mean, "largest of 99.9 %": error.worst},
+    )
+
+
+def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
+    from ..plugin.energy import indices_of
+
+    check_patch(bsdf)
+    table = bsdf.table
+    textures = patch_textures(table)
+    index = indices_of(bsdf.fresnel, drawn_spectrum().wavelengths)
+    parts = np.full(NODES, 1.5 + 0j) if index is None else index
+    arrays = {
+        "Eta": np.real(parts),
+        "Absorption": np.imag(parts),
+        "Roughness": table.roughness.nodes,
+        "Order0": textures.order_0,
+    }
+    stretch = bsdf.lateral_scale.range_over_table()[0]
+    constants = patch_constants(table, textures, stretch)
+    constants["PERFECT"] = int(index is None)
+    constants["SMALL_SLOPE"] = int(str(bsdf.boundary) == "small_slope")
+    constants["PIGMENT_SHARE"] = mean_transmittance(index)
+    return Shader(
+        "patch.osl",
+        constants,
+        [array_parameter("float", name, values) for name, values in arrays.items()],
+        [
+            window_socket(table.coherence_width),
+            height_socket(bsdf.height_scale[0], table.height_scale_max),
+            *common,
+        ],
+        {"PowersFile": textures.powers, "DrawsFile": textures.draws},
+        f"patch of {bsdf.table.source.get('name', 'heights')}, {bsdf.fresnel}",
+        patch_error(table, textures),
+    )
+
+
+def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
+    """Return the source of a shader: constants, the shared functions, and its own."""
+    spectrum = drawn_spectrum()
+    arrays = [array_parameter("float", "Wavelengths", spectrum.wavelengths)]
+    arrays += [
+        array_parameter("color", f"Colours{n}", colours)
+        for n, colours in enumerate(spectrum.colours.values())
+    ]
+    declarations = [socket.declaration() for socket in sockets]
+    parameters = [*declarations, *arrays, *shader.arrays, "output closure color BSDF = 0"]
+    constants = {
+        "N_NODES": NODES,
+        **dict(zip(("RED", "GREEN", "BLUE"), (1e-3 * x for x in RGB_WAVELENGTHS), strict=True)),
+        **shader.constants,
+    }
+    lines = [f"#define {key} {_literal(value)}" for key, value in constants.items()]
+    lines += [f'#define SPACE_{n} "{space}"' for n, space in enumerate(WORKING_SPACES)]
+    folder = resources.files(__package__).joinpath("shaders")
+    common, own = (
+        folder.joinpath(file).read_text(encoding="utf-8") for file in ("common.osl", shader.source)
+    )
+    own = own.replace("SHADER(PARAMETERS)", f"{name}(\n    " + ",\n    ".join(parameters) + "\n)")
+    head = _HEAD.format(surface=shader.surface, version=version("mitsuba_diffraction"))
+    return head + "\n".join(lines) + "\n\n" + common + "\n" + own
+
+
+def _literal(value: float | int) -> str:
+    """Return a number as OSL reads it: with a point if it is no whole number's type."""
+    return str(value) if isinstance(value, int) else repr(float(value))
+
+
+def _save_text(path: Path, text: str) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _save_texture(path: Path, pixels: NDArray[np.floating]) -> None:
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with atomic_path(path) as temporary:
+        try:
+            OpenEXR.File(header, {"RGBA": np.ascontiguousarray(pixels)}).write(str(temporary))
+        except RuntimeError as error:  # OpenEXR's exception for a full disk
+            raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error

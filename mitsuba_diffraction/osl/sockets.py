@@ -1,0 +1,120 @@
+"""Sockets of the shaders: declared once for the OSL source and for the script in Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+#: Blender's socket class of each kind of socket, and the type in OSL.
+_KINDS = {
+    "float": ("NodeSocketFloat", "float"),
+    "color": ("NodeSocketColor", "color"),
+    "vector": ("NodeSocketVector", "vector"),
+    "normal": ("NodeSocketVector", "normal"),
+    "string": ("NodeSocketString", "string"),
+}
+
+
+@dataclass(frozen=True)
+class Socket:
+    """Input of a shader that Blender shows.
+
+    Attributes
+    ----------
+    identifier : name of the parameter in OSL.
+    label : name that Blender shows, with the unit.
+    kind : "float", "color", "vector", "normal" or "string".
+    default : value, or for vectors the global variable of OSL; colours have three numbers.
+    help : tooltip.
+    """
+
+    identifier: str
+    label: str
+    kind: str
+    default: Any
+    help: str
+
+    def declaration(self) -> str:
+        """Return the declaration of the parameter with its metadata."""
+        value = self.default
+        if self.kind == "string":
+            value = f'"{value}"'
+        elif self.kind == "color":
+            value = f"color({', '.join(f'{x:.9g}' for x in value)})"
+        elif self.kind == "float":
+            value = f"{float(value)!r}"
+        widget = ' string widget = "null",' if self.kind in ("vector", "normal") else ""
+        return (
+            f"{_KINDS[self.kind][1]} {self.identifier} = {value}\n"
+            f'        [[{widget} string label = "{self.label}", string help = "{self.help}" ]]'
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the socket for the script in Blender, as JSON types.
+
+        Vectors have no default: the shader takes the surface's own while nothing is linked.
+        """
+        document = {**asdict(self), "socket": _KINDS[self.kind][0]}
+        if self.kind in ("vector", "normal"):
+            document["default"] = None
+        return document
+
+
+def array_parameter(kind: str, name: str, rows: Iterable[Any]) -> str:
+    """Return the declaration of a parameter that is a constant array, which Blender hides.
+
+    kind : "float", "int" or "color"; rows of the latter have three numbers.
+    """
+
+    def number(value: Any) -> str:
+        return str(int(value)) if kind == "int" else f"{float(value):.7g}"
+
+    items = [
+        f"color({', '.join(number(x) for x in row)})" if kind == "color" else number(row)
+        for row in rows
+    ]
+    return f"{kind} {name}[{len(items)}] = {{{', '.join(items)}}}"
+
+
+def window_socket(coherence_width: float) -> Socket:
+    """Return the socket of the coherence width, µm."""
+    return Socket(
+        "CoherenceWidth", "Coherence Width (µm)", "float", coherence_width,
+        "Width over which light is coherent, 65 in sunlight. Narrower windows blur the orders: "
+        "the roughness of their lobes",
+    )  # fmt: skip
+
+
+def height_socket(scale: float, most: float) -> Socket:
+    """Return the socket of the factor on the heights."""
+    return Socket(
+        "HeightScale", "Height Scale", "float", scale,
+        f"Factor on the heights, 0 to {most:g}: the table has no deeper surface",
+    )  # fmt: skip
+
+
+def common_sockets(orientation: float) -> list[Socket]:
+    """Return the sockets that all shaders have.
+
+    orientation : degrees from the tangent to the patch's x axis.
+    """
+    return [
+        Socket(
+            "Rotation", "Rotation (°)", "float", orientation,
+            "Angle in degrees from the tangent to the x axis of the patch, across the grooves",
+        ),
+        Socket(
+            "Pigment", "Pigment", "color", (0.0, 0.0, 0.0),
+            "Colour beneath, which receives the light that is not reflected; black for metals",
+        ),
+        Socket(
+            "WorkingSpace", "Working Space", "string", "Linear Rec.709",
+            "Working space of the file, Blender's name. Linear Rec.2020 holds spectral colours "
+            "better than Linear Rec.709",
+        ),
+        Socket("Normal", "Normal", "normal", "N", "Normal of the surface"),
+        Socket(
+            "Tangent", "Tangent", "vector", "dPdu", "Direction of u; link a Tangent node, UV Map"
+        ),
+    ]  # fmt: skip

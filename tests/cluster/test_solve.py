@@ -1,0 +1,88 @@
+"""Tables of orders solved on workers: killed workers, and clients that were killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.thorough
+
+pytest.importorskip("distributed")
+pytest.importorskip("gratinglab")
+
+from mitsuba_diffraction.cli import main  # noqa: E402
+from mitsuba_diffraction.cluster.workers import executor_of  # noqa: E402
+from mitsuba_diffraction.solve.jobs import Jobs  # noqa: E402
+from mitsuba_diffraction.solve.orders import Settings, solve_orders  # noqa: E402
+from mitsuba_diffraction.solve.profiles import sinusoidal  # noqa: E402
+from mitsuba_diffraction.tables.orders import OrderTable  # noqa: E402
+from tests.support import ROOT  # noqa: E402
+from tests.support.orders import digest_in_file  # noqa: E402
+
+# a perfect conductor has no third variable: 300 solutions of some milliseconds
+PROFILE = sinusoidal(0.5, 0.05)
+SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, resolution=48)
+WORDS = [
+    "solve", "sinusoidal", "--period", "0.5", "--depth", "0.05", "--material", "none",
+    "--wavelength-range", "520,640", "--tolerance", "0.1", "--resolution", "48",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def table():
+    """The table of one process."""
+    return solve_orders(PROFILE, "none", settings=SETTINGS)
+
+
+def test_a_killed_worker_changes_no_bit(client, table, tmp_path):
+    killed = []
+
+    def disturb(done, total, text):
+        if text == "solving orders" and done >= 3 and not killed:
+            killed.append(next(iter(client.cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with executor_of(client) as workers:
+        jobs = Jobs(executor=workers, progress=disturb)
+        on_workers = solve_orders(PROFILE, "none", settings=SETTINGS, jobs=jobs)
+    assert killed
+    assert digest_in_file(on_workers, tmp_path) == digest_in_file(table, tmp_path)
+    client.wait_for_workers(2, timeout=300)
+
+
+CLIENT = """
+import os, signal, sys, threading, time
+from pathlib import Path
+from mitsuba_diffraction.cli import main
+
+def watch():
+    while len(list(Path(".groove.solving").glob("*.npz"))) < {count}:
+        time.sleep(0.01)
+    os.kill(os.getpid(), signal.{signal})
+
+threading.Thread(target=watch, daemon=True).start()
+sys.exit(main({words!r}))
+"""
+
+
+def test_a_client_that_was_killed_and_interrupted_goes_on(client, table, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = [*WORDS, "-o", "groove.nc", "--scheduler", client.scheduler.address]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
+    before = 0
+    for name, code in (("SIGKILL", -signal.SIGKILL), ("SIGINT", 130)):
+        program = CLIENT.format(count=before + 60, signal=name, words=words)
+        ran = subprocess.run(
+            [sys.executable, "-c", program], env=variables, capture_output=True, text=True
+        )
+        assert ran.returncode == code
+        assert "Traceback" not in ran.stderr
+        before = len(list((tmp_path / ".groove.solving").glob("*.npz")))
+        assert not (tmp_path / "groove.nc").exists()
+    assert main(words) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["groove.nc"]
+    assert OrderTable.load("groove.nc").digest() == digest_in_file(table, tmp_path)

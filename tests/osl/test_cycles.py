@@ -1,0 +1,102 @@
+"""Exported materials in Cycles: energy, directions and colours. Needs Blender, skips without."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
+from mitsuba_diffraction.tables.orders import Band, OrderTable
+from tests.support.blender import blender
+from tests.support.cycles import plane_seen
+from tests.support.patches import DEFAULTS, PATCH
+
+pytestmark = pytest.mark.thorough
+
+PERIOD = 1.6
+
+
+@pytest.fixture(autouse=True)
+def _blender(some_variant):
+    blender()
+
+
+def table_of(values, superstrate=1.0):
+    """Table whose efficiencies, of one node a band, are values(channels), (j, q)."""
+
+    def kind(count):
+        return np.repeat(values(count)[None, None, None, ..., None], 2, -1).astype(np.float32)
+
+    last = OrderTable.mirror(PERIOD, superstrate=superstrate).last_band
+    bands = tuple(Band(k, kind(k + 1), kind(k) if k else None) for k in range(last + 1))
+    return OrderTable(PERIOD, (380.0, 780.0), bands, superstrate)
+
+
+def exported(table, folder, **parameters):
+    return md.osl.export(mi.load_dict(md.bsdf_dict(table, **parameters)), folder)
+
+
+@pytest.mark.parametrize("superstrate", [1.0, 1.5])
+def test_white_mirror_is_white(tmp_path, superstrate):
+    mirror = OrderTable.mirror(PERIOD, superstrate=superstrate)
+    seen = plane_seen(exported(mirror, tmp_path), [0, 60])
+    assert seen.mean == pytest.approx(1.0, abs=0.02)
+
+
+def test_lossless_grating_is_white(tmp_path):
+    """Light in equal parts in all orders, also where the lobes are wide."""
+    equal = table_of(lambda n: np.full((n, n), 1.0 / n))
+    seen = plane_seen(exported(equal, tmp_path), [20, 50])
+    assert seen.mean == pytest.approx(1.0, abs=0.02)
+
+
+def test_order_follows_the_grating_equation(tmp_path):
+    """Light of order 1 alone: the mean of x over its directions is that of λ/d − sinθ, by channel.
+
+    Efficiency 1 wherever order 1 propagates; at 40° it does, in all of the visible.
+    """
+    one = table_of(lambda n: np.eye(n, k=-1) if n > 1 else np.zeros((1, 1)))
+    width, theta = 65.0, 40.0
+    seen = plane_seen(
+        exported(one, tmp_path, coherence_width=width), [theta], sky="x", WorkingSpace="ACEScg"
+    )
+    spectrum = drawn_spectrum()
+    u = (np.arange(4000) + 0.5) / 4000
+    nodes = np.linspace(0.0, 1.0, NODES)
+    colours = spectrum.colours["ACEScg"]
+    weights = np.stack([np.interp(u, nodes, column) for column in colours.T])
+    mean = (weights @ np.interp(u, nodes, spectrum.wavelengths)) / 4000
+    expected = 1.0 + 1e-3 * mean / PERIOD - np.sin(np.radians(theta))
+    # four standard errors, of some 0.001 of the light; a wavelength of 3 nm
+    assert np.all(np.abs(seen.mean[0] - expected) < 4 * seen.error[0] + 1e-3)
+
+
+@pytest.mark.parametrize("material", ["none", "dielectric"])
+def test_patch_reflects_as_in_mitsuba(tmp_path, material):
+    """A patch of a flat mirror is white; a rough dielectric has the albedo of Mitsuba's BSDF."""
+    if material == "none":
+        flat = md.HeightField(np.zeros((32, 32)), 0.08)
+        bsdf = mi.load_dict(md.bsdf_dict(flat, coherence_width=5, material="none"))
+        expected = 1.0
+    else:
+        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False))
+        expected = albedo(bsdf, 30.0)
+    seen = plane_seen(md.osl.export(bsdf, tmp_path), [30], WorkingSpace="Linear Rec.2020")
+    assert seen.mean == pytest.approx(expected, rel=0.02)
+
+
+def albedo(bsdf, degrees, count=100_000):
+    """Mean of drawn weights over the visible, of light from x."""
+    rng = np.random.default_rng(3)
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    angle = np.radians(degrees)
+    si.wi = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    si.n, si.sh_frame = mi.Normal3f(0, 0, 1), mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.wavelengths = mi.UnpolarizedSpectrum(550.0)
+    first, *second = (mi.Float(x) for x in rng.random((3, count)).astype(np.float32))
+    _, weight = bsdf.sample(mi.BSDFContext(), si, first, mi.Point2f(*second))
+    return float(np.mean(np.array(weight)))

@@ -1,0 +1,81 @@
+"""The BSDF `diffraction_orders` of a thin sheet: light on both sides."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError, reference
+from tests.support.orders import PERIOD, lit_pairs, load, on_all_sides, thin_grating
+from tests.support.variants import evaluate
+
+SHEET = thin_grating(thin=True)
+
+
+def expected_values(table, wi, wo, wavelength):
+    """The reference of light on any side, times |cosθo|."""
+    values = np.zeros(len(wi))
+    up = np.array([1.0, 1.0, -1.0])
+    for from_below, transmitted in itertools.product((False, True), (False, True)):
+        here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
+        efficiency = functools.partial(
+            table.efficiency, from_below=from_below, transmitted=transmitted
+        )
+        above = wi[here] * up if from_below else wi[here]
+        left = wo[here] * up if from_below != transmitted else wo[here]
+        values[here] = reference.orders_brdf(efficiency, PERIOD, above, left, wavelength[here])
+    return values * np.abs(wo[:, 2])
+
+
+def test_values_are_the_references_on_both_sides_and_weights_are_one(some_variant):
+    wi, wo, samples, wavelength = lit_pairs(80)
+    wavelength[:] = wavelength[:, :1]
+    wi, wo = on_all_sides(wi, wo)
+    values, pdf, again, pdf_again, drawn, _, weights = evaluate(
+        load(SHEET), wi, wo, samples, wavelength
+    )
+    expected = expected_values(SHEET, wi, wo, wavelength[:, 0])
+    # linear interpolation between the corners of cells
+    assert np.abs(values[:, 0] - expected).sum() <= 1e-3 * expected.sum()
+    assert np.array_equal(values, again)
+    assert np.array_equal(pdf, pdf_again)
+    steps = np.arange(-5, 6)[:, None]
+    albedo = sum(
+        np.where(
+            (wi[:, 2] < 0.0) == from_below,
+            SHEET.efficiency(
+                -wi[:, 0], -wi[:, 1], wavelength[:, 0], steps,
+                from_below=from_below, transmitted=transmitted,
+            ).sum(axis=0),
+            0.0,
+        )
+        for from_below, transmitted in itertools.product((False, True), (False, True))
+    )  # fmt: skip
+    # drawn exactly: half floats are rounded up
+    valid = weights[:, 0] > 0.0
+    assert valid.mean() > 0.9
+    assert weights[valid, 0] == pytest.approx(albedo[valid], rel=3e-3)
+    assert (drawn[valid, 2] * wi[valid, 2] < 0.0).mean() == pytest.approx(0.72, abs=0.15)
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_a_component_is_the_light_of_its_side(some_variant, component):
+    wi, wo, samples, wavelength = lit_pairs(40)
+    wi, wo = on_all_sides(wi, wo)
+    whole = evaluate(load(SHEET), wi, wo, samples, wavelength)[0]
+    part = evaluate(load(SHEET), wi, wo, samples, wavelength, component)
+    passed = wi[:, 2] * wo[:, 2] < 0.0
+    assert np.array_equal(part[0], np.where((passed == component)[:, None], whole, 0.0))
+    sides = part[4][:, 2] * wi[:, 2] < 0.0
+    assert np.all(part[5][sides != component] == 0.0)
+
+
+def test_no_bsdf_lies_beneath_a_sheet(some_variant):
+    with pytest.raises(Exception, match="thin sheet") as caught:
+        load(SHEET, beneath={"type": "diffuse"})
+    assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
+    assert mi.has_flag(load(SHEET).flags(), mi.BSDFFlags.GlossyTransmission)

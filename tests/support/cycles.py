@@ -1,0 +1,113 @@
+"""A plane under a sky, rendered by Cycles with an exported material; runs Blender."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mitsuba_diffraction.osl import Exported
+from tests.support.blender import result_of
+from tests.support.directions import Array
+
+_CODE = """
+import bpy, math, _cycles, numpy as np
+from pathlib import Path
+folder = Path(folder)
+document = json.loads((folder / document).read_text(encoding="utf-8"))
+compiled = folder / "shader.oso"
+assert _cycles.osl_compile(str(folder / document["shader"]), str(compiled)), "no OSL"
+result = []
+for degrees in tilts:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.shading_system = "CPU", True
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.cycles.use_adaptive_sampling = False
+    scene.render.resolution_x = scene.render.resolution_y = pixels
+    scene.render.threads_mode, scene.render.threads = "FIXED", 1
+    material = bpy.data.materials.new("surface")
+    tree = material.node_tree
+    tree.nodes.clear()
+    script = tree.nodes.new("ShaderNodeScript")
+    script.mode, script.filepath = "EXTERNAL", str(compiled)
+    bsdf = script.outputs.new("NodeSocketShader", document["output"])
+    for item in document["inputs"]:
+        name = item["identifier"]
+        socket = script.inputs.new(item["socket"], item["label"], identifier=name)
+        value = values.get(name, item["default"])
+        if item["kind"] == "color":
+            value = [*value, 1.0]
+        if value is not None:
+            socket.default_value = value
+        if name == "Tangent":
+            tangent = tree.nodes.new("ShaderNodeTangent")
+            tangent.direction_type = "UV_MAP"
+            tree.links.new(tangent.outputs[0], socket)
+    end = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(bsdf, end.inputs["Surface"])
+    bpy.ops.mesh.primitive_plane_add(size=100)
+    bpy.context.object.data.materials.append(material)
+    world = scene.world = bpy.data.worlds.new("sky")
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    background = nodes.new("ShaderNodeBackground")
+    if sky == "x":  # radiance 1 + x of the direction
+        place = nodes.new("ShaderNodeTexCoord")
+        split = nodes.new("ShaderNodeSeparateXYZ")
+        add = nodes.new("ShaderNodeMath")
+        add.inputs[1].default_value = 1.0
+        links.new(place.outputs["Generated"], split.inputs[0])
+        links.new(split.outputs["X"], add.inputs[0])
+        links.new(add.outputs[0], background.inputs["Color"])
+    else:
+        background.inputs["Color"].default_value = (1, 1, 1, 1)
+    sink = nodes.new("ShaderNodeOutputWorld")
+    links.new(background.outputs[0], sink.inputs["Surface"])
+    tilt = math.radians(degrees)
+    place = (10 * math.sin(tilt), 0, 10 * math.cos(tilt))  # the camera looks from x
+    bpy.ops.object.camera_add(location=place, rotation=(0, tilt, 0))
+    scene.camera = bpy.context.object
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(folder / "picture.exr")
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    picture.colorspace_settings.name = "Non-Color"
+    light = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
+    spread = light.std(axis=0) / len(light) ** 0.5
+    result.append([light.mean(axis=0).tolist(), spread.tolist()])
+"""
+
+
+class Seen(NamedTuple):
+    """Radiance of a plane in linear RGB, (tilts, 3): mean over pixels, and its standard error."""
+
+    mean: Array
+    error: Array
+
+
+def plane_seen(
+    exported: Exported,
+    tilts: list[float],
+    sky: str = "white",
+    samples: int = 256,
+    pixels: int = 12,
+    **values: object,
+) -> Seen:
+    """Render a plane whose patch has x along the world's, seen from some angles towards x.
+
+    tilts : degrees from the normal.
+    sky : "white", or "x" for a radiance of 1 + x of the direction.
+    values : of sockets, by identifier.
+    """
+    folder = Path(exported.document).parent
+    light = result_of(
+        _CODE, folder, folder=str(folder), document=exported.document.name, tilts=tilts, sky=sky,
+        samples=samples, pixels=pixels, values=values,
+    )  # fmt: skip
+    mean, error = np.moveaxis(np.array(light), 1, 0)
+    return Seen(mean, error)
