@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "wavelength_range", "tolerance", "solver",
-    "resolution", "jobs", "workers", "scheduler",
+    "resolution", "polarised", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -84,8 +84,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
-        "more; needs --period",
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
+        "incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
@@ -147,6 +147,10 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
+        if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
+            args.parser.error(
+                f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
+            )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, Settings(), Path(f"{source.stem}.nc"))
     changed = {
