@@ -301,7 +301,7 @@ def _unpolarised(place: Place, amplitudes: Complex) -> Real:
 
 def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
     """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
-    y = np.maximum(grating.station(*place).along, 1e-3)[:, None, None, None, None]
+    y = grating.station(*place).along[:, None, None, None, None]
     elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
     return elements.reshape(*elements.shape[:3], 16)
 
@@ -334,14 +334,19 @@ def _band(
             )
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
-            excess = np.maximum(total.max(axis=-1), 1.0)[..., None, None]
-            matrices.append(at_nodes(mueller_of) / excess)
+            matrices.append(at_nodes(lambda amplitudes: mueller_of(_limited(amplitudes))))
     return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 
 def _powers(amplitudes: Complex) -> Real:
     """Return (w, j, q, 2) of (w, j, 2, q, 2): sums over the leaving light's polarisations."""
     return np.asarray((np.abs(amplitudes) ** 2).sum(axis=-1).swapaxes(2, 3))
+
+
+def _limited(amplitudes: Complex) -> Complex:
+    """Scale amplitudes (w, j, 2, q, 2) whose powers sum to more than 1."""
+    total = _powers(amplitudes).sum(axis=2)
+    return amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None]
 
 
 def _at_nodes(

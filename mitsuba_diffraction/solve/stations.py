@@ -74,7 +74,9 @@ class Grating:
         fraction = float(np.clip(begin + t * (end - begin), begin + margin, end - margin))
         big_k = band + r
         lam = np.atleast_1d(cells.wavelength_of(big_k, w, self.wavelengths, self.optical_period))
-        cosine = big_k * lam / (2e3 * self.optical_period)
+        longest = 2e3 * self.optical_period / big_k
+        cosine = np.minimum(lam / longest, np.sqrt(1.0 - cells.LEAST_ALONG**2))
+        lam = cosine * longest
         index = self.material.index(lam)
         return Station(
             big_k,
@@ -82,7 +84,7 @@ class Grating:
             band + 1 - kind,
             lam / (1e3 * self.superstrate),
             None if index is None else index / self.superstrate,
-            np.sqrt(np.maximum(1.0 - cosine**2, 0.0)),
+            np.sqrt(1.0 - cosine**2),
             self.thin,
         )
 
