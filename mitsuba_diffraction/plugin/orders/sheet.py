@@ -58,9 +58,9 @@ class OrdersSheet(DiffractionOrders):
         lit = mi.Mask(active) & (sides != 0.0) & _requested(ctx, sides < 0.0)
         below = mi.Mask(wo.z < 0.0)
         above = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
-        light = self._lobes.reflected(Pair(si, above, self._frame(si, lit), lit), si, below)
-        value = mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(light.value)))
-        return dr.select(lit, value, 0.0), dr.select(lit, light.density, 0.0)
+        pair = Pair(si, above, self._frame(si, lit), lit)
+        light = self._lobes.reflected(pair, si, below, ctx.mode)
+        return dr.select(lit, light.value, 0.0), dr.select(lit, light.density, 0.0)
 
     def sample(
         self,
