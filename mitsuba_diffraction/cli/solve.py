@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "wavelength_range", "tolerance", "solver",
-    "resolution", "jobs", "workers", "scheduler",
+    "resolution", "polarised", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -78,10 +78,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="points on the boundary, or harmonics; default: chosen by convergence",
     )  # fmt: skip
     group.add_argument(
+        "--polarised", action="store_true", default=None,
+        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+    )  # fmt: skip
+    group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
-        "more; needs --period",
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
+        "incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
@@ -143,6 +147,10 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
+        if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
+            args.parser.error(
+                f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
+            )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, Settings(), Path(f"{source.stem}.nc"))
     changed = {
@@ -150,6 +158,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         for field, value in (
             ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
             ("method", args.solver), ("resolution", args.resolution),
+            ("polarised", args.polarised),
         )
         if value is not None
     }  # fmt: skip
@@ -228,6 +237,8 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
                 f"{facts['error_worst']:.2%} in 95 % of directions"
             ),
         )
+        if table.polarised:
+            yield "", f"{facts['error_polarised']:.2%} with its polarisation"
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
 
 

@@ -106,7 +106,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     surfaces = {
         number: shape
         for number, shape in enumerate(scene.shapes())
-        if re.search(r"Diffraction(Dielectric)?\[", str(shape.bsdf()))
+        if re.search(r"Diffraction(Dielectric|Orders)?\[", str(shape.bsdf()))
     }
     for number, shape in surfaces.items():
         check_attributes(shape, number)

@@ -3,7 +3,8 @@
 Contents
 --------
 orders      `solve_orders`: from a profile and a material to a table
-measured    `read_orders`: from a file of efficiencies, solved or measured elsewhere
+measured    `read_orders`: from efficiencies that were solved or measured elsewhere
+efficiencies  files of efficiencies, CSV and NetCDF, and their conventions
 profiles    one period of the grooves as a polygon; generators and a reader
 materials   refractive index over wavelength, by name or number
 stations    sets of directions with one system matrix

@@ -57,15 +57,15 @@ def lines(band: int, most: tuple[int, int, int] = MOST) -> Iterator[Line]:
 def count_for(values: NDArray[np.float64], fewest: int, error: float) -> int:
     """Return the number of nodes whose interpolation misses `error` of the light at most.
 
-    values : (nodes, j, q) unpolarised efficiencies at Chebyshev nodes.
+    values : (nodes, j, q, n) at Chebyshev nodes, whose norm over n is the unpolarised efficiency.
 
-    The terms that n nodes leave out, and as much again for those they take for lower ones, are
-    summed over q and averaged over j.
+    The terms that a number of nodes leaves out, and as much again for those it takes for lower
+    ones, are summed over q and averaged over j.
     """
     terms = dct(values, axis=0) / len(values)
-    light = max(float(values.sum(axis=-1).mean()), 1e-12)
+    light = max(float(np.linalg.norm(values, axis=-1).sum(axis=-1).mean()), 1e-12)
     for count in range(fewest, len(values)):
-        left = np.sqrt(np.sum(terms[count:] ** 2, axis=0))
+        left = np.sqrt(np.sum(terms[count:] ** 2, axis=(0, -1)))
         if float(left.sum(axis=-1).mean()) <= error * light:
             return count
     return len(values)

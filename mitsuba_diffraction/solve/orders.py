@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..heights.lengths import number_between
 from ..tables.orders import Band, OrderTable, cells
+from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import Counts, check_outline
 from .jobs import Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
@@ -22,7 +25,7 @@ from .resolution import (
     reciprocity_error,
     resolution_error,
 )
-from .stations import Grating, Real, reversed_light
+from .stations import Complex, Grating, Real, reversed_light
 
 #: Wavelengths of a table, nm: the visible.
 WAVELENGTHS = (380.0, 780.0)
@@ -51,10 +54,13 @@ class Measured(NamedTuple):
 
     mean : of the light in all orders but 0, which the table has too much or too little in an order.
     most : the same of a direction, which 95 % of them keep.
+    polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the same light (½‖M‖ is the
+        efficiency); None without them.
     """
 
     mean: float
     most: float
+    polarised: float | None
 
 
 @dataclass(frozen=True)
@@ -67,12 +73,14 @@ class Settings:
     tolerance : mean error of interpolation, of the light in all orders but 0.
     method : one of `jobs.METHODS`.
     resolution : points on the boundary, or harmonics; None chooses by convergence.
+    polarised : whether the table has Mueller matrices.
     """
 
     wavelengths: tuple[float, float] = WAVELENGTHS
     tolerance: float = TOLERANCE
     method: str = "integral"
     resolution: int | None = None
+    polarised: bool = False
 
     def __post_init__(self) -> None:
         number_between(self.tolerance, "tolerance", 1e-4, 0.2)
@@ -115,14 +123,14 @@ def solve_orders(
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
     coarse = replace(problem, resolution=how.resolution or coarsest(problem))
-    counts = _counts(coarse, work, bands, how.tolerance, tell)
+    counts = _counts(coarse, work, bands, how, tell)
     if how.resolution is None:
         problem, solver_error = chosen_resolution(problem, work, bands, how.tolerance / 2)
     else:
         solver_error = resolution_error(problem, work, bands)
     places = [p for band in bands for p in _places(band, counts[band])]
     _announce(tell, "solving", problem, work, places)
-    solved = work.solve(problem, places, "solving orders")
+    solved = work.amplitudes(problem, places, "solving orders")
     header: dict[str, Any] = {
         "solver": solver_of(problem).name,
         "material": grating.material.name,
@@ -131,12 +139,13 @@ def solve_orders(
         "solver_error": solver_error,
         "tolerance": how.tolerance,
     }
-    made = tuple(_band(band, counts[band], solved) for band in bands)
+    made = tuple(_band(band, counts[band], solved, how.polarised) for band in bands)
     table = OrderTable(profile.period, how.wavelengths, made, superstrate, header)
     error = measured_error(table, problem, work)
-    if error.mean > how.tolerance or error.most > WORST * how.tolerance:
+    mean = max(error.mean, error.polarised or 0.0)
+    if mean > how.tolerance or error.most > WORST * how.tolerance:
         raise DiffractionError(
-            f"the table misses {error.mean:.2%} of the light in its orders on average and "
+            f"the table misses {mean:.2%} of the light in its orders on average and "
             f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
             "tolerance, or fewer wavelengths"
         )
@@ -145,6 +154,8 @@ def solve_orders(
         "error_worst": error.most,
         "processor_seconds": round(work.processor_seconds, 1),
     }
+    if error.polarised is not None:
+        header["error_polarised"] = error.polarised
     return OrderTable(profile.period, how.wavelengths, made, superstrate, header)
 
 
@@ -162,20 +173,25 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
             cell.band, cell.kind, cell.tau, cell.rho, w, strict=True
         )
     ]
-    solved = jobs.solve(problem, places, "measuring the error")
-    missed, light = np.zeros(SAMPLES), np.zeros(SAMPLES)
+    solved = jobs.amplitudes(problem, places, "measuring the error")
+    missed, light, turned = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
     for n, place in enumerate(places):
         j = int(cell.channel[n])
-        truth = solved[place][0, j].mean(axis=0).sum(axis=-1)  # (q,)
+        truth = _powers(solved[place])[0, j].mean(axis=-1)  # (q,)
         orders = j - np.arange(len(truth))
         got = table.efficiency(x[n], y[n], lam[n], orders)
         # where order 0 is alone, it is the colour
         coloured = orders != 0 if len(orders) > 1 else np.array([True])
         missed[n], light[n] = np.abs(got - truth)[coloured].sum(), truth[coloured].sum()
+        if table.polarised:
+            matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
+            error = matrices - mueller_of(solved[place])[0, j]
+            turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
     floor = 0.05 * light.mean()  # directions with hardly any light in orders
     return Measured(
         float(missed.sum() / light.sum()),
         float(np.quantile(missed / np.maximum(light, floor), 0.95)),
+        float(turned / light.sum()) if table.polarised else None,
     )
 
 
@@ -183,7 +199,7 @@ def _counts(
     problem: Problem,
     jobs: Jobs,
     bands: Iterable[int],
-    tolerance: float,
+    how: Settings,
     announce: Callable[[Estimate], None],
 ) -> dict[int, Counts]:
     """Choose the numbers of nodes of each band by series along lines across it."""
@@ -191,11 +207,14 @@ def _counts(
     drawn = {band: list(lines(band, most)) for band in bands}
     places = [place for of_band in drawn.values() for line in of_band for place in line.places]
     _announce(announce, "choosing nodes", problem, jobs, places)
-    solved = jobs.solve(problem, places, "choosing nodes")
+    solved = jobs.amplitudes(problem, places, "choosing nodes")
+    values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
     # three variables share the tolerance; rarely seen bands may miss more
     shares = _band_shares(problem.grating, len(drawn))
     return {
-        band: _count(of_band, most, solved, tolerance / np.sqrt(3 * len(drawn) * share))
+        band: _count(
+            of_band, most, solved, values_of, how.tolerance / np.sqrt(3 * len(drawn) * share)
+        )
         for (band, of_band), share in zip(drawn.items(), shares, strict=True)
     }
 
@@ -221,22 +240,40 @@ def _diffuse(count: int, wavelengths: tuple[float, float]) -> tuple[Real, Real, 
 
 
 def _count(
-    drawn: Sequence[Line], most: Counts, solved: Mapping[Place, Real], error: float
+    drawn: Sequence[Line],
+    most: Counts,
+    solved: Mapping[Place, Complex],
+    values_of: Callable[[Place, Complex], Real],
+    error: float,
 ) -> Counts:
-    """Return the numbers of nodes that all lines of a band need."""
+    """Return the numbers of nodes that all lines of a band need, for values (w, j, q, n)."""
     needed = [1 if size == 1 else least for size, least in zip(most, FEWEST, strict=True)]
     for line in drawn:
         if most[line.axis] == 1:
             continue
-        values = [solved[place] for place in line.places]
+        values = [values_of(place, solved[place]) for place in line.places]
         if line.axis == 0:
-            values += [reversed_light(value) for value in reversed(values)]
-        # (nodes, j, q), unpolarised; order 0 is no colour, and is left out
-        along = np.concatenate(values).sum(axis=-1).mean(axis=2)
+            values += [
+                values_of(place, reversed_light(solved[place])) for place in reversed(line.places)
+            ]
+        # order 0 is no colour, and is left out
+        along = np.concatenate(values)
         if along.shape[1] > 1:
-            along *= 1.0 - np.eye(along.shape[1])
+            along *= 1.0 - np.eye(along.shape[1])[..., None]
         needed[line.axis] = max(needed[line.axis], count_for(along, FEWEST[line.axis], error))
     return Counts(*needed)
+
+
+def _unpolarised(place: Place, amplitudes: Complex) -> Real:
+    """Return unpolarised efficiencies (w, j, q, 1)."""
+    return _powers(amplitudes).mean(axis=-1, keepdims=True)
+
+
+def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
+    """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
+    y = np.maximum(grating.station(*place).along, 1e-3)[:, None, None, None, None]
+    elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
+    return elements.reshape(*elements.shape[:3], 16)
 
 
 def _places(band: int, counts: Counts) -> list[Place]:
@@ -251,21 +288,12 @@ def _places(band: int, counts: Counts) -> list[Place]:
     ]
 
 
-def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
-    """Return the efficiencies of a band from those of its stations."""
-    kinds = []
+def _band(band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool) -> Band:
+    """Return the efficiencies, and Mueller matrices, of a band from those of its stations."""
+    kinds, matrices = [], []
     for kind in (cells.A, cells.B) if band else (cells.A,):
-        size = band + 1 - kind
-        values = np.empty((*counts, size, size, 2), np.float32)
-        places = iter(place for place in _places(band, counts) if place.kind == kind)
-        for n in range((counts.tau + 1) // 2):
-            for m in range(counts.rho):
-                of_place = solved[next(places)]
-                # (w, j, 2, q, 2) to (w, j, q, 2): the sum over the leaving light's polarisations
-                values[n, m] = of_place.sum(axis=-1).swapaxes(2, 3)
-                back = reversed_light(of_place).sum(axis=-1).swapaxes(2, 3)
-                opposite = counts.tau - 1 - n
-                values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
+        at_nodes = functools.partial(_at_nodes, band, kind, counts, solved)
+        values = at_nodes(_powers)
         total = values.sum(axis=-2, keepdims=True)
         if total.max() > MOST_EXCESS:
             raise DiffractionError(
@@ -273,7 +301,35 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Real]) -> Band:
                 "resolution, or a smaller tolerance"
             )
         kinds.append(values / np.maximum(total, 1.0))
-    return Band(band, *kinds)
+        if polarised:
+            excess = np.maximum(total.max(axis=-1), 1.0)[..., None, None]
+            matrices.append(at_nodes(mueller_of) / excess)
+    return Band(band, *kinds, mueller=tuple(matrices) or None)
+
+
+def _powers(amplitudes: Complex) -> Real:
+    """Return (w, j, q, 2) of (w, j, 2, q, 2): sums over the leaving light's polarisations."""
+    return np.asarray((np.abs(amplitudes) ** 2).sum(axis=-1).swapaxes(2, 3))
+
+
+def _at_nodes(
+    band: int,
+    kind: int,
+    counts: Counts,
+    solved: Mapping[Place, Complex],
+    values_of: Callable[[Complex], Real],
+) -> NDArray[np.float32]:
+    """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …)."""
+    places = [place for place in _places(band, counts) if place.kind == kind]
+    shape = values_of(solved[places[0]]).shape
+    values = np.empty((counts.tau, counts.rho, *shape), np.float32)
+    for number, place in enumerate(places):
+        n, m = divmod(number, counts.rho)
+        values[n, m] = values_of(solved[place])
+        back = values_of(reversed_light(solved[place]))
+        opposite = counts.tau - 1 - n
+        values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
+    return values
 
 
 def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:

@@ -6,6 +6,7 @@
     superstrate = 1.58              # index of the clear medium above; default 1
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
+    polarised = true                # with Mueller matrices; default false
     output = "tables/cd.nc"
 
     [arguments]                     # of the profile
@@ -33,7 +34,7 @@ from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
     "method", "profile", "material", "superstrate", "wavelengths", "tolerance", "solver",
-    "resolution", "output", "arguments",
+    "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -127,4 +128,5 @@ def _settings(content: Mapping[str, Any]) -> Settings:
         float(content.get("tolerance", default.tolerance)),
         str(content.get("solver", default.method)),
         content.get("resolution", default.resolution),
+        bool(content.get("polarised", default.polarised)),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from mitsuba_diffraction.tables.orders import Band, OrderTable
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
+from tests.support.patches import DEFAULTS, PATCH
 
 pytestmark = pytest.mark.thorough
 
@@ -70,3 +72,31 @@ def test_order_follows_the_grating_equation(tmp_path):
     expected = 1.0 + 1e-3 * mean / PERIOD - np.sin(np.radians(theta))
     # four standard errors, of some 0.001 of the light; a wavelength of 3 nm
     assert np.all(np.abs(seen.mean[0] - expected) < 4 * seen.error[0] + 1e-3)
+
+
+@pytest.mark.parametrize("material", ["none", "dielectric"])
+def test_patch_reflects_as_in_mitsuba(tmp_path, material):
+    """A patch of a flat mirror is white; a rough dielectric has the albedo of Mitsuba's BSDF."""
+    if material == "none":
+        flat = md.HeightField(np.zeros((32, 32)), 0.08)
+        bsdf = mi.load_dict(md.bsdf_dict(flat, coherence_width=5, material="none"))
+        expected = 1.0
+    else:
+        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False))
+        expected = albedo(bsdf, 30.0)
+    seen = plane_seen(md.osl.export(bsdf, tmp_path), [30], WorkingSpace="Linear Rec.2020")
+    assert seen.mean == pytest.approx(expected, rel=0.02)
+
+
+def albedo(bsdf, degrees, count=100_000):
+    """Mean of drawn weights over the visible, of light from x."""
+    rng = np.random.default_rng(3)
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    angle = np.radians(degrees)
+    si.wi = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    si.n, si.sh_frame = mi.Normal3f(0, 0, 1), mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.wavelengths = mi.UnpolarizedSpectrum(550.0)
+    first, *second = (mi.Float(x) for x in rng.random((3, count)).astype(np.float32))
+    _, weight = bsdf.sample(mi.BSDFContext(), si, first, mi.Point2f(*second))
+    return float(np.mean(np.array(weight)))

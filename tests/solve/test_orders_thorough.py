@@ -16,6 +16,7 @@ from mitsuba_diffraction.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support import ROOT
+from tests.support.orders import digest_in_file
 
 pytestmark = pytest.mark.thorough
 pytest.importorskip("gratinglab")
@@ -41,7 +42,7 @@ def test_an_interrupted_table_goes_on_and_is_the_same(tmp_path):
         jobs=Jobs(tmp_path, None, lambda done, total, text: first.setdefault(text, done)),
     )  # fmt: skip
     assert first["solving orders"] > 0
-    assert again.digest() == table.digest()
+    assert digest_in_file(again, tmp_path) == digest_in_file(table, tmp_path)
 
 
 def test_a_tolerance_that_is_missed_is_refused():
@@ -54,8 +55,9 @@ def test_a_solution_is_the_same_in_this_process_and_another():
     problem = problem_of(Grating(PROFILE, material_of("none", RANGE), 1.0, RANGE), "integral", 48)
     place = Place(1, 0, 0.3, 0.4, (0.5,))
     with processes(1) as pool:
-        elsewhere = Jobs(executor=pool).solve(problem, [place], "")[place]
-    assert np.array_equal(elsewhere, solve_place(problem, place).values)
+        elsewhere = Jobs(executor=pool).amplitudes(problem, [place], "")[place]
+    # sums of BLAS in another order, rounded to single precision
+    assert np.allclose(elsewhere, solve_place(problem, place).values, atol=1e-7)
 
 
 RECIPE = """method = "solved"

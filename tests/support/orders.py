@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -90,3 +91,11 @@ def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
             squared = (tangential**2).sum()
         wo[row] = [*tangential, np.sqrt(1.0 - squared)]
     return wi, as_single(wo), rng.random((n, 3)), wavelength
+
+
+def digest_in_file(table: OrderTable, folder: Path) -> str:
+    """Return the digest of a table's file: rounded to 16 bits, past what BLAS adds in any order."""
+    table.save(folder / "digest.nc")
+    digest = OrderTable.load(folder / "digest.nc").digest()
+    (folder / "digest.nc").unlink()
+    return digest

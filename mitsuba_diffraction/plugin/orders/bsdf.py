@@ -102,7 +102,7 @@ class DiffractionOrders(mi.BSDF):
     """
 
     #: Feature that shaders do not support.
-    not_in_shaders = "solved orders"
+    not_in_shaders: str | None = None
 
     def __init__(self, props: Properties, read: Parameters) -> None:
         super().__init__(props)

@@ -16,11 +16,10 @@ import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...tables.store import cached_colours
-from .maps import Map, axis_map
-from .materials import Material, height_scale, pack_conservation, pack_surface
-from .packing import pack_colours, pack_powers, pack_responses
-from .source import global_names, pruned, renamed, resolved, shader_file
+from .maps import Map
+from .materials import Diffracting, Material, diffraction_of, pack_conservation, pack_surface
+from .packing import pack_responses
+from .source import global_names, method_files, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that can be exported, and the names of their functions.
@@ -113,14 +112,12 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         If the BSDF does not diffract or has features that the shaders lack, a method is unknown, or
         a method does not support the table.
     """
-    from ...plugin.surface import DiffractingSurface  # which only a variant has
-
     if lacking := getattr(bsdf, "not_in_shaders", None):
         raise DiffractionError(
             f"the surface has {lacking}, which the shaders do not support: export it without, or "
             "render it with Mitsuba"
         )
-    if not isinstance(bsdf, DiffractingSurface):
+    if (surface := diffraction_of(bsdf)) is None:
         raise DiffractionError(
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
             "instance mi.load_dict(md.bsdf_dict(...))"
@@ -129,23 +126,15 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
         )
-    if bsdf.lateral_scale.varying is not None:
-        raise DiffractionError(
-            "the surface has a lateral_scale that varies, which this export does not support: "
-            "export one with a number for each period"
-        )
-    stretch = float(axis_map(bsdf.orientation, bsdf.lateral_scale).value[2])
-    material = Material(Map(np.zeros(3)), bsdf=bsdf)
+    material = Material(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)
     common |= Packed(
-        uniforms={"height_scale": height_scale(material)},
+        uniforms={"height_scale": surface.height_scale},
         definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
-    tables = {method: _tables(method, bsdf) for method in methods}
-    # equal for all methods, and read by shared functions
-    common |= Packed(uniforms={"area_factor": tables[methods[0]].uniforms["area_factor"]})
-    return _joined(common, tables, stretch, _words(bsdf))
+    tables = {method: _tables(method, surface) for method in methods}
+    return _joined(common, tables, surface.stretch, surface.words)
 
 
 def export_shader(
@@ -182,12 +171,13 @@ def export_shader(
     return shader
 
 
-def _tables(method: str, bsdf: Any) -> Packed:
-    """Pack the table of a BSDF for a method."""
+def _tables(method: str, surface: Diffracting) -> Packed:
+    """Pack the table of a surface for a method."""
+    tables = surface.tables(method, floats=True)
     if method == "fast":
-        return pack_colours(cached_colours(bsdf.table), floats=True)
+        return tables
     daylight = (np.array([360.0, 830.0]), np.ones(2))
-    return pack_powers(bsdf.table) | pack_responses([daylight])
+    return tables | pack_responses([daylight])
 
 
 def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: str) -> Shader:
@@ -197,14 +187,15 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
         definitions |= packed.definitions
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
     second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
-    files = ["library.glsl", "boundary.glsl", "layers.glsl", *second_order, "pair.glsl"]
+    look_up = "orders.glsl" if "ORDERS" in definitions else "pair.glsl"
+    files = ["library.glsl", "boundary.glsl", "layers.glsl", *second_order, look_up]
     shared = "".join(constants) + resolved("\n".join(map(shader_file, files)), definitions)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)
     for method, packed in tables.items():
         prefix = f"{_PREFIX}{method}_"
-        text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
+        text = "\n".join(map(shader_file, method_files(method, definitions)))
         text = resolved(text, {**common.definitions, **packed.definitions})
         method_names = global_names(text)
         text = renamed(text, [(_PREFIX, names), (prefix, method_names)])
@@ -216,7 +207,8 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
         functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
     )  # fmt: skip
     text = f"{head}\n" + pruned("".join(code) + _BENEATH, _PREFIX)
-    return Shader(text, dict(declared.uniforms), declared.textures, functions, surface)
+    textures = {texture.name: texture for texture in declared.textures}  # methods share some
+    return Shader(text, dict(declared.uniforms), tuple(textures.values()), functions, surface)
 
 
 def _declared(packed: Packed, prefix: str, names: set[str]) -> Packed:
@@ -231,15 +223,6 @@ def _four(data: Any) -> Any:
     """Pad a texture to four channels, which some loaders require."""
     missing = 4 - data.shape[2]
     return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
-
-
-def _words(bsdf: Any) -> str:
-    """Describe a surface: material, coherence width, height scale."""
-    table = bsdf.table
-    return (
-        f"{bsdf.fresnel}, coherence width {table.width_text}, "
-        f"height scale {float(np.array(bsdf.height_scale).ravel()[0]):g}"
-    )
 
 
 def _save(texture: Texture, path: Path) -> None:

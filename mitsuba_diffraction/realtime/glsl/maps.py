@@ -115,22 +115,25 @@ def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
     return total
 
 
-def axis_map(orientation: Any, lateral: Any) -> Map:
+def axis_map(orientation: Any, lateral: Any = None) -> Map:
     """Return the patch's frame: (cos, sin) of its x axis in the tangent frame, and its stretch.
 
-    lateral : `LateralScale` of the BSDF; its factor is relative to the table's patch.
+    lateral : `LateralScale` of the BSDF; its factor is relative to the table's patch. None: 1.
 
     Raises a DiffractionError for textures that do not fit one picture.
     """
     import mitsuba as mi
 
     turning = getattr(orientation, "texture", None)
-    stretching = None if lateral.varying is None else lateral.varying.texture
+    stretching = None if lateral is None or lateral.varying is None else lateral.varying.texture
+
+    def stretches(si: Any) -> NDArray[np.floating]:
+        """Evaluate the factor."""
+        return np.array(1.0 if lateral is None else lateral.over_table(si, True), float).ravel()
+
     stretch = 1.0
     if stretching is None:
-        stretch = float(
-            np.array(lateral.over_table(_interaction(np.zeros((1, 2))), True)).ravel()[0]
-        )
+        stretch = float(stretches(_interaction(np.zeros((1, 2))))[0])
     if turning is None and stretching is None:
         angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
         return Map(np.array([np.cos(angle), np.sin(angle), stretch]))
@@ -141,7 +144,7 @@ def axis_map(orientation: Any, lateral: Any) -> Map:
     def frame(uv: Array) -> Array:
         """Evaluate both textures."""
         si = _interaction(uv)
-        values = [*orientation.rotation(si, mi.Mask(True)), lateral.over_table(si, True)]
+        values = [*orientation.rotation(si, mi.Mask(True)), stretches(si)]
         return np.stack([np.broadcast_to(np.array(x, float).ravel(), len(uv)) for x in values], 1)
 
     textures = [texture for texture in (turning, stretching) if texture is not None]

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.colour import RGB_WAVELENGTHS
-from ...optics.geometry import wavenumber
+from ...heights.field import HeightField
 from ...plugin.parameter_changes import children
-from ...tables.directional import FINE
-from ...tables.table import DiffractionTable
-from .maps import Map, Spectrum, axis_map, colour_map, evaluated, interval_maps, raw_picture
-from .packing import (
-    pack_beneath,
-    pack_conductor,
-    pack_energy,
-    pack_roughness,
-    pack_second_order,
-)
+from .maps import Map, Spectrum, colour_map, interval_maps, raw_picture
+from .modelled import Modelled, index_spectra
+from .orders import Solved
+from .packing import pack_conductor
 from .texels import Packed, Texture, Uniform, as_half
 
 _COSINES = 64  # nodes of transmittances
@@ -87,7 +80,7 @@ class Gloss:
             return packed | _principled(self.bsdf)
         parts = children(self.bsdf)
         if self.through is None:
-            return packed | pack_conductor(*_index_spectra(parts["eta"], parts["k"]))
+            return packed | pack_conductor(*index_spectra(parts["eta"], parts["k"]))
         eta = float(np.array(mi.traverse(self.bsdf)["eta"]).ravel()[0])
         rows = np.repeat(self.through.reshape(1, -1, 1), 4, axis=2).astype(np.float32)
         face = Packed(
@@ -139,13 +132,75 @@ def _through(bsdf: Any) -> NDArray[np.float64]:
     return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
 
 
+class Diffracting(Protocol):
+    """Surface that diffracts: all that depends on the kind of its BSDF.
+
+    Attributes
+    ----------
+    table : data of the BSDF; surfaces of the same table share textures.
+    nested : BSDF beneath, or None.
+    height_scale : factor on the heights, 1 where the kind has none.
+    largest_scale : largest height scale of the table, or None where the kind has none.
+    coherence_width : 4σ of the amplitude window, µm.
+    coherent : whether orders interfere, which `exact` does not support.
+    """
+
+    table: Any
+    nested: Any
+    height_scale: float
+    largest_scale: float | None
+    coherence_width: float
+    coherent: bool
+
+    @property
+    def axis(self) -> Map:
+        """(cos, sin) from the tangent to the patch's x axis, and the patch's stretch."""
+
+    @property
+    def heights(self) -> HeightField:
+        """Heights, for the thesis' methods; raises a DiffractionError where the kind has none."""
+
+    @property
+    def stretch(self) -> float:
+        """Stretch of the patch; raises a DiffractionError if it varies."""
+
+    @property
+    def words(self) -> str:
+        """Description in a few words."""
+
+    def surface(self) -> Packed:
+        """Pack constants and definitions that all methods share."""
+
+    def conservation(self, scales: Sequence[float]) -> Packed:
+        """Pack energy conservation and the base's light, one page per height scale."""
+
+    def tables(self, method: str, *, floats: bool = False) -> Packed:
+        """Pack the table for `fast` or `exact`; raises a DiffractionError if it does not suit.
+
+        floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
+        """
+
+    def lobes(self) -> Packed:
+        """Pack directions drawn from the lobes, for shaders/lobes.glsl."""
+
+
+def diffraction_of(bsdf: Any) -> Diffracting | None:
+    """Return the surface of a BSDF that diffracts, or None for other BSDFs."""
+    from ...plugin.bsdf import Diffraction  # which only a variant has
+    from ...plugin.orders.bsdf import DiffractionOrders
+
+    if isinstance(bsdf, DiffractionOrders):
+        return Solved(bsdf)
+    return Modelled(bsdf) if isinstance(bsdf, Diffraction) else None
+
+
 @dataclass(frozen=True)
 class Material:
     """Material of one shape."""
 
     pigment: Map  # diffuse reflectance, linear sRGB
+    diffraction: Diffracting | None = None
     two_sided: bool = False  # whether the back reflects like the front
-    bsdf: Any = None  # the diffraction BSDF, or None
     # (cos, sin) from the tangent to the patch's x axis, and the factor by which it is stretched
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0, 1.0])))
     gloss: Gloss | None = None  # specular reflection of a BSDF that does not diffract
@@ -156,15 +211,9 @@ class Material:
     @property
     def black(self) -> bool:
         """Whether the material reflects no light."""
-        diffuse = self.bsdf is None and self.gloss is None
+        diffuse = self.diffraction is None and self.gloss is None
         constant = self.pigment.picture is None and self.pigment.attribute is None
         return diffuse and constant and not self.pigment.value.any()
-
-    @property
-    def table(self) -> DiffractionTable:
-        """Table of the diffraction BSDF."""
-        table: DiffractionTable = self.bsdf.table
-        return table
 
 
 def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> list[Material]:
@@ -177,7 +226,6 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
     import mitsuba as mi
 
     from ...plugin.blended_patches import DiffractionMix  # which only a variant has
-    from ...plugin.bsdf import Diffraction
 
     two_sided, bumps, normals = False, None, None
     while bsdf.class_name() in _WRAPPERS:
@@ -212,11 +260,11 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
                 replace(materials[0], two_sided=both, bumps=bumps, normals=normals, mask=mask)
             )
         return parts
-    if isinstance(bsdf, Diffraction):
+    if (diffraction := diffraction_of(bsdf)) is not None:
         pigment = Map(np.zeros(3))
-        if bsdf.nested is not None:
-            pigment = _diffuse(bsdf.nested, omissions, f"the base beneath {name}", light)
-        material = Material(pigment, bsdf=bsdf, axis=axis_map(bsdf.orientation, bsdf.lateral_scale))
+        if diffraction.nested is not None:
+            pigment = _diffuse(diffraction.nested, omissions, f"the base beneath {name}", light)
+        material = Material(pigment, diffraction, axis=diffraction.axis)
     elif (gloss := Gloss.read(bsdf)) is not None:
         omissions += [f"{part} of {name}" for part in gloss.omissions]
         pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
@@ -224,24 +272,6 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
     else:
         material = Material(_diffuse(bsdf, omissions, name, light))
     return [replace(material, two_sided=two_sided, bumps=bumps, normals=normals)]
-
-
-def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
-    """Pack energy conservation and the base's light, at the height scale times each factor."""
-    if material.bsdf is None:
-        return Packed()
-    scales = [height_scale(material) * factor for factor in factors]
-    return conservation_at(material.bsdf, scales)
-
-
-def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
-    """Pack energy conservation and the base's light of a BSDF at height scales."""
-    ratios = [bsdf.reflected_ratio(scale) for scale in scales]
-    beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
-    energy = [bsdf.energy_scale(scale) for scale in scales]
-    if all(scale is None for scale in energy):
-        return beneath
-    return beneath | pack_energy([FINE.ones if scale is None else scale for scale in energy])
 
 
 def pack_surface(material: Material) -> Packed:
@@ -257,37 +287,24 @@ def pack_surface(material: Material) -> Packed:
             marks = {"MAPPED": True, "CLAMPED": value.clamped, "NEAREST": value.nearest}
             definitions |= {f"{name.upper()}_{mark}": "" for mark, on in marks.items() if on}
     packed = Packed(tuple(textures), uniforms, definitions)
-    bsdf, gloss = material.bsdf, material.gloss
-    if bsdf is None:
+    diffraction, gloss = material.diffraction, material.gloss
+    if diffraction is None:
         pigmented = gloss is None or gloss.pigment is not None
     else:
-        pigmented = bsdf.nested is not None
+        pigmented = diffraction.nested is not None
     if pigmented:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
         return packed | gloss.packed()
-    if bsdf is None:
-        return packed
-    definitions["DIFFRACTING"] = ""
-    if bsdf.vcavity:
-        definitions["VCAVITY"] = ""
-    if hasattr(bsdf.layering, "weight"):
-        definitions["THESIS"] = ""
-        uniforms["diffuse_weight"] = float(bsdf.layering.weight)
-    from ...plugin.boundary import SmallSlope  # which only a variant has
+    return packed if diffraction is None else packed | diffraction.surface()
 
-    surface = bsdf.fresnel
-    if bsdf.coat is not None:
-        surface = surface.material
-        definitions["COATED"] = ""
-        uniforms["coat"] = coat_index(material)
-        uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    if isinstance(bsdf.boundary, SmallSlope):
-        packed |= pack_roughness(material.table.roughness)
-    ratios = material.table.slope_ratios
-    if bsdf.second_order_index is not None and ratios is not None:
-        packed |= pack_second_order(bsdf.second_order_index, ratios)
-    return packed | _reflectance(surface)
+
+def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
+    """Pack energy conservation and the base's light, at the height scale times each factor."""
+    if material.diffraction is None:
+        return Packed()
+    height_scale = material.diffraction.height_scale
+    return material.diffraction.conservation([height_scale * factor for factor in factors])
 
 
 def pack_emission(radiance: Array | None) -> Packed:
@@ -312,55 +329,6 @@ def pack_relief(material: Material) -> Packed:
             {definition: ""},
         )
     return packed
-
-
-def height_scale(material: Material) -> float:
-    """Return the height scale of a material that diffracts."""
-    return _number(material.bsdf.height_scale)
-
-
-def coat_index(material: Material) -> float:
-    """Return the index of the coat over that of the medium above; 1 without a coat."""
-    return 1.0 if material.bsdf.coat is None else _number(material.bsdf.coat.eta)
-
-
-def _number(value: Any) -> float:
-    """Convert a Dr.Jit value of one element to a float."""
-    return float(np.array(value).ravel()[0])
-
-
-def _reflectance(surface: Any) -> Packed:
-    """Pack the Fresnel reflectance of a dielectric or conductor."""
-    kind = type(surface).__name__
-    if kind == "Dielectric":
-        ratio = _number(surface.eta)
-        if ratio < 1.0:  # total reflection has phases like a conductor
-            return pack_conductor(np.array([360.0, 830.0]), np.full(2, ratio), np.zeros(2))
-        return Packed(uniforms={"eta": ratio}, definitions={"SURFACE_KIND": "1"})
-    if kind == "Conductor":
-        lam, eta, k = _index_spectra(surface.eta, surface.k)
-        medium = 1.0 if surface.medium is None else _number(surface.medium.eta)
-        return pack_conductor(lam, eta / medium, k / medium)
-    return Packed()
-
-
-class IndexSpectra(NamedTuple):
-    """Complex index of refraction η + ik over wavelengths, (n,) each."""
-
-    wavelengths: Array  # nm
-    eta: Array
-    k: Array
-
-
-def _index_spectra(eta: Any, k: Any) -> IndexSpectra:
-    """Evaluate the textures of an index; RGB values become three wavelengths."""
-    import mitsuba as mi
-
-    # in RGB variants the wavelengths of sRGB's primaries, which textures list from red to blue
-    lam = np.linspace(360.0, 830.0, 96) if mi.is_spectral else np.array([464.0, 549.0, 611.0])
-    order = slice(None, None, 1 if mi.is_spectral else -1)
-    uv = np.full((1, 2), 0.5)
-    return IndexSpectra(lam, *(evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k)))
 
 
 def _is_bsdf(child: Any) -> bool:

@@ -12,13 +12,13 @@ from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
 from ...settings import TableSettings
 from ...tables.build.build import build_with
-from ...tables.store import cached_colours, cached_table
+from ...tables.store import cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method
 from .context import Bindings, compile_program
-from .materials import Material
-from .packing import area_factor, pack_colours, pack_powers
+from .materials import Diffracting
+from .packing import area_factor
 from .scene import VERTEX, RealtimeScene
 from .source import METHODS, THESIS_METHODS
 from .texels import Packed, Uniform, as_half, listed, texels
@@ -137,15 +137,15 @@ class Prepared:
         self._surfaces, self._buffers = surfaces, buffers
         packed: dict[int, Packed] = {}
         for surface in scene.diffracting:
-            key = id(surface.material.table)
+            key = id(surface.table)
             if key not in packed:
-                packed[key] = method_tables(method, surface.material)
+                packed[key] = method_tables(method, surface)
         bound = {key: Bindings(context, tables) for key, tables in packed.items()}
-        first = next(iter(bound.values()))
-        # one for each surface; any table serves a surface that does not diffract
+        without = Bindings(context, Packed())
+        # one for each surface
         self.tables = [
-            first if s.material.bsdf is None else bound[id(s.material.table)]
-            for s in scene.surfaces
+            without if surface is None else bound[id(surface.table)]
+            for surface in (s.material.diffraction for s in scene.surfaces)
         ]
         self.nbytes = sum(p.nbytes for p in packed.values())  # size of the method's textures
         self._programs: dict[tuple[tuple[str, str], ...], Any] = {}
@@ -188,26 +188,23 @@ class Prepared:
             thing.release()
 
 
-def method_tables(method: str, material: Material) -> Packed:
-    """Pack a material's table for a method.
+def method_tables(method: str, surface: Diffracting) -> Packed:
+    """Pack a surface's table for a method.
 
     Raises a DiffractionError if the method is unknown, or does not support the table.
     """
-    if method == "fast":
-        return pack_colours(cached_colours(material.table))
-    if method == "exact":
-        return pack_powers(material.table)
     if method in THESIS_METHODS:
-        heights = material.bsdf.heights()
-        return pack_method(thesis_method(method, heights, material.table))
-    raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+        return pack_method(thesis_method(method, surface.heights, surface.table))
+    if method not in METHODS:
+        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    return surface.tables(method)
 
 
 def window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
     """Return the uniforms of another coherence width in µm."""
     sigma = sigma_of(coherence_width)
     factor = area_factor(sigma)
-    exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms["area_factor"]
+    exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms.get("area_factor")
     uniforms: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
     if isinstance(exponents, tuple) and isinstance(table_factor, float):
         # exponents are proportional to σ², too

@@ -18,17 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...extras import optional
-from ...tables.store import cached_colours
 from .camera import Camera
 from .context import Bindings, Target, compile_plain, set_uniforms
 from .emitters import Emitters
 from .lights import Light, light_definitions
-from .materials import coat_index, height_scale
 from .methods import vertex_array
 from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
 from .source import display_definitions
-from .surroundings import flat_shapes, pack_flats, pack_lobes, pack_obstacles
+from .surroundings import flat_shapes, pack_flats, pack_obstacles
 from .texels import Packed, Uniform
 
 Array = NDArray[np.float64]
@@ -114,12 +112,11 @@ class Stage:
         extras = []
         for surface in self._scene.surfaces:
             parts = [*around]
-            if surface.material.bsdf is not None:
-                table = surface.material.table
-                if id(table) not in lobes:
-                    factor = height_scale(surface.material) * coat_index(surface.material)
-                    lobes[id(table)] = self._bound(pack_lobes(cached_colours(table), factor))
-                parts.append(lobes[id(table)])
+            if (diffraction := surface.material.diffraction) is not None:
+                key = id(diffraction.table)
+                if key not in lobes:
+                    lobes[key] = self._bound(diffraction.lobes())
+                parts.append(lobes[key])
             extras.append(Joined(parts))
         return extras
 

@@ -22,14 +22,7 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import (
-    conservation_at,
-    height_scale,
-    pack_conservation,
-    pack_emission,
-    pack_relief,
-    pack_surface,
-)
+from .materials import pack_conservation, pack_emission, pack_relief, pack_surface
 from .methods import Prepared, window
 from .packing import pack_energy, pack_responses
 from .progressive import Extra, ProgressiveLight, Stage
@@ -279,8 +272,8 @@ class Renderer:
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
-            if surface.material.bsdf is not None:
-                factor = scale if scale is not None else height_scale(surface.material)
+            if (diffraction := surface.material.diffraction) is not None:
+                factor = scale if scale is not None else diffraction.height_scale
                 set_uniforms(program, {"height_scale": factor})
                 if coherence_width is not None:
                     set_uniforms(program, window(part.tables, coherence_width))
@@ -292,7 +285,8 @@ class Renderer:
             if {"energy", "beneath"}.isdisjoint(own.textures):
                 continue
             ones = pack_energy([FINE.ones])
-            packed = ones | conservation_at(surface.material.bsdf, [scale])
+            assert surface.material.diffraction is not None
+            packed = ones | surface.material.diffraction.conservation([scale])
             for texture in packed.textures:
                 if texture.name in own.textures:
                     own.textures[texture.name].write(texture.data.tobytes())

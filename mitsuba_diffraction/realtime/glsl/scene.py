@@ -19,7 +19,7 @@ from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .materials import Material, diffracts, read_materials
+from .materials import Diffracting, Material, diffracts, read_materials
 from .source import LIGHTS
 
 Array = NDArray[np.float64]
@@ -194,14 +194,21 @@ class RealtimeScene:
         return bool(self.emitting) or any(s.radiance is not None for s in self.surfaces)
 
     @property
-    def diffracting(self) -> tuple[Surface, ...]:
-        """Surfaces that diffract."""
-        return tuple(s for s in self.surfaces if s.material.bsdf is not None)
+    def diffracting(self) -> tuple[Diffracting, ...]:
+        """What diffracts of all surfaces."""
+        all_surfaces = (surface.material.diffraction for surface in self.surfaces)
+        return tuple(surface for surface in all_surfaces if surface is not None)
+
+    @property
+    def subject(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) of the box around all surfaces that diffract."""
+        subjects = (s for s in self.surfaces if s.material.diffraction is not None)
+        return box_of([s.vertices[:, :3] for s in subjects])
 
     @property
     def middle(self) -> Array:
         """Middle (3,) of the box around all surfaces that diffract."""
-        low, high = box_of([s.vertices[:, :3] for s in self.diffracting])
+        low, high = self.subject
         return 0.5 * (low + high)
 
 

@@ -31,7 +31,7 @@ LIGHTS = 4
 
 _CONSTANTS = {
     "PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS),
-    "SURFACE_KIND": "0", "LIGHTS_LIT": "1",
+    "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1", "TAPS_X": "1", "TAPS_Y": "1",
 }  # fmt: skip
 
 _PREAMBLES = {
@@ -95,18 +95,27 @@ def fragment_parts(
     shared.append("layers.glsl")
     if "SECOND_ORDER" in known:
         shared.append("second_order.glsl")
-    if "DIFFRACTING" in known:
+    if "ORDERS" in known:
+        shared.append("orders.glsl")
+    elif "DIFFRACTING" in known:
         shared.append("pair.glsl")
     if "GLOSS" in known:
         shared.append("gloss.glsl")
     if "WEIGHTED" in known or "LOOKED_UP" in known:
         shared += ["obstacles.glsl", "surroundings.glsl", "lobes.glsl"]
-    shared.append(f"{method}.glsl")
-    if "DIFFRACTING" in known:
-        shared.append("diffraction.glsl")
+    shared += method_files(method, known)
     if "DISPLAYED" in known:
         shared.append("display.glsl")
     return parts + [(name, shader_file(name)) for name in (*shared, main)]
+
+
+def method_files(method: str, definitions: Mapping[str, str]) -> list[str]:
+    """Return the files of a method's `diffraction`."""
+    files = ["responses.glsl"] if method == "exact" else []
+    if "ORDERS" in definitions:
+        return [*files, "orders_light.glsl"]
+    files.append(f"{method}.glsl")
+    return [*files, "diffraction.glsl"] if "DIFFRACTING" in definitions else files
 
 
 def plain_source(

@@ -89,7 +89,7 @@ def _seconds(renderer: Renderer, triangle: _Triangle) -> float:
 def _first_diffracting(renderer: Renderer, method: str) -> tuple[Bindings, Bindings]:
     """Return the bindings of the first diffracting surface, and of the method's tables."""
     surfaces = renderer.scene.surfaces
-    number = next(n for n, s in enumerate(surfaces) if s.material.bsdf is not None)
+    number = next(n for n, s in enumerate(surfaces) if s.material.diffraction is not None)
     return renderer.bindings[number], renderer.prepared(method).tables[number]
 
 

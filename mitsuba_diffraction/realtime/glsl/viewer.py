@@ -101,10 +101,9 @@ class Viewer(moderngl_window.WindowConfig):
         renderer = self._ready
         scene = renderer.scene
         self.orbit = Orbit.start(scene.camera, 0.5 * (scene.low + scene.high))
-        first = scene.diffracting[0].material
-        self.scale = float(np.array(first.bsdf.height_scale).ravel()[0])
-        self.largest_scale = float(first.table.height_scale_max)
-        self.table_width = self.width = float(first.table.coherence_width)
+        first = scene.diffracting[0]
+        self.scale, self.largest_scale = first.height_scale, first.largest_scale
+        self.table_width = self.width = first.coherence_width
         renderer.lights = list(scene.lighting.lights)
         self._dragged = False
 
@@ -192,9 +191,10 @@ class Viewer(moderngl_window.WindowConfig):
         if changed:
             self.choose(METHODS[index])
         _, self.stops = imgui.slider_float("exposure, stops", self.stops, -8.0, 8.0)
-        _, self.scale = imgui.slider_float("height scale", self.scale, 0.05, self.largest_scale)
-        if imgui.is_item_deactivated_after_edit():
-            self._ready.energy_for(self.scale)
+        if (most := self.largest_scale) is not None:
+            _, self.scale = imgui.slider_float("height scale", self.scale, 0.05, most)
+            if imgui.is_item_deactivated_after_edit():
+                self._ready.energy_for(self.scale)
         if not self._baked:
             low = self.table_width
             _, self.width = imgui.slider_float("coherence, µm", self.width, low, 4.0 * low)

@@ -78,7 +78,7 @@ class SameLights:
         ]
         self._exact = np.array([bool(s) and all(one.exact for one in s) for s in surfaces])
         self._diffracting = np.array(
-            [any(one.material.bsdf is not None for one in s) for s in surfaces]
+            [any(one.material.diffraction is not None for one in s) for s in surfaces]
         )
 
     def regions(self, picture: NDArray[np.floating]) -> dict[str, NDArray[np.bool_]]:

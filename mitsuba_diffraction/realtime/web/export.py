@@ -20,17 +20,15 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...optics.display import check_view
 from ...progress import Progress, silent
-from ...tables.table import DiffractionTable
 from ..glsl.emitters import Emitters
 from ..glsl.materials import (
-    Material,
-    height_scale,
+    Diffracting,
     pack_conservation,
     pack_emission,
     pack_relief,
     pack_surface,
 )
-from ..glsl.scene import RealtimeScene, box_of, load, read_scene
+from ..glsl.scene import RealtimeScene, load, read_scene
 from ..glsl.source import (
     display_definitions,
     fragment_parts,
@@ -182,8 +180,7 @@ def _packed(
     scene = read_scene(loaded, sensor)
     emitters = Emitters(loaded, scene.middle) if loaded.emitters() else None
     sections = Sections()
-    tables: list[DiffractionTable] = []
-    materials: list[Material] = []
+    tables: list[Diffracting] = []  # a surface of each table
     surfaces = []
     for number, surface in enumerate(scene.surfaces):
         progress(number, len(scene.surfaces), f"packing {surface.name}")
@@ -197,15 +194,16 @@ def _packed(
             "parts": packed_parts(common, sections),
             "emits": surface.radiance is not None,
         }
-        if material.bsdf is not None:
-            entry["height_scale"] = height_scale(material)
-            if not any(material.table is t for t in tables):
-                tables.append(material.table)
-                materials.append(material)
-            entry["table"] = next(n for n, t in enumerate(tables) if t is material.table)
+        if (diffraction := material.diffraction) is not None:
+            entry["height_scale"] = diffraction.height_scale
+            if not any(diffraction.table is other.table for other in tables):
+                tables.append(diffraction)
+            entry["table"] = next(
+                n for n, other in enumerate(tables) if other.table is diffraction.table
+            )
         surfaces.append((entry, common))
     light = packed_light(scene, emitters, sections)
-    around, definitions = packed_surroundings(loaded, scene, emitters, materials, sections)
+    around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections)
 
     room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
@@ -233,7 +231,7 @@ def _packed(
             "offset": list(scene.camera.offset),
         },
         "box": [scene.low.tolist(), scene.high.tolist()],
-        "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
+        "subject": [x.tolist() for x in scene.subject],
     }
     _add_programs(header, sections, surfaces, shown, packed, definitions, view)
     header["loss"] = {
@@ -246,11 +244,11 @@ def _packed(
 
 
 def _fitted(
-    methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
+    methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
 ) -> tuple[list[str], Any, dict[str, str]]:
     """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
-    if "exact" in shown and any(table.grid.coherent for table in tables):
+    if "exact" in shown and any(surface.coherent for surface in tables):
         shown.remove("exact")
         left_out["exact"] = "it has no interference of orders, which coherence='patch' requires"
     while shown:
@@ -291,11 +289,11 @@ def _add_programs(
     """
     sources: list[str] = []
     for entry, common in surfaces:
-        # any table serves a surface that does not diffract
-        table = entry.setdefault("table", 0)
+        diffracts = "table" in entry
+        table = entry.setdefault("table", 0)  # of which other surfaces read nothing
         entry["programs"] = {}
         for method in methods:
-            tables = packed[method, table].packed.definitions
+            tables = packed[method, table].packed.definitions if diffracts else {}
             source = _source(method, {**common.definitions, **tables, **around, "SHADOWED": ""})
             if source not in sources:
                 sources.append(source)

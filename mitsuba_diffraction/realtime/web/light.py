@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
-from ...tables.store import cached_colours
 from ..glsl.emitters import Emitters
 from ..glsl.lights import Light
-from ..glsl.materials import Material, coat_index, height_scale
+from ..glsl.materials import Diffracting
 from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.progressive import pack_solid, pack_surroundings
 from ..glsl.scene import RealtimeScene
 from ..glsl.source import plain_source, vertex_source
-from ..glsl.surroundings import flat_shapes, pack_lobes
+from ..glsl.surroundings import flat_shapes
 from ..glsl.texels import Packed, shortened
 from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 
@@ -105,12 +104,12 @@ def packed_surroundings(
     mitsuba_scene: Any,
     scene: RealtimeScene,
     emitters: Emitters | None,
-    materials: Sequence[Material],
+    tables: Sequence[Diffracting],
     sections: Sections,
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
     """Return the page's data of surroundings, as JSON types, and definitions for the shaders.
 
-    materials : one material for each table, for directions of its lobes.
+    tables : one surface of each table, for directions of its lobes.
 
     The data is None for a scene without environment and without shapes that emit light.
     """
@@ -119,7 +118,7 @@ def packed_surroundings(
         return None, {}
     flats = flat_shapes(mitsuba_scene)
     packed, solid = pack_surroundings(scene, emitters, flats), pack_solid(scene, flats)
-    lobes = [_lobes(material) for material in materials]
+    lobes = [_lobes(surface) for surface in tables]
     definitions = {k: v for part in (packed, solid, *lobes) for k, v in part.definitions.items()}
     background = None
     if environment is not None:
@@ -154,13 +153,12 @@ def _coarser(packed: Packed) -> Packed:
     return replace(packed, textures=tuple(textures))
 
 
-def _lobes(material: Material) -> Packed:
+def _lobes(surface: Diffracting) -> Packed:
     """Pack directions of lobes and their densities in fewer digits.
 
     Rounding adds no bias: shaders divide by the rounded densities.
     """
-    factor = height_scale(material) * coat_index(material)
-    packed = pack_lobes(cached_colours(material.table), factor)
+    packed = surface.lobes()
     rounding: dict[str, Callable[[Any], Any]] = {
         "lobe_places": np.float16,
         "lobe_densities": shortened,

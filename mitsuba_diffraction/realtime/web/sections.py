@@ -109,7 +109,9 @@ class Sections:
         self._parts: list[Section] = []
 
     def add(self, section: Section) -> int:
-        """Append a section and return its number."""
+        """Append a section unless it exists, and return its number."""
+        if section in self._parts:
+            return self._parts.index(section)
         self._parts.append(section)
         return len(self._parts) - 1
 

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...progress import Progress
 from ...tables.colour.table import colour_difference, power_colour_difference
+from ...tables.orders import OrderTable, cells
+from ...tables.orders.grids import rows, wavelength_of
+from ...tables.orders.table import Counts
 from ...tables.powers import power_series
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
+from ..glsl.materials import Diffracting
+from ..glsl.orders import Solved, cells_within
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array, packed_series
@@ -30,6 +37,8 @@ _FEWER = range(4)  # digits that may be left out of tables that are too large fo
 
 _ORDERS = 5  # largest number of orders that the page names
 _LARGE = 1 << 20  # least number of entries of rounded textures
+_ORDER_BYTES = 6 << 20  # size of efficiencies of solved orders before compression
+_BANDS = 4  # bands of solved orders whose colours are compared
 
 
 @dataclass(frozen=True)
@@ -46,27 +55,14 @@ class WebTable:
         return sum(len(section.data) for section in self.sections.values())
 
 
-def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
+def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
 
     `exact` does not support coherent tables.
     """
-    if method == "fast":
-        colours = cached_colours(table)
-        # rounded twice, so that the upper halves of floats, which the shader reads, are exact
-        coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
-        fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
-        packed, loss = pack_colours(fewer), colour_difference(colours, fewer)
-        width = fewer.coefficients.shape[-1] // 2  # a word has two numbers
-    else:
-        series, order_0, scale, expansion = power_series(table)
-        powers = replace(
-            table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
-            expansion=expansion,
-        )  # fmt: skip
-        less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
-        packed, loss = pack_powers(less), power_colour_difference(powers, less)
-        width = 4 * int(packed.definitions["TEXELS"])
+    packed, loss, width = (_solved if isinstance(surface, Solved) else _modelled)(
+        method, surface, digits
+    )
     sections = {}
     for texture in packed.textures:
         data, channels = texture.data, texture.data.shape[2]
@@ -76,6 +72,81 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
             else packed_array(as_columns(data, channels))
         )
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
+
+
+class Rounded(NamedTuple):
+    """Table in fewer digits.
+
+    Attributes
+    ----------
+    packed : textures, uniforms and definitions.
+    loss : ΔE2000 (n,) from the exact table.
+    width : numbers in a row of large textures.
+    """
+
+    packed: Packed
+    loss: NDArray[np.float64]
+    width: int
+
+
+def _modelled(method: str, surface: Diffracting, digits: int) -> Rounded:
+    """Round a table of `diffraction`."""
+    table: DiffractionTable = surface.table
+    if method == "fast":
+        colours = cached_colours(table)
+        # rounded twice, so that the upper halves of floats, which the shader reads, are exact
+        coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
+        fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
+        # a word has two numbers
+        width = fewer.coefficients.shape[-1] // 2
+        return Rounded(pack_colours(fewer), colour_difference(colours, fewer), width)
+    series, order_0, scale, expansion = power_series(table)
+    powers = replace(
+        table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
+        expansion=expansion,
+    )  # fmt: skip
+    less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
+    packed = pack_powers(less)
+    width = 4 * int(packed.definitions["TEXELS"])
+    return Rounded(packed, power_colour_difference(powers, less), width)
+
+
+def _solved(method: str, surface: Solved, digits: int) -> Rounded:
+    """Round a table of solved orders, and take fewer cells."""
+    packed = surface.tables(method, most_bytes=_ORDER_BYTES)
+    counts = cells_within(surface.table, _ORDER_BYTES)
+    width = 4 * (counts.rho + 1)
+    textures = [
+        replace(t, data=rounded(as_columns(t.data, width), digits, FLOOR).reshape(t.data.shape))
+        if t.name == "efficiencies"
+        else t
+        for t in packed.textures
+    ]
+    loss = _solved_loss(surface.table, counts, digits)
+    return Rounded(replace(packed, textures=tuple(textures)), loss, width)
+
+
+def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.float64]:
+    """Return the ΔE2000 (n,) of orders in the middles of cells, which are farthest from nodes."""
+    losses = []
+    step = max(1, len(table.bands) // _BANDS)
+    for band in table.bands[::step]:
+        fine = rows(table, band, cells.A, Counts(*(2 * n for n in counts)))
+        nodes = np.minimum(fine.within, 8.0)[::2, ::2, ::2]
+        lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
+        for axis in range(3):
+            lower, upper = (
+                np.moveaxis(lines, axis, 0)[part] for part in (slice(-1), slice(1, None))
+            )
+            lines = np.moveaxis(0.5 * (lower + upper), 0, axis)
+        exact, face = (values[1::2, 1::2, 1::2] for values in fine)
+        rho, w = ((np.arange(n) + 0.5) / n for n in (counts.rho, counts.w))
+        lam = wavelength_of(table, (band.k + cells.sine_squared(rho))[:, None], w)
+        colours = linear_srgb(response(lam.ravel())).reshape(*lam.shape, 1, 1, 3)
+        passed = (face / np.maximum(exact, 1e-12))[..., None] * colours
+        difference = delta_e(exact[..., None] * passed, lines[..., None] * passed)
+        losses.append(difference[np.isfinite(difference)])
+    return np.concatenate(losses)
 
 
 def rounded(values: NDArray[np.floating], bits: int, floor: float = 0.0) -> NDArray[np.float16]:
@@ -93,7 +164,7 @@ def rounded(values: NDArray[np.floating], bits: int, floor: float = 0.0) -> NDAr
 
 
 def fitting_tables(
-    methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
+    methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
 ) -> dict[tuple[str, int], WebTable] | int:
     """Round tables for all methods to `DIGITS`, or to fewer if they exceed `room` bytes.
 
@@ -114,12 +185,15 @@ def fitting_tables(
     return needed
 
 
-def strongest_orders(table: DiffractionTable) -> list[list[float]]:
+def strongest_orders(surface: Diffracting) -> list[list[float]]:
     """Return the brightest separate orders in green light along the normal.
 
     Each entry has q_x and q_y in rad/µm, and the share of the light; a pair ±q has one entry. The
-    list of a coherent table is empty.
+    list of a coherent table is empty; that of solved orders has the first.
     """
+    if isinstance(surface, Solved):
+        return [[2.0 * np.pi / surface.table.period, 0.0, 1.0]]
+    table: DiffractionTable = surface.table
     if table.grid.coherent:
         return []
     series, _, scale, expansion = power_series(table)

@@ -6,6 +6,7 @@ OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
 Band        efficiencies of the directions with the same number of propagating orders
 cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
 lookup      interpolation in NumPy
+polarised   Mueller matrices of orders, and their axes
 grids       even grids that the BSDF reads, under a coat where the table has one
 daylight    the sum of an order's lobe over daylight, for RGB variants
 file        tables as NetCDF files
@@ -14,7 +15,7 @@ file        tables as NetCDF files
 from __future__ import annotations
 
 from .file import load_orders, save_orders
-from .lookup import efficiency, polarised_efficiency
+from .lookup import efficiency, mueller, polarised_efficiency
 from .table import Band, OrderTable
 
 __all__ = ["Band", "OrderTable"]
@@ -22,5 +23,6 @@ __all__ = ["Band", "OrderTable"]
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency
 OrderTable.polarised_efficiency = polarised_efficiency
+OrderTable.mueller = mueller
 OrderTable.load = staticmethod(load_orders)
 OrderTable.save = save_orders

@@ -1,11 +1,12 @@
 """Tables of orders as NetCDF files (classic format), which most programs read.
 
 The variable `kind_a_K` holds kind A of band K, with the dimensions `tau_K`, `rho_K`, `w_K`, `j`,
-`q` and `polarisation` (s, p) of `Band.a`; `kind_b_K` holds kind B. Numbers are packed in 16 bits,
-as the CF conventions have it: efficiency = scale_factor × number. Global attributes hold the rest:
-`period` (µm), `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose
-`j` and `q` are ports of `cells`; else left out), `header` (JSON), `version`, and `sha256` of all of
-these and the numbers.
+`q` and `polarisation` (s, p) of `Band.a`; `kind_b_K` holds kind B. The Mueller matrices of a
+polarised table are `mueller_a_K` and `mueller_b_K`, with `row` and `column` for `polarisation`.
+Numbers are packed in 16 bits, as the CF conventions have it: efficiency = scale_factor × number.
+Global attributes hold the rest: `period` (µm), `wavelengths` (nm, in vacuum), `superstrate`
+(index), `thin` (1 for a sheet, whose `j` and `q` are ports of `cells`; else left out), `header`
+(JSON), `version`, and `sha256` of all of these and the numbers.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ MARK = "mitsuba_diffraction_orders"
 _STEP = 1.0 / 30_000.0
 #: Bytes at the beginning, among which the mark is: dimensions precede the attributes.
 _HEAD = 1 << 16
+#: Mark of Mueller matrices among packed arrays.
+_MUELLER = " mueller"
 _AGAIN = "solve it again with 'mitsuba-diffraction solve'"
 
 
@@ -53,9 +56,10 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
             f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
         )
     packed = {
-        (band.k, kind): np.rint(values / _STEP).astype(">i2")
+        (band.k, kind + part): np.rint(values / _STEP).astype(">i2")
         for band in table.bands
-        for kind, values in zip("ab", band.kinds, strict=False)
+        for part, arrays in (("", band.kinds), (_MUELLER, band.mueller or ()))
+        for kind, values in zip("ab", arrays, strict=False)
     }
     header = json.dumps(dict(table.header), sort_keys=True)
     content = io.BytesIO()
@@ -71,13 +75,19 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         outline = (table.period, tuple(table.wavelengths), table.superstrate, header)
         file.sha256 = _checksum(outline, table.thin, packed)
         file.createDimension("polarisation", 2)
-        for (k, kind), numbers in packed.items():
+        if table.polarised:
+            file.createDimension("row", 4)
+            file.createDimension("column", 4)
+        for (k, part), numbers in packed.items():
+            kind, matrices = part[0], part.endswith(_MUELLER)
             names = [f"{axis}_{k}" for axis in ("tau", "rho", "w")]
             names += [f"{axis}_{kind}_{k}" for axis in ("j", "q")]
             for name, size in zip(names, numbers.shape, strict=False):
                 if name not in file.dimensions:
                     file.createDimension(name, size)
-            variable = file.createVariable(f"kind_{kind}_{k}", ">i2", (*names, "polarisation"))
+            names += ["row", "column"] if matrices else ["polarisation"]
+            first = "mueller" if matrices else "kind"
+            variable = file.createVariable(f"{first}_{kind}_{k}", ">i2", names)
             variable[:] = numbers
             variable.scale_factor, variable.units = np.float64(_STEP), "1"
         file.flush()
@@ -132,21 +142,26 @@ def _table(file: Any) -> OrderTable:
     header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     for name, variable in file.variables.items():
-        _, kind, k = name.split("_")
+        first, kind, k = name.split("_")
         if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
             raise ValueError(f"{name} claims {variable.shape} numbers")
-        packed[int(k), kind] = variable[:]
+        packed[int(k), kind + (_MUELLER if first == "mueller" else "")] = variable[:]
     checksum = _checksum((period, (low, high), superstrate, header), thin, packed)
     if file.sha256 != checksum.encode():
         raise ValueError("its checksum is that of another one")
-    kinds = {
-        key: (numbers * file.variables[f"kind_{key[1]}_{key[0]}"].scale_factor).astype(np.float32)
+    unpacked = {
+        key: (numbers * file.variables[f"kind_{key[1][0]}_{key[0]}"].scale_factor).astype(
+            np.float32
+        )
         for key, numbers in packed.items()
     }
-    bands = tuple(
-        Band(k, kinds[k, "a"], kinds.get((k, "b"))) for k in sorted({k for k, _ in kinds})
-    )
+    bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
     return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin)
+
+
+def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
+    matrices = [arrays[k, kind + _MUELLER] for kind in "ab" if (k, kind + _MUELLER) in arrays]
+    return Band(k, arrays[k, "a"], arrays.get((k, "b")), mueller=tuple(matrices) or None)
 
 
 def _checksum(

@@ -7,8 +7,8 @@ c is at least √(1 − 1/n²).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from ...optics.fresnel import reflectance
 from . import cells
 from .cells import Array
 from .lookup import clamped
+from .polarised import smooth_elements
 from .table import Band, Counts, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
@@ -47,6 +48,20 @@ class Corners(NamedTuple):
     values: NDArray[np.float16]
 
 
+class Matrices(NamedTuple):
+    """Mueller matrices of the grating alone on the even grids.
+
+    Attributes
+    ----------
+    starts : (2 × bands,) first record of kind A and B of each band.
+    values : (records, 16) float16, `polarised.smooth_elements` of each node (τ, ρ, w) and each pair
+        of ports (j, q).
+    """
+
+    starts: NDArray[np.uint32]
+    values: NDArray[np.float16]
+
+
 class Rows(NamedTuple):
     """Efficiencies on an even grid, (τ, ρ, w, j, q) from 0 to 1.
 
@@ -63,41 +78,54 @@ class Rows(NamedTuple):
 def corners(table: OrderTable) -> Corners:
     """Resample a table for the renderer."""
     counts = _cells(table)
+
+    def records(band: Band, kind: int) -> NDArray[np.float16]:
+        of_kind = rows(table, band, kind, counts)
+        parts = [_records(of_kind.within, counts)]
+        if table.superstrate != 1.0:
+            parts.append(_records(of_kind.through, counts))
+        return np.concatenate(parts, axis=-1)
+
+    return Corners(counts, *_stacked(table, records))
+
+
+def matrices(table: OrderTable, counts: Counts) -> Matrices:
+    """Resample the Mueller matrices of a polarised table on grids of so many cells."""
+
+    def records(band: Band, kind: int) -> NDArray[np.float16]:
+        elements = smooth_elements(table, band, kind)
+        even = _resampled(table, band, elements, _grid(table, band, counts))
+        return even.astype(np.float16).reshape(-1, 16)
+
+    return Matrices(*_stacked(table, records))
+
+
+def _stacked(
+    table: OrderTable, records: Callable[[Band, int], NDArray[np.float16]]
+) -> tuple[NDArray[np.uint32], NDArray[np.float16]]:
+    """Return the first record of each kind of each band, and all records."""
     starts, parts, total = [], [], 0
     for band in table.bands:
         for kind in (cells.A, cells.B):
             starts.append(total)
-            if kind == cells.B and band.b is None:
-                continue
-            of_kind = rows(table, band, kind, counts)
-            records = [_records(of_kind.within, counts)]
-            if table.superstrate != 1.0:
-                records.append(_records(of_kind.through, counts))
-            parts.append(np.concatenate(records, axis=-1))
-            total += len(parts[-1])
-    return Corners(counts, np.array(starts, np.uint32), np.concatenate(parts))
+            if kind == cells.A or band.b is not None:
+                parts.append(records(band, kind))
+                total += len(parts[-1])
+    return np.array(starts, np.uint32), np.concatenate(parts)
 
 
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     """Evaluate the polynomials of a kind on a grid with so many cells, unpolarised."""
+    grid = _grid(table, band, counts)
     unpolarised = band.kind(kind).mean(axis=-1, dtype=np.float64)
-    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
-    along_tau, along_rho = (
-        cells.interpolation(known, places)
-        for known, places in zip(band.counts, (tau, rho), strict=False)
-    )
-    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, unpolarised, optimize=True)
-    big_k = (band.k + cells.sine_squared(rho))[:, None]
-    lam = wavelength_of(table, big_k, w)
-    at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
-    along_w = cells.interpolation(band.counts.w, at)
-    summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
+    summed = _resampled(table, band, unpolarised, grid)
     values: Array = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
-    places = tau[:, None, None, None], rho[:, None, None]
-    light = cells.from_cell(band.k, kind, channels, *places, lam[..., None], table.optical_period)
+    places = grid.tau[:, None, None, None], grid.rho[:, None, None]
+    lam = grid.wavelength[..., None]
+    light = cells.from_cell(band.k, kind, channels, *places, lam, table.optical_period)
     through = face_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
@@ -105,6 +133,33 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     repeated = np.eye(len(channels)) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
     return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
+
+
+class _Grid(NamedTuple):
+    """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
+
+    tau: Array
+    rho: Array
+    big_k: Array
+    wavelength: Array
+
+
+def _grid(table: OrderTable, band: Band, counts: Counts) -> _Grid:
+    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
+    big_k = (band.k + cells.sine_squared(rho))[:, None]
+    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w))
+
+
+def _resampled(table: OrderTable, band: Band, values: NDArray[Any], grid: _Grid) -> Array:
+    """Evaluate the polynomials of values (τ, ρ, w, …) at nodes of a band on a grid."""
+    along_tau, along_rho = (
+        cells.interpolation(known, places)
+        for known, places in zip(band.counts, grid[:2], strict=False)
+    )
+    summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
+    at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
+    along_w = cells.interpolation(band.counts.w, at)
+    return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True))
 
 
 def least_c(index: float) -> float:

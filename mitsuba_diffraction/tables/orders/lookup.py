@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError
 from . import cells
 from .cells import Array, Cell
+from .polarised import ODD, nearest_pure, smooth_elements
 from .table import Band, OrderTable
 
 
@@ -61,6 +65,64 @@ def polarised_efficiency(
 
     Arguments and errors as for `efficiency`.
     """
+    return _values(
+        table, x, y, wavelength, order, from_below, transmitted, lambda band, kind: band.kind(kind),
+        clamped,
+    )  # fmt: skip
+
+
+def mueller(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    *,
+    from_below: bool = False,
+    transmitted: bool = False,
+) -> Array:
+    """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
+
+    M₀₀ is `efficiency`. Arguments and errors as for `efficiency`.
+
+    Raises
+    ------
+    DiffractionError
+        If the table has no Mueller matrices.
+    """
+    if not table.polarised:
+        raise DiffractionError(
+            "this table has efficiencies alone; solve the profile with --polarised for Mueller "
+            "matrices"
+        )
+
+    def of_kind(band: Band, kind: int) -> Array:
+        return smooth_elements(table, band, kind)
+
+    elements = _values(table, x, y, wavelength, order, from_below, transmitted, of_kind, np.asarray)
+    power = efficiency(
+        table, x, y, wavelength, order, from_below=from_below, transmitted=transmitted
+    )
+    matrices = elements.reshape(*elements.shape[:-1], 4, 4)
+    return nearest_pure(matrices * np.where(ODD, np.asarray(y)[..., None, None], 1.0), power)
+
+
+def _values(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    from_below: bool,
+    transmitted: bool,
+    of_kind: Callable[[Band, int], NDArray[Any]],
+    finish: Callable[[Array], Array],
+) -> Array:
+    """Interpolate values of an order, (…, n), 0 where it does not propagate.
+
+    of_kind : values (τ, ρ, w, j, q, n) of a band's kind.
+    finish : applied to the rows (lanes, q, n) of all ports.
+    """
     if (from_below or transmitted) and not table.thin:
         raise DiffractionError(
             "this table has reflected light alone; solve the profile with thin for that below"
@@ -73,32 +135,32 @@ def polarised_efficiency(
     w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
     q = cell.channel - m.ravel().astype(np.int64)
     propagates = (cell.channel >= 0) & (q >= 0) & (q < cell.channels)
-    result = np.zeros((len(x), 2))
+    result = np.zeros((len(x), of_kind(table.bands[0], cells.A).shape[-1]))
     for k in np.unique(cell.band):
         for kind in (cells.A, cells.B):
             here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
             if len(here):
                 channels = int(k) + 1 - kind
-                rows = _polynomial(table.bands[k], kind, cell, w, here, channels * from_below)
+                values = of_kind(table.bands[k], kind)
+                rows = _polynomial(values, cell, w, here, channels * from_below)
                 port = q[here] + channels * (from_below != transmitted)
-                result[here] = clamped(rows)[np.arange(len(here)), port]
-    return result.reshape(*shape, 2)
+                result[here] = finish(rows)[np.arange(len(here)), port]
+    return result.reshape(*shape, result.shape[-1])
 
 
 def _polynomial(
-    band: Band, kind: int, cell: Cell, w: Array, here: NDArray[np.int64], first: int
+    nodes: NDArray[Any], cell: Cell, w: Array, here: NDArray[np.int64], first: int
 ) -> Array:
-    """Return the rows of all ports of some lanes, (n, q, 2); first : port of channel 0."""
-    counts = band.counts
+    """Return the rows of all ports of some lanes, (lanes, q, n); first : port of channel 0."""
     weights = [
         cells.interpolation(count, places[here])
-        for count, places in zip(counts, (cell.tau, cell.rho, w), strict=True)
+        for count, places in zip(nodes.shape, (cell.tau, cell.rho, w), strict=False)
     ]
-    rows = np.empty((len(here), band.kind(kind).shape[4], 2))
+    rows = np.empty((len(here), *nodes.shape[4:]))
     for j in np.unique(cell.channel[here]):
         lanes = np.flatnonzero(cell.channel[here] == j)
         of_lanes = [matrix[lanes] for matrix in weights]
-        values = band.kind(kind)[:, :, :, first + j].astype(np.float64)
+        values = nodes[:, :, :, first + j].astype(np.float64)
         rows[lanes] = np.einsum("na,nb,nc,abcqs->nqs", *of_lanes, values, optimize=True)
     return rows
 

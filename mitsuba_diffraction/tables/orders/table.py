@@ -18,6 +18,8 @@ from .cells import Array, B, largest_band, nodes
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
 LARGEST_SUM = 1.001
+#: Largest difference between M₀₀ ± M₀₁ and efficiencies: packing in 16 bits, and sums above 1.
+ROUNDING = 2e-3
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
 #: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
@@ -45,11 +47,14 @@ class Band:
         the leaving light. Nodes are `cells.nodes`. A sheet has ports instead of channels, twice as
         many.
     b : (τ, ρ, w, k, k, 2) of kind B, with the same nodes; None for k = 0.
+    mueller : of a polarised table, the Mueller matrices (τ, ρ, w, j, q, 4, 4) of each kind, about
+        the axes of `polarised`, where M₀₀ ± M₀₁ are the efficiencies; else None.
     """
 
     k: int
     a: NDArray[np.float32]
     b: NDArray[np.float32] | None = None
+    mueller: tuple[NDArray[np.float32], ...] | None = field(default=None, kw_only=True)
 
     @property
     def counts(self) -> Counts:
@@ -74,6 +79,11 @@ class Band:
     def kinds(self) -> tuple[NDArray[np.float32], ...]:
         """Efficiencies of kind A and, but for band 0, of kind B."""
         return (self.a,) if self.b is None else (self.a, self.b)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.float32], ...]:
+        """Efficiencies, then Mueller matrices, of all kinds."""
+        return self.kinds + (self.mueller or ())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,6 +124,7 @@ class OrderTable:
     # Set by the package, since look-ups and files build on this class
     efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
     polarised_efficiency: ClassVar[Callable[..., Array]]  #: `lookup.polarised_efficiency`
+    mueller: ClassVar[Callable[..., Array]]  #: matrices of an order: `lookup.mueller`
     load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 
@@ -161,6 +172,11 @@ class OrderTable:
         return 2 if self.thin else 1
 
     @property
+    def polarised(self) -> bool:
+        """Whether the table has Mueller matrices."""
+        return all(band.mueller is not None for band in self.bands)
+
+    @property
     def last_band(self) -> int:
         """Band of in-plane light of the shortest wavelength."""
         return largest_band(self.wavelengths, self.optical_period)
@@ -194,8 +210,8 @@ class OrderTable:
 
     @property
     def nbytes(self) -> int:
-        """Size of the efficiencies in memory."""
-        return sum(kind.nbytes for band in self.bands for kind in band.kinds)
+        """Size of the numbers in memory."""
+        return sum(part.nbytes for band in self.bands for part in band.arrays)
 
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of the header."""
@@ -207,8 +223,8 @@ class OrderTable:
         shapes = [kind.shape for band in self.bands for kind in band.kinds]
         content = hashlib.sha256(json.dumps([outline, shapes]).encode())
         for band in self.bands:
-            for kind in band.kinds:
-                content.update(np.ascontiguousarray(kind).data)
+            for part in band.arrays:
+                content.update(np.ascontiguousarray(part).data)
         return content.hexdigest()
 
     def summary(self) -> dict[str, Any]:
@@ -218,6 +234,7 @@ class OrderTable:
             "wavelength_range_nm": list(self.wavelengths),
             "superstrate_index": self.superstrate,
             "thin_sheet": self.thin,
+            "polarised": self.polarised,
             "bands": len(self.bands),
             "nodes": sorted({" x ".join(map(str, band.counts)) for band in self.bands}),
             "mean_albedo": round(self.albedo, 4),
@@ -230,6 +247,7 @@ class OrderTable:
         low, high = self.wavelengths
         medium = "" if self.superstrate == 1.0 else f" under index {self.superstrate:g}"
         medium = ", thin sheet" if self.thin else medium
+        medium += ", polarised" if self.polarised else ""
         return (
             f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
             f"{self.nbytes / 1e6:.1f} MB)"
@@ -276,6 +294,8 @@ def _check_band(band: Band, sides: int) -> None:
         )
     if (band.b is None) != (band.k == 0):
         raise DiffractionError(f"band {band.k}: kind B must be there for all bands but band 0")
+    if band.mueller is not None:
+        _check_mueller(band)
     for name, values, channels in zip("AB", band.kinds, (band.k + 1, band.k), strict=False):
         ports = sides * channels
         expected = (tau, rho, w, ports, ports, 2)
@@ -295,4 +315,25 @@ def _check_band(band: Band, sides: int) -> None:
             raise DiffractionError(
                 f"band {band.k}, kind {name}: efficiencies sum to {largest:.4g} over the orders; "
                 f"at most {LARGEST_SUM} is allowed: use more points or modes in the solver"
+            )
+
+
+def _check_mueller(band: Band) -> None:
+    assert band.mueller is not None
+    shapes = [values.shape for values in band.mueller]
+    expected = [(*values.shape[:-1], 4, 4) for values in band.kinds]
+    if shapes != expected:
+        raise DiffractionError(
+            f"band {band.k}: Mueller matrices of shapes {shapes}, expected {expected}"
+        )
+    for values, matrices in zip(band.kinds, band.mueller, strict=True):
+        first = matrices[..., 0, :2]
+        efficiencies = np.stack([first.sum(axis=-1), first[..., 0] - first[..., 1]], axis=-1)
+        limit = matrices[..., :1, :1] + ROUNDING
+        # also refuses NaN
+        if not (np.all(np.abs(matrices) <= limit) and
+                np.all(np.abs(efficiencies - values) <= ROUNDING)):  # fmt: skip
+            raise DiffractionError(
+                f"band {band.k}: Mueller matrices are not those of its efficiencies; solve the "
+                "table again"
             )

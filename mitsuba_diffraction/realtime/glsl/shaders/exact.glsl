@@ -13,7 +13,6 @@
 uniform sampler2D orders;        // TEXELS texels per order: terms of its series in κ
 uniform sampler2D functions;     // factors of all terms over κ, and |a₀|²: TEXELS + 1 texels at
                                  // each end of `cells` cells per interval
-uniform sampler2D responses;     // linear sRGB / 2π over k, one row per light
 uniform ivec2 last_order;        // orders run from −last to last
 uniform vec2 spacing;            // spacing of orders, rad/µm
 uniform float sigma;
@@ -53,13 +52,6 @@ int first_texel(int interval, ivec2 order)
     ivec2 size = 2 * last_order + 1;
     ivec2 place = order + last_order;
     return ((interval * size.y + place.y) * size.x + place.x) * TEXELS;
-}
-
-vec3 response(float k, int light)
-{
-    float last = float(textureSize(responses, 0).x - 1);
-    float x = (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x) * last + 0.5;
-    return texelFetch(responses, ivec2(int(clamp(x, 0.0, last)), light), 0).rgb;  // 0 at both ends
 }
 
 vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)

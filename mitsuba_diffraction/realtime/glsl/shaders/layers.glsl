@@ -16,7 +16,11 @@ vec2 in_patch(vec3 direction, vec2 rotation)
 
 const float LOWEST = 1e-6;  // least cosine of a direction, which keeps results finite
 
-#ifdef DIFFRACTING
+#if defined(ORDERS)
+
+vec3 albedo(vec3 w, vec2 rotation);  // of orders.glsl
+
+#elif defined(DIFFRACTING)
 
 // Albedo of the surface for one direction, at most 1.
 vec3 albedo(vec3 w, vec2 rotation)

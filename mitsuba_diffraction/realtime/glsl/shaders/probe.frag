@@ -19,5 +19,10 @@ void main()
 #endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
+#ifdef ORDERS
+    vec3 wo = vec3(place.xy, sqrt(1.0 - dot(place.xy, place.xy)));
+    fragment = vec4(diffraction(vec3(0.0, 0.0, 1.0), wo, vec2(1.0, 0.0), 0), 1.0);
+#else
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
+#endif
 }

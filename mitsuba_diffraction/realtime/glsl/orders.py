@@ -1,0 +1,201 @@
+"""Surfaces of the BSDF `diffraction_orders` for shaders: efficiencies as a texture, and lobes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from ...errors import DiffractionError
+from ...heights.field import HeightField
+from ...optics.colour import RGB_WAVELENGTHS
+from ...optics.geometry import wavenumber
+from ...tables.orders import OrderTable, cells
+from ...tables.orders.daylight import ENDS, daylight_weights
+from ...tables.orders.grids import face_transmittance, rows
+from ...tables.orders.table import Counts
+from .lobes import AZIMUTHS, RINGS, pack_lobes
+from .maps import Map, axis_map
+from .texels import PAGE, Packed, Texture
+
+Array = NDArray[np.float64]
+
+#: Cells of a tile along τ, ρ and w, in air and under a layer, whose critical angles lie along w;
+#: fewer where a table would need more memory than this.
+CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 15), 48 << 20
+
+# efficiency within a layer at most: where more is trapped, its face sends nearly nothing out
+_MOST_WITHIN = 8.0
+
+# lobes: directions and wavelengths of the mean efficiencies
+_DIRECTIONS, _WAVELENGTHS = 32, 24
+
+
+class Solved:
+    """Surface of a `diffraction_orders` BSDF; see `materials.Diffracting`."""
+
+    height_scale: float = 1.0
+    largest_scale: float | None = None
+    stretch: float = 1.0
+    coherent: bool = False
+
+    def __init__(self, bsdf: Any) -> None:
+        self.bsdf = bsdf
+        self.table: OrderTable = bsdf.table
+        self.nested = bsdf.nested
+        self.coherence_width = float(bsdf.coherence_width)
+
+    @property
+    def axis(self) -> Map:
+        """See `Diffracting.axis`."""
+        return axis_map(self.bsdf.orientation)
+
+    @property
+    def heights(self) -> HeightField:
+        """See `Diffracting.heights`."""
+        raise DiffractionError(
+            "the thesis' methods draw heights, but the surface has solved orders; use method fast "
+            "or exact"
+        )
+
+    @property
+    def words(self) -> str:
+        """See `Diffracting.words`."""
+        return f"{self.table}, coherence width {self.coherence_width:g} µm"
+
+    def surface(self) -> Packed:
+        """See `Diffracting.surface`."""
+        channels = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
+        return Packed((), {"channel_wavenumbers": channels}, {"DIFFRACTING": ""})
+
+    def conservation(self, scales: Sequence[float]) -> Packed:
+        """See `Diffracting.conservation`: solved orders conserve energy."""
+        return Packed()
+
+    def tables(self, method: str, *, floats: bool = False, most_bytes: int = MOST_BYTES) -> Packed:
+        """See `Diffracting.tables`; the textures are floats in any case.
+
+        most_bytes : size of the efficiencies at most.
+        """
+        packed = pack_efficiencies(self.table, most_bytes)
+        packed |= Packed((), {"sigma": self.bsdf.sigma})
+        return packed | self._daylight() if method == "fast" else packed
+
+    def lobes(self) -> Packed:
+        """See `Diffracting.lobes`."""
+        sigma = self.bsdf.sigma
+        return pack_lobes(lambda edges: order_power(self.table, sigma, edges), sigma)
+
+    def _daylight(self) -> Packed:
+        """Pack the sum of lobes over daylight."""
+        weights = daylight_weights(self.bsdf.sigma, self.table.period)
+        smoothed = weights.smoothed.astype(np.float16)
+        order_0 = np.column_stack([weights.order_0[:, :3], 1e-3 * weights.wavelengths])
+        return Packed(
+            (
+                Texture("daylight", smoothed, smooth=True),
+                Texture("order_0", order_0[None].astype(np.float32)),
+            ),
+            {"daylight_waves": weights.waves, "daylight_variances": weights.variances},
+            {"DAYLIGHT": ""},
+        )
+
+
+@functools.lru_cache(maxsize=4)
+def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed:
+    """Pack efficiencies for shaders/orders.glsl, with all reflections within a clear layer.
+
+    Bands follow each other, kind A of a band before its kind B. A row of a kind has a tile for each
+    channel of the leaving light, and one for their sum outside of the layer.
+
+    most_bytes : size of the texture at most.
+    """
+    counts = cells_within(table, most_bytes)
+    tiles = []
+    for band in table.bands:
+        for kind in (cells.A, cells.B)[: len(band.kinds)]:
+            values = rows(table, band, kind, counts)
+            whole = values.through.sum(axis=-1, keepdims=True)
+            within = np.minimum(values.within, _MOST_WITHIN)
+            row = np.concatenate([within, whole], axis=-1).astype(np.float16)
+            groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
+            # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
+            row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
+            tiles.append(row.reshape(-1, counts.tau + 1, groups.shape[0] * (counts.rho + 1), 4))
+    joined = np.concatenate(tiles)
+    columns = PAGE // joined.shape[2]
+    joined = np.pad(joined, [(0, -len(joined) % columns), (0, 0), (0, 0), (0, 0)])
+    _, height, width, _ = joined.shape
+    picture = joined.reshape(-1, columns, height, width, 4).swapaxes(1, 2)
+    low, high = table.wavelengths
+    return Packed(
+        (Texture("efficiencies", picture.reshape(-1, columns * width, 4), smooth=True),),
+        {
+            "order_cells": tuple(map(float, counts)),
+            "order_columns": columns,
+            "last_band": float(table.last_band),
+            "period": table.period,
+            "superstrate": table.superstrate,
+            "solved_range": (1e-3 * low, 1e-3 * high),
+        },
+        {"ORDERS": "", **({} if table.superstrate == 1.0 else {"FACE": ""})},
+    )
+
+
+def cells_within(table: OrderTable, most_bytes: int) -> Counts:
+    """Return the numbers of cells of a texture of this size at most."""
+    counts = CELLS if table.superstrate == 1.0 else CELLS_UNDER_LAYER
+    tiles = sum(n * (n + 1) for band in table.bands for n in (kind.shape[3] for kind in band.kinds))
+    while _tile_bytes(counts) * tiles > most_bytes and max(counts) > 4:
+        tau, rho, w = (max(min(n, 4), 3 * n // 4) for n in counts)
+        counts = Counts(tau, rho, max(w - w % 3, 3))
+    return counts
+
+
+def _tile_bytes(counts: Counts) -> int:
+    """Return the size of a tile of half floats."""
+    return 2 * (counts.tau + 1) * (counts.rho + 1) * (counts.w // 3) * 4
+
+
+def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
+    """Return the brightness of all orders in the cells (rings, azimuths) between radii `edges`.
+
+    Efficiencies are means over directions; layers only pass and mirror. Lobes of orders other than
+    0 are as wide as they are only around the axis: along it, wavelengths spread them further.
+    """
+    index = table.superstrate
+    radius = np.sqrt((np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS)
+    turn = 2.399963 * np.arange(_DIRECTIONS)  # sunflower spiral
+    x, y = ((radius / index * part)[:, None] for part in (np.cos(turn), np.sin(turn)))
+    through = np.ones(_DIRECTIONS)
+    if index > 1.0:
+        through = face_transmittance((radius / index) ** 2, index)
+    daylight = np.diff(daylight_weights(sigma, table.period).cumulative)
+    lam = ENDS[0] + (np.arange(len(daylight)) + 0.5) * (ENDS[1] - ENDS[0]) / len(daylight)
+    some = np.linspace(*ENDS, _WAVELENGTHS)
+    deviation = 1e-3 * lam / (2.0 * np.pi * np.sqrt(2.0) * sigma)
+    around = np.linspace(-np.pi, np.pi, AZIMUTHS + 1)  # edges of azimuths
+
+    def power(order: int) -> Array:
+        """Return the mean efficiency at all wavelengths, as bright as these are."""
+        efficiency = table.efficiency(x, y, some, order)
+        mean = (through[:, None] * efficiency).mean(axis=0)
+        if order == 0:
+            mean = mean + (1.0 - through).mean()
+        return np.asarray(daylight * np.interp(lam, some, mean))
+
+    within = power(0) @ -np.expm1(-0.5 * (edges / deviation[:, None]) ** 2)
+    cell_power = np.diff(within)[:, None] * np.full(AZIMUTHS, 1.0 / AZIMUTHS)
+    for order in range(1, int(2e3 * table.period / ENDS[0]) + 1):
+        radii = order * 1e-3 * lam / table.period
+        rings = np.clip(np.searchsorted(edges, radii) - 1, 0, RINGS - 1)
+        across = np.clip(around, -0.5 * np.pi, 0.5 * np.pi)
+        spread = np.diff(ndtr((radii / deviation)[:, None] * np.sin(across)), axis=1)
+        for sign, first in ((1, AZIMUTHS // 2), (-1, 0)):
+            lobes = power(sign * order)[:, None] * np.roll(spread, first, axis=1)
+            np.add.at(cell_power, rings, lobes)
+    return np.asarray(cell_power)

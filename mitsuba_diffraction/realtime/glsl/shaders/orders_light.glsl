@@ -1,0 +1,131 @@
+// Light of all solved orders under the coherence window, like plugin/orders/lobes.py:
+// f = Σ_m η_m (k²σ²/π) exp(−σ²|q − q_m|²).
+
+#define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
+
+uniform float sigma;             // standard deviation of the amplitude window, µm
+
+const float FAR = 18.0;          // squared distance from a lobe's centre, in its widths, where it is 0
+
+// Lobes of all orders of one wavenumber, from a look-up at it: f without the cosine.
+float orders_at(vec2 uv, float k)
+{
+    find_row(2.0 * PI / k);
+    vec2 place = uv * (k * period / (2.0 * PI));
+    float sharpness = 2.0 * PI * sigma / period;
+    float reach = sqrt(FAR) / sharpness;
+    int last = int(floor(place.x + reach));
+    float sum = 0.0;
+    for (int m = int(ceil(place.x - reach)); m <= last; ++m) {
+        vec2 apart = sharpness * (place - vec2(float(m), 0.0));
+        float squared = dot(apart, apart);
+        if (squared < FAR) sum += exp(-squared) * efficiency_of(float(m));
+    }
+    return sum * (k * k * sigma * sigma / PI);
+}
+
+#if defined(MONOCHROME)
+
+uniform float wavenumber;        // wavenumber of monochromatic light, rad/µm
+
+vec3 all_orders(vec2 uv, int light) { return light_colour[light] * orders_at(uv, wavenumber); }
+
+#else
+
+// Order m is brightest along a direction at m times this wavenumber.
+float wavenumber_step(vec2 uv) { return abs(uv.x) * 2.0 * PI / (period * dot(uv, uv)); }
+
+// exp(−σ² q_m² v²/r²) is the largest value of the lobe of order m along a direction.
+float aside(vec2 uv)
+{
+    float away = sigma * 2.0 * PI / period * uv.y;
+    return away * away / dot(uv, uv);
+}
+
+#ifdef DAYLIGHT
+
+uniform sampler2D daylight;       // linear sRGB of a lobe: columns over its k, rows over its variance
+uniform vec2 daylight_waves;      // k of the first and last column, rad/µm
+uniform vec2 daylight_variances;  // variance of the first and last row
+uniform sampler2D order_0;        // linear sRGB of wavelengths that order 0 is summed over, and these
+
+vec3 daylight_at(float k, float variance)
+{
+    vec2 size = vec2(textureSize(daylight, 0));
+    vec2 low = vec2(daylight_waves.x, daylight_variances.x);
+    vec2 place = (vec2(k, variance) - low) / (vec2(daylight_waves.y, daylight_variances.y) - low);
+    return textureLod(daylight, (clamp(place, 0.0, 1.0) * (size - 1.0) + 0.5) / size, 0.0).rgb;
+}
+
+// All lobes, summed over daylight (tables/orders/daylight.py).
+vec3 all_orders(vec2 uv, int light)
+{
+    uv.x = abs(uv.x) < 1e-4 ? 1e-4 : uv.x;
+    float square = dot(uv, uv), step = wavenumber_step(uv), falloff = aside(uv);
+    float first = max(ceil(daylight_waves.x / step), 1.0);
+    float last = min(floor(daylight_waves.y / step), sqrt(FAR / max(falloff, 1e-8)));
+    vec3 sum = vec3(0.0);
+    for (float m = first; m <= last; ++m) {
+        float k = m * step;
+        find_row(2.0 * PI / k);
+        sum += exp(-falloff * m * m) * efficiency_of(sign(uv.x) * m)
+             * daylight_at(k, 0.5 / (sigma * sigma * square));
+    }
+    sum *= sigma * inversesqrt(square * PI);
+    int nodes = textureSize(order_0, 0).x;
+    float longest = 2.0 * PI * sigma / texelFetch(order_0, ivec2(nodes - 1, 0), 0).w;
+    if (square * longest * longest < FAR)
+        for (int n = 0; n < nodes; ++n) {
+            vec4 node = texelFetch(order_0, ivec2(n, 0), 0);
+            float k = 2.0 * PI / node.w, squared = sigma * sigma * k * k;
+            find_row(node.w);
+            sum += node.rgb * (squared / PI * exp(-square * squared) * efficiency_of(0.0));
+        }
+    return light_colour[light] * sum;
+}
+
+#else
+
+const float WIDEST_LOBE = 0.35;  // widest lobe for steps from order to order, rad/µm: 17 nm at 550
+const float LARGEST_STEP = 0.25; // largest step in k, rad/µm, which resolves colour matching
+
+// All lobes under the light's spectrum. Far from the mirror direction they are narrow in k: two points
+// at one standard deviation yield a lobe's mean to third order. Near it, the loop steps in k.
+vec3 all_orders(vec2 uv, int light)
+{
+    float r = max(length(uv), 1e-6), deviation = sqrt(0.5) / (sigma * r);
+    vec3 sum = vec3(0.0);
+    if (deviation < WIDEST_LOBE) {
+        uv.x = abs(uv.x) < 1e-4 ? 1e-4 : uv.x;
+        float step = wavenumber_step(uv), falloff = aside(uv);
+        float first = max(ceil((wavenumbers.x - 3.0 * deviation) / step), 1.0);
+        float last = min(floor((wavenumbers.y + 3.0 * deviation) / step), sqrt(FAR / max(falloff, 1e-8)));
+        for (float m = first; m <= last; ++m) {
+            vec3 mean = vec3(0.0);
+            for (int side = -1; side <= 1; side += 2) {
+                float k = m * step + float(side) * deviation;
+                find_row(2.0 * PI / k);
+                mean += efficiency_of(sign(uv.x) * m) * response(k, light);
+            }
+            sum += exp(-falloff * m * m) * mean;
+        }
+        return sum * (2.0 * PI * sqrt(PI) * sigma / r);
+    }
+    int count = int(ceil((wavenumbers.y - wavenumbers.x) / min(LARGEST_STEP, 1.5 * deviation)));
+    float delta = (wavenumbers.y - wavenumbers.x) / float(count);
+    for (int n = 0; n < count; ++n) {
+        float k = wavenumbers.x + (float(n) + 0.5) * delta;
+        sum += orders_at(uv, k) * response(k, light) / (k * k);
+    }
+    return sum * (4.0 * PI * PI * delta);
+}
+
+#endif
+#endif
+
+// f·cosθ times the light's irradiance.
+vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
+{
+    begin_orders(wi, rotation);
+    return wo.z * all_orders(in_patch(wi + wo, rotation), light);
+}
