@@ -25,6 +25,7 @@ from PIL import Image
 from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
+from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene.load import load_scene, set_variant
 from mitsuba_diffraction.scene.pictures import read_exr
 
@@ -34,7 +35,7 @@ from .pages import exit_code, write_jpeg
 #: Largest size of a picture, bytes.
 _MOST = 150_000
 #: Side of the blocks that are compared, pixels.
-_BLOCK = 5
+_BLOCK = 6
 #: ΔE2000 at the end of the colour bar.
 _END = 20.0
 
@@ -78,12 +79,12 @@ SCENES = (
         _RECIPE.format("lamellar") + "period = 1.6\ndepth = 0.12\npixels_per_period = 64\n",
         "material=Al,coat_ior=1.58", ("resx=450", "resy=330", "spp=128"),
         "Order 2, the green and violet fan behind the hole, is missing in the model, whose "
-        "grooves, half as wide as their period, have no even orders. Far from lamp and camera the "
-        "solved disc is grey where the model is blue.",
+        "grooves, half as wide as their period, have no even orders. In the light of the "
+        "surroundings the solved disc is grey, where the model is blue in front and behind.",
     ),
     Scene(
         "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
-        "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=128"),
+        "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=256"),
         "Order 1 has the same hues at the same places, for these follow from the grating equation. "
         "Its brightness differs.",
     ),
@@ -95,8 +96,9 @@ SCENES = (
     ),
 )  # fmt: skip
 _HOW = (
-    "ΔE2000 is that of blocks of {} pixels on the disc, grating or wall, with the noise of both "
-    "pictures in it. `python -m docs.make.figures.orders` makes pictures and table."
+    "ΔE2000 is that of blocks of {} pixels on the disc, grating or wall, as a display shows them, "
+    "with the noise of both pictures in it. `python -m docs.make.figures.orders` makes pictures "
+    "and table."
 )
 _HEADER = (
     "scene", "mean ΔE2000", "95th percentile", "processor time, solved / model",
@@ -105,7 +107,7 @@ _HEADER = (
 
 @dataclass(frozen=True)
 class Rendered:
-    """Linear sRGB (ny, nx, 3) of blocks of pixels, the file for a display, and the processor time, s."""
+    """Linear sRGB (ny, nx, 3) of blocks of pixels, file for a display, and processor time, s."""
 
     pixels: NDArray[np.float32]
     display: Path
@@ -120,9 +122,9 @@ def row(scene: Scene, output: Path, folder: Path, flags: Sequence[str]) -> tuple
     options = [word for flag in flags for word in ("-D", flag)]
     model = _render(scene, folder / "model.exr", [*options, "--material", material])
     solved = _render(scene, folder / "solved.exr", options)
-    difference = delta_e(solved.pixels, model.pixels)
+    difference = delta_e(natural(solved.pixels), natural(model.pixels), exposure=1.0, least=0.0)
     _show(model, solved, difference, output / f"{scene.name}.jpg")
-    changed = difference[np.isfinite(difference) & _is_on(scene, flags)]
+    changed = difference[_is_on(scene, flags)]
     return (
         scene.title,
         f"{changed.mean():.1f}",
