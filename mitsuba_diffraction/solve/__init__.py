@@ -12,6 +12,7 @@ integral    solver: boundary integral method
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
 nodes       choice of the numbers of nodes
+sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`
 """

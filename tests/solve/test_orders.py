@@ -20,7 +20,7 @@ pytest.importorskip("gratinglab")
 # two bands and a perfect conductor, which has no third variable: a second's work
 PROFILE = sinusoidal(0.5, 0.05)
 LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
-SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05)
+SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05, polarised=True)
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +30,7 @@ def table():
 
 def test_the_measured_error_is_within_the_tolerance(table):
     assert table.header["error_mean"] <= SETTINGS.tolerance
+    assert table.header["error_polarised"] <= SETTINGS.tolerance
     assert table.header["reciprocity_error"] <= SETTINGS.tolerance
 
 
