@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from mitsuba_diffraction.tables.orders import Band, OrderTable
 from tests.support.blender import blender
@@ -61,7 +62,10 @@ def test_order_follows_the_grating_equation(tmp_path):
     one = table_of(lambda n: np.eye(n, k=-1) if n > 1 else np.zeros((1, 1)))
     width, theta = 65.0, 40.0
     seen = plane_seen(
-        exported(one, tmp_path, coherence_width=width), [theta], sky="x", WorkingSpace="ACEScg"
+        exported(one, tmp_path, coherence_width=width),
+        [theta],
+        sky=(1.0, 0.0, 0.0, 1.0, 1),
+        WorkingSpace="ACEScg",
     )
     spectrum = drawn_spectrum()
     u = (np.arange(4000) + 0.5) / 4000
@@ -72,6 +76,19 @@ def test_order_follows_the_grating_equation(tmp_path):
     expected = 1.0 + 1e-3 * mean / PERIOD - np.sin(np.radians(theta))
     # four standard errors, of some 0.001 of the light; a wavelength of 3 nm
     assert np.all(np.abs(seen.mean[0] - expected) < 4 * seen.error[0] + 1e-3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_lobe_is_as_wide_as_the_window_has_it(tmp_path, axis):
+    """Second moments of a mirror's lobe: variance 1/(2σ²k²) of each direction cosine, at 50°."""
+    width, theta = 12.0, 50.0
+    centre = np.sin(np.radians(theta)) if axis == 0 else 0.0
+    squared = (1.0 - axis, axis, 0.0, centre, 2)  # the mirror direction is at −x
+    mirror = exported(OrderTable.mirror(PERIOD), tmp_path, coherence_width=width)
+    seen = plane_seen(mirror, [theta], sky=squared, samples=512)
+    variance = (1e-3 * np.array(RGB_WAVELENGTHS) / (0.5 * np.pi * width)) ** 2 / 2
+    # mean of λ² over a channel is up to 1 % above the square of its mean; and noise
+    assert seen.mean[0] == pytest.approx(variance, rel=0.04)
 
 
 @pytest.mark.parametrize("material", ["none", "dielectric"])
