@@ -20,6 +20,11 @@ _NEEDS = {
     "SurfaceTopography": _Need("instrument files need SurfaceTopography", "afm"),
     "distributed": _Need("workers need Dask", "cluster"),
     "flip_evaluator": _Need("FLIP needs flip-evaluator", "gl"),
+    "h5py": _Need(
+        "NetCDF files of version 4 need h5py",
+        "solve",
+        "write the classic format: format='NETCDF3_64BIT' in xarray, 'classic' in MATLAB",
+    ),
     "imageio_ffmpeg": _Need(
         "films ending in .mp4 need imageio-ffmpeg", "film", "name a film ending in .webp or .gif"
     ),

@@ -62,8 +62,8 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         raise DiffractionError(f"cannot read {str(file)!r}: {error.strerror}") from error
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """Return the content of a text file in UTF-8 of at most `LARGEST_TEXT` bytes.
+def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
+    """Return the content of a text file in UTF-8 of at most `largest` bytes.
 
     Raises
     ------
@@ -72,9 +72,9 @@ def read_text(path: str | os.PathLike[str]) -> str:
     """
     file = readable_file(path)
     size = file.stat().st_size
-    if size > LARGEST_TEXT:
+    if size > largest:
         raise DiffractionError(
-            f"{str(file)!r} is too large: {size} bytes, and a text may have {LARGEST_TEXT}; is it "
+            f"{str(file)!r} is too large: {size} bytes, and a text may have {largest}; is it "
             "the right file?"
         )
     try:

@@ -16,6 +16,7 @@ evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
+export_osl             a surface as a shader for Blender's Cycles
 options                options that several commands share, declared once, and their types
 scene_options          the scene, its parameters and materials; a mesh on a stage
 workers                options of commands that may run on many processes

@@ -37,6 +37,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
+    if args.material is not None and args.int_ior is not None:
+        args.parser.error("argument --int-ior: not allowed with argument --material")
     folder = args.output or Path(f"{args.source.stem}-osl")
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")

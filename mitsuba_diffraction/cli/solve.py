@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "wavelength_range", "tolerance", "solver",
-    "resolution", "jobs", "workers", "scheduler",
+    "depth", "duty", "direction", "material", "thin", "wavelength_range", "tolerance", "solver",
+    "resolution", "polarised", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -34,7 +34,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "solve", run, "solve the orders of a periodic profile rigorously",
         "Solve Maxwell's equations for a grating and write the efficiencies of its reflected "
-        "orders, for all directions and wavelengths, as a table of the BSDF diffraction_orders. "
+        "orders, and a thin sheet's transmitted ones, for all directions and wavelengths, as a "
+        "table of the BSDF diffraction_orders. "
         "Interrupted by Ctrl-C, the same command goes on.",
     )  # fmt: skip
     parser.add_argument(
@@ -62,6 +63,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="index of the clear medium above the grooves, e.g. 1.58 under polycarbonate; "
         "default: 1",
     )  # fmt: skip
+    group.add_argument(
+        "--thin", action="store_true", default=None,
+        help="a thin sheet that light goes through, with these grooves on its upper side; needs an "
+        "index as material",
+    )  # fmt: skip
     group = parser.add_argument_group("the table")
     group.add_argument("--wavelength-range", metavar="A,B", type=_pair, help="nm; default: 380,780")
     group.add_argument(
@@ -79,13 +85,13 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     group.add_argument(
         "--polarised", action="store_true", default=None,
-        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+        help="with Mueller matrices, for polarised variants; about 20 times as large",
     )  # fmt: skip
     group.add_argument(
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, of one angle of incidence or "
-        "more; needs --period",
+        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
+        "incidence or more; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
@@ -147,8 +153,12 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
+        if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
+            args.parser.error(
+                f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
+            )
         profile = profile_of(args.source, shape)
-        recipe = SolvedRecipe(profile, "Al", 1.0, Settings(), Path(f"{source.stem}.nc"))
+        recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
     changed = {
         field: value
         for field, value in (
@@ -162,6 +172,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         recipe,
         material=recipe.material if args.material is None else args.material,
         superstrate=recipe.superstrate if args.superstrate is None else args.superstrate,
+        thin=recipe.thin or bool(args.thin),
         settings=replace(recipe.settings, **changed),
         output=args.output or recipe.output,
     )
@@ -186,6 +197,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             recipe.profile,
             recipe.material,
             superstrate=recipe.superstrate,
+            thin=recipe.thin,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -219,6 +231,7 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
     facts: dict[str, Any] = dict(table.header)
     low, high = table.wavelengths
     medium = f" under index {table.superstrate:g}" if table.superstrate > 1 else ""
+    medium = ", thin sheet" if table.thin else medium
     yield "grating", f"{facts['profile']}, {facts['material']}{medium}, {low:g} to {high:g} nm"
     yield "solver", str(facts["solver"])
     if facts.get("solver_error") is not None:
@@ -236,6 +249,8 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         if table.polarised:
             yield "", f"{facts['error_polarised']:.2%} with its polarisation"
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
+    if "energy_error" in facts:
+        yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"
 
 
 def _pair(text: str) -> tuple[float, float]:

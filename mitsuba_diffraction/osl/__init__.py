@@ -2,8 +2,14 @@
 
 Contents
 --------
-export    write a shader with its textures, and a script that adds the material to a .blend file
-shaders/  sources in OSL
+export            write a shader with its textures and the script into a folder
+orders            texture and constants of a table of solved orders
+patch             textures and constants of a patch of heights
+spectrum          wavelengths that a shader draws, and their colours
+sockets           inputs of the shaders, with names and tooltips
+blender_material  script that runs in Blender and adds the material to a file
+
+Sources in OSL are in the folder shaders.
 """
 
 from __future__ import annotations

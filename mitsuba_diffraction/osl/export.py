@@ -19,9 +19,15 @@ from numpy.typing import NDArray
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.colour import RGB_WAVELENGTHS, WORKING_SPACES
-from ..tables.orders import OrderTable
 from .orders import interpolation_error, order_constants, order_texture
-from .sockets import Socket, array_parameter, common_sockets, window_socket
+from .patch import check_patch, mean_transmittance, patch_constants, patch_error, patch_textures
+from .sockets import (
+    Socket,
+    array_parameter,
+    common_sockets,
+    height_socket,
+    window_socket,
+)
 from .spectrum import NODES, drawn_spectrum
 
 #: Script that adds the material to a .blend file, copied into the folder.
@@ -77,7 +83,8 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
 
     Parameters
     ----------
-    bsdf : BSDF of the plugin `diffraction_orders`, from `mi.load_dict`.
+    bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`, without
+        coat, film or nested BSDF.
     folder : made if it is missing.
     name : of the shader and its files; letters, digits and underscores.
 
@@ -131,26 +138,79 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
 
 def _shader(bsdf: Any) -> Shader:
     """Return the shader of a BSDF, or refuse it."""
-    table = getattr(bsdf, "table", None)
-    if isinstance(table, OrderTable):
-        return _orders(bsdf, table)
-    raise DiffractionError(
-        f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction_orders', for "
-        "instance mi.load_dict(md.bsdf_dict(table))"
+    from ..plugin.bsdf import Diffraction  # which only a variant has
+    from ..plugin.orders.bsdf import DiffractionOrders
+
+    if not isinstance(bsdf, DiffractionOrders | Diffraction):
+        raise DiffractionError(
+            f"bsdf={type(bsdf).__name__} cannot be shown in OSL: give a BSDF of type 'diffraction' "
+            "or 'diffraction_orders', for instance mi.load_dict(md.bsdf_dict(...))"
+        )
+    if bsdf.nested is not None:
+        raise DiffractionError(
+            "a BSDF beneath the surface is not exported: leave it out, and set the colour as "
+            "Pigment in Blender"
+        )
+    turn = getattr(bsdf.orientation, "degrees", None)
+    if turn is None:
+        raise DiffractionError(
+            "orientation is a texture, which OSL does not read: export a number, and link a "
+            "texture to Rotation or Tangent in Blender"
+        )
+    common = common_sockets(float(turn[0]))
+    return _orders(bsdf, common) if isinstance(bsdf, DiffractionOrders) else _patch(bsdf, common)
+
+
+def _orders(bsdf: Any, common: Sequence[Socket]) -> Shader:
+    if bsdf.table.thin:
+        raise DiffractionError(
+            "the table is of a thin sheet, which lets light through, and OSL shows reflection "
+            "alone: export a table of the reflecting side, or render it with Mitsuba"
+        )
+    texture = order_texture(bsdf.table)
+    error = interpolation_error(bsdf.table, texture)
+    return Shader(
+        "orders.osl",
+        order_constants(bsdf.table, texture),
+        [array_parameter("int", "Starts", texture.starts)],
+        [window_socket(bsdf.coherence_width), *common],
+        {"OrdersFile": texture.pixels},
+        str(bsdf.table),
+        {"mean": error.mean, "largest of 99.9 %": error.worst},
     )
 
 
-def _orders(bsdf: Any, table: OrderTable) -> Shader:
-    texture = order_texture(table)
-    error = interpolation_error(table, texture)
+def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
+    from ..plugin.energy import indices_of
+
+    check_patch(bsdf)
+    table = bsdf.table
+    textures = patch_textures(table)
+    index = indices_of(bsdf.fresnel, drawn_spectrum().wavelengths)
+    parts = np.full(NODES, 1.5 + 0j) if index is None else index
+    arrays = {
+        "Eta": np.real(parts),
+        "Absorption": np.imag(parts),
+        "Roughness": table.roughness.nodes,
+        "Order0": textures.order_0,
+    }
+    stretch = bsdf.lateral_scale.range_over_table()[0]
+    constants = patch_constants(table, textures, stretch)
+    constants["PERFECT"] = int(index is None)
+    constants["SMALL_SLOPE"] = int(str(bsdf.boundary) == "small_slope")
+    constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
-        "orders.osl",
-        order_constants(table, texture),
-        [array_parameter("int", "Starts", texture.starts)],
-        [window_socket(bsdf.coherence_width), *common_sockets(float(bsdf.orientation.degrees[0]))],
-        {"OrdersFile": texture.pixels},
-        str(table),
-        {"mean": error.mean, "largest of 99.9 %": error.worst},
+        "patch.osl",
+        constants,
+        [array_parameter("float", name, values) for name, values in arrays.items()],
+        [
+            window_socket(table.coherence_width),
+            height_socket(bsdf.height_scale[0], table.height_scale_max),
+            *common,
+        ],
+        {"PowersFile": textures.powers, "DrawsFile": textures.draws},
+        f"patch of {bsdf.table.source.get('name', 'heights')}, {bsdf.fresnel}",
+        patch_error(table, textures),
     )
 
 

@@ -18,7 +18,7 @@ _CELLS, _UNDER_LAYER = Counts(16, 12, 6), Counts(12, 8, 10)
 _MOST_PIXELS = 4 << 20
 #: Closures of a sample: Cycles has at most 64, and the mirror and the pigment take four.
 _CLOSURES = 58
-_MOST_SAMPLES = 5
+_MOST_SAMPLES = 4
 #: Transmittance of the layer's face below which light counts as trapped.
 _TRAPPED = 2e-3
 

@@ -86,6 +86,14 @@ def window_socket(coherence_width: float) -> Socket:
     )  # fmt: skip
 
 
+def height_socket(scale: float, most: float) -> Socket:
+    """Return the socket of the factor on the heights."""
+    return Socket(
+        "HeightScale", "Height Scale", "float", scale,
+        f"Factor on the heights, 0 to {most:g}: the table has no deeper surface",
+    )  # fmt: skip
+
+
 def common_sockets(orientation: float) -> list[Socket]:
     """Return the sockets that all shaders have.
 

@@ -35,7 +35,7 @@ class CoatedPair(Pair):
 
     def __init__(self, outer: Pair, n: Float) -> None:
         self._outer, self.n = outer, n
-        self.wi, self.wo = _refracted(outer.wi, n), _refracted(outer.wo, n)
+        self.wi, self.wo = refracted(outer.wi, n), refracted(outer.wo, n)
         self.frame, self.uv = outer.frame, outer.uv
         self.cos_i, self.cos_o = self.wi.z, self.wo.z
         self.w = n * (self.cos_i + self.cos_o)
@@ -94,7 +94,8 @@ def bounced(face: tuple[Float, Float], structure: tuple[Float, Float]) -> Float:
     return dr.rcp(dr.maximum(left, dr.maximum(*structure) * (1.0 - dr.minimum(*face))))
 
 
-def _refracted(direction: Vector3f, n: Float) -> Vector3f:
+def refracted(direction: Vector3f, n: Float) -> Vector3f:
+    """Return a direction that points away from the surface, within a coat of index n."""
     x, y = direction.x / n, direction.y / n
     # Grazing light would come to lie in the face where the coat is none
     return mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - dr.fma(x, x, y * y), 1e-12)))

@@ -3,7 +3,8 @@
 Contents
 --------
 orders      `solve_orders`: from a profile and a material to a table
-measured    `read_orders`: from a file of efficiencies, solved or measured elsewhere
+measured    `read_orders`: from efficiencies that were solved or measured elsewhere
+efficiencies  files of efficiencies, CSV and NetCDF, and their conventions
 profiles    one period of the grooves as a polygon; generators and a reader
 materials   refractive index over wavelength, by name or number
 stations    sets of directions with one system matrix
@@ -11,6 +12,7 @@ integral    solver: boundary integral method
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
 nodes       choice of the numbers of nodes
+sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`
 """

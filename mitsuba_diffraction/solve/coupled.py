@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import toeplitz
+from scipy.linalg import block_diag, toeplitz
 
 from ..errors import DiffractionError
 from .profiles import Profile
-from .stations import Real, Station
+from .stations import LEAST_NORMAL, Real, Station
 
 Complex = NDArray[Any]
 
@@ -47,7 +47,7 @@ class CoupledWaves:
         levels = np.unique(profile.z)
         edges = levels if _has_walls(profile) else np.linspace(levels[0], levels[-1], harmonics + 1)
         edges = edges[::-1]
-        self._top = float(edges[0])
+        self._top, self._bottom = float(edges[0]), float(edges[-1])
         #: Layers from the top: thickness in µm, and ends (n, 2) of the intervals of material.
         self.layers = [
             (float(above - below), _intervals(profile, float(0.5 * (above + below))))
@@ -72,28 +72,32 @@ class CoupledWaves:
     def _solve(self, station: Station, wavelength: float, index: complex, y: float) -> Complex:
         """Return the amplitudes at one wavelength.
 
-        The reflection matrix R of tangential E is carried up from the material: with modes W, V of
-        a layer above an interface and those below it, A = W⁻¹W'(1 + R'), B = V⁻¹V'(1 − R'),
-        R = (A − B)(A + B)⁻¹; through a layer of thickness h, R becomes X R X with X = exp(iqh).
+        The scattering matrix of tangential E is carried up from the material (`_across`); through a
+        layer of thickness h, R becomes X R X, U becomes X U, and D becomes D X, with X = exp(iqh).
         """
         first = station.channels // 2 - self.harmonics
         numbers = np.arange(first, first + 2 * self.harmonics + 1)
-        x = np.sqrt(1.0 - y**2) * (1.0 - 2.0 * (numbers + station.fraction) / station.extent)
+        x = np.sqrt(1.0 - y**2) * station.sines_of(numbers)
         epsilon = index**2
         below = _uniform(x, y, epsilon)
-        reflection = np.zeros((2 * len(x), 2 * len(x)), complex)
+        total = _material(len(x), station.inside - first)
         for thickness, filled in reversed(self.layers):
             above = _layer(x, y, epsilon, filled / self.period)
-            reflection = _across(above, below, reflection)
-            through = np.exp(2j * np.pi * thickness / wavelength * above.q)
-            reflection = through[:, None] * reflection * through
+            total = _across(above, below, total)
+            through = np.exp(2j * np.pi * thickness / wavelength * above.q)[:, None]
+            total = _Scattering(
+                through * total.back * through.T, through * total.up, total.down * through.T,
+                total.inner,
+            )  # fmt: skip
             below = above
-        reflection = _across(_uniform(x, y, 1.0), below, reflection)
-        places = np.arange(station.channels) - first
-        # from the top of the profile to z = 0
-        height = np.sqrt(1.0 - y**2 - x[places] ** 2) * self._top / wavelength
-        phase = np.exp(-2j * np.pi * height)[:, None]
-        return phase[..., None, None] * _amplitudes(reflection, x, y, places) * phase
+        total = _across(_uniform(x, y, 1.0), below, total)
+        sides = (
+            _Side(x[np.arange(station.channels) - first], y, 1.0, -self._top / wavelength),
+            # a metal, whose index is complex, has no channels
+            _Side(x[station.inside - first], y, abs(index), self._bottom / wavelength),
+        )
+        rows = np.arange(station.channels) - first
+        return _amplitudes(total, np.concatenate([rows, len(x) + rows]), sides)
 
 
 class _Modes(NamedTuple):
@@ -102,6 +106,23 @@ class _Modes(NamedTuple):
     q: Complex  # (2n,)
     electric: Complex  # W (2n, 2n): Ex, then Ey
     magnetic: Complex  # V
+
+
+class _Scattering(NamedTuple):
+    """Scattering of all that lies below, between the modes of a layer and waves in the material.
+
+    Attributes
+    ----------
+    back : R (2n, 2n), from downward modes to upward ones.
+    up : U (2n, m), from upward waves in the material, the tangential E of its ports, to modes.
+    down : D (m, 2n), from downward modes to downward waves in the material.
+    inner : (m, m), from upward waves in the material to downward ones.
+    """
+
+    back: Complex
+    up: Complex
+    down: Complex
+    inner: Complex
 
 
 def _uniform(x: Real, y: float, epsilon: complex) -> _Modes:
@@ -140,34 +161,97 @@ def _products(x: Real, y: float, along: Complex, across: Complex) -> tuple[Compl
     return p, q
 
 
-def _across(above: _Modes, below: _Modes, reflection: Complex) -> Complex:
-    """Return the reflection matrix above an interface from that below it."""
-    one = np.eye(len(reflection))
-    a = np.linalg.solve(above.electric, below.electric @ (one + reflection))
-    b = np.linalg.solve(above.magnetic, below.magnetic @ (one - reflection))
-    return np.asarray(np.linalg.solve((a + b).T, (a - b).T).T)
+def _material(size: int, inside: NDArray[np.int64]) -> _Scattering:
+    """Return the scattering of the material alone, with ports at some of its harmonics."""
+    ports = np.eye(2 * size, dtype=complex)[np.concatenate([inside, size + inside])]
+    nothing = np.zeros((2 * size, 2 * size), complex)
+    return _Scattering(nothing, ports.T, ports, np.zeros((len(ports), len(ports)), complex))
 
 
-def _amplitudes(reflection: Complex, x: Real, y: float, places: NDArray[np.int64]) -> Complex:
-    """Return amplitudes (j, 2, q, 2) between waves that propagate, from R of tangential E.
+def _across(above: _Modes, below: _Modes, lower: _Scattering) -> _Scattering:
+    """Return the scattering above an interface from that below it.
 
-    With c² = 1 − y², a wave whose E lies along the grooves has E = (−xy, c², …)/c, and one whose B
-    does (±z, 0, −x)/c, with the upper sign for light that goes down.
+    With A = W⁻¹W' and B = V⁻¹V' and light e from within the material, modes above and below are
+    c⁺ = M d⁺ + ½(A − B) U e and c⁻ = N d⁺ + ½(A + B) U e, of 2M = A(1 + R) + B(1 − R) and
+    2N = A(1 + R) − B(1 − R).
     """
-    n, c = len(x), np.sqrt(1.0 - y * y)
-    sines, count = x[places], len(places)
-    z = np.sqrt(c * c - sines**2)
-    incident = np.zeros((2 * n, 2, count), complex)
-    channels = np.arange(count)
-    incident[places, 0, channels] = -sines * y / c
-    incident[n + places, 0, channels] = c
-    incident[places, 1, channels] = z / c
-    fields = np.tensordot(reflection, incident, 1)
-    e = fields[n + places] / c
-    b = -(fields[places] * c + e * (sines * y)[:, None, None]) / z[:, None, None]
-    flux = np.sqrt(z[:, None, None, None])
-    fields = flux * np.stack([e, b], axis=-1)
-    return np.asarray(fields.transpose(2, 1, 0, 3) / flux)
+    n, one = len(lower.back), np.eye(len(lower.back))
+    a = np.linalg.solve(above.electric, below.electric @ np.hstack([one + lower.back, lower.up]))
+    b = np.linalg.solve(above.magnetic, below.magnetic @ np.hstack([one - lower.back, lower.up]))
+    total, difference = a + b, a - b
+    sent, kept = 0.5 * difference[:, n:], 0.5 * total[:, n:]
+    rows = np.vstack([difference[:, :n], 2.0 * lower.down])
+    rows = np.linalg.solve(total[:, :n].T, rows.T).T
+    back, down = rows[:n], rows[n:]
+    return _Scattering(back, kept - back @ sent, down, lower.inner - down @ sent)
+
+
+def _amplitudes(total: _Scattering, rows: NDArray[np.int64], sides: tuple[_Side, _Side]) -> Complex:
+    """Return amplitudes (ports, 2, ports, 2) from the scattering of tangential E; see `Solver`.
+
+    rows : of both components of E of the channels above.
+    """
+    matrix = np.block(
+        [[total.back[rows][:, rows], total.up[rows]], [total.down[:, rows], total.inner]]
+    )
+    above, below = sides
+    came = block_diag(above.fields(1.0), below.fields(-1.0))
+    left = block_diag(above.fields(-1.0), below.fields(1.0))
+    matrix = np.linalg.solve(left, matrix @ came)
+    # E and B of the channels above, E and B of those below, to (ports, 2)
+    n, m = len(above.x), len(below.x)
+    order = np.arange(2 * n).reshape(2, n), 2 * n + np.arange(2 * m).reshape(2, m)
+    ports = np.concatenate(order, axis=1).T
+    phase = np.concatenate([side.phase for side in sides])
+    result = matrix.T[ports[:, :, None, None], ports] * phase[:, None, None, None]
+    return np.asarray(result * phase[:, None])
+
+
+class _Side(NamedTuple):
+    """Channels on a side of the profile.
+
+    Attributes
+    ----------
+    x, y : tangential parts of the wave vectors; x of each channel.
+    index : of the medium.
+    height : path over the wavelength from the end of the profile to z = 0, along the normal.
+    """
+
+    x: Real
+    y: float
+    index: float
+    height: float
+
+    @property
+    def z(self) -> Real:
+        """Normal parts of the wave vectors; 1 where none propagates."""
+        return np.asarray(np.sqrt(np.where(self._lit, self._square, 1.0)))
+
+    @property
+    def phase(self) -> Complex:
+        """Factors that move amplitudes from the end of the profile; 0 where none propagates."""
+        return np.asarray(self._lit * np.exp(2j * np.pi * self.height * self.z))
+
+    def fields(self, down: float) -> Real:
+        """Return the tangential E (2n, 2n) of waves of unit power, down = 1 or up = −1.
+
+        With k² = n² − y² a wave of unit |E| whose E lies along the grooves has the tangential E
+        (−xy, k²)/(n k), and one whose B does has (±z, 0)/k. The power is z.
+        """
+        k, z = np.sqrt(self.index**2 - self.y**2), self.z
+        rows = (
+            (-self.x * self.y / (self.index * k), down * z / k),
+            (np.full(len(z), k / self.index), np.zeros(len(z))),
+        )
+        return np.block([[np.diag(part / np.sqrt(z)) for part in row] for row in rows])
+
+    @property
+    def _square(self) -> Real:
+        return np.asarray(self.index**2 - self.y**2 - self.x**2)
+
+    @property
+    def _lit(self) -> NDArray[np.bool_]:
+        return np.asarray(self._square > (LEAST_NORMAL * self.index) ** 2)
 
 
 def _toeplitz(n: int, outside: complex, inside: complex, filled: Real) -> Complex:

@@ -15,6 +15,11 @@ the material,
 
 with c_E = n²k⁺²/k⁻², c_B = k⁺²/k⁻², s = cosγ (1 − k⁺²/k⁻²), k⁺ = k sinγ, k⁻ = k√(n² − cos²γ), and
 cosγ the direction cosine of the light along the grooves.
+
+Light that comes from within the material, with E and B of its plane wave on the boundary, has
+instead the right-hand sides, from the same boundary relation,
+
+    −(½ + K⁺) E + c_E V⁺ ∂ₙE + s V⁺ ∂ₜB,    −(½ + K⁺) B + c_B V⁺ ∂ₙB − s V⁺ ∂ₜE
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from scipy.linalg import solve as solve_linear
 
 from ..errors import DiffractionError
 from .profiles import Profile
-from .stations import Complex, Station
+from .stations import LEAST_NORMAL, Complex, Real, Station
 
 #: Order of the mesh graded towards corners, which gratinglab recommends (Kress 1990).
 GRADING = 4
@@ -128,18 +133,34 @@ class IntegralSolver:
         first, second = k_above @ trace, v_above @ normal
         cross = s * (v_above @ tangential)
         system = np.block([[first - c_e * second, -cross], [cross, first - c_b * second]])
-        n, channels = self.points, len(waves.alpha)
-        right = np.zeros((2 * n, 2 * channels), complex)
-        right[:n, :channels] = right[n:, channels:] = waves.incident.T
+        inner = _InnerWaves(self._boundary, waves, k_below, self.period)
+        n, ports = self.points, len(waves.alpha) + len(inner.alpha)
+        # columns: E, then B, of all ports; rows: the equations of E, then of B
+        came = np.hstack([waves.incident.T, np.zeros((n, len(inner.alpha)))])
+        within, across, aside = (
+            np.hstack([np.zeros((n, len(waves.alpha))), part])
+            for part in (inner.trace, inner.normal, inner.tangential)
+        )
+        left, back, turned = k_above @ within, v_above @ across, s * (v_above @ aside)
+        right = np.block([[came - left + c_e * back, turned], [-turned, came - left + c_b * back]])
         densities = solve_linear(system, right, overwrite_a=True, overwrite_b=True)
         w, tau = densities[:n], densities[n:]
-        e_normal = c_e * (normal @ w) + s * (tangential @ tau)
-        b_normal = c_b * (normal @ tau) - s * (tangential @ w)
-        e = waves.reflected(e_normal, trace @ w)
-        b = waves.reflected(b_normal, trace @ tau)
-        # (out, 2, channels in) to (in, 2, out, 2)
-        fields = np.stack([e, b]).reshape(2, channels, 2, channels)
-        return waves.flux[:, None, :, None] * fields.transpose(3, 2, 1, 0)
+        none = np.zeros_like(within)
+        e, b = trace @ w + np.hstack([within, none]), trace @ tau + np.hstack([none, within])
+        e_across = normal @ w + np.hstack([across, none])
+        b_across = normal @ tau + np.hstack([none, across])
+        e_aside = tangential @ w + np.hstack([aside, none])
+        b_aside = tangential @ tau + np.hstack([none, aside])
+        up = (
+            waves.reflected(c_e * e_across + s * b_aside, e),
+            waves.reflected(c_b * b_across - s * e_aside, b),
+        )
+        # (2, out, 2, in) to (in, 2, out, 2)
+        fields = np.concatenate([up, (inner.transmitted(w), inner.transmitted(tau))], axis=1)
+        fields = fields.reshape(2, ports, 2, ports).transpose(3, 2, 1, 0)
+        roots = np.sqrt(np.concatenate([np.tile(waves.gamma, (2, 1)).T, inner.power(c_e, c_b)]))
+        lit = roots > 0
+        return np.asarray(fields * roots / np.where(lit, roots, np.inf)[:, :, None, None])
 
     def _perfect(self, waves: _Waves) -> Complex:
         """A perfect conductor: E vanishes on it, and so does the normal derivative of B."""
@@ -173,7 +194,9 @@ class _Waves:
     def __init__(self, boundary: Any, station: Station, period: float) -> None:
         self.k = np.pi * station.extent / period
         self.alpha = self.k * station.sines
-        gamma = np.sqrt(self.k**2 - self.alpha**2)
+        self.gamma = gamma = np.sqrt(self.k**2 - self.alpha**2)
+        #: α of the channels within the material.
+        self.inside = self.k * station.sines_of(station.inside)
         #: Bloch wavenumber of the kernels, which cancel least where it is small.
         self.reference = float(self.alpha[np.argmin(np.abs(self.alpha))])
         self.incident = np.exp(
@@ -190,3 +213,37 @@ class _Waves:
     def reflected(self, normal: Complex, trace: Complex) -> Complex:
         """Amplitudes (channels, n) of fields with this normal derivative and trace, (points, n)."""
         return np.asarray(self._single @ normal + self._double @ trace)
+
+
+class _InnerWaves:
+    """Plane waves within the material, on the boundary; channels are columns.
+
+    Attributes
+    ----------
+    trace, normal, tangential : waves that come up from within, and their derivatives along the
+        normal n and the tangent (n_y, −n_x).
+    """
+
+    def __init__(self, boundary: Any, waves: _Waves, k: complex, period: float) -> None:
+        self.alpha = waves.inside
+        square = k.real**2 - self.alpha**2
+        self._lit = square > (LEAST_NORMAL * k.real) ** 2
+        self._gamma = gamma = np.sqrt(np.where(self._lit, square, k.real**2))
+        x, y, nx, ny = (v[:, None] for v in (boundary.x, boundary.y, boundary.nx, boundary.ny))
+        self.trace = np.exp(1j * (self.alpha * x + gamma * y))
+        self.normal = 1j * (self.alpha * nx + gamma * ny) * self.trace
+        self.tangential = 1j * (self.alpha * ny - gamma * nx) * self.trace
+        down = np.exp(-1j * (self.alpha * x - gamma * y)) * boundary.quadrature[:, None]
+        self._down = (down / (2j * period * gamma)).T
+
+    def transmitted(self, density: Complex) -> Complex:
+        """Return the amplitudes (channels, n) of the single layers' waves in the material."""
+        return np.asarray(self._down @ density)
+
+    def power(self, c_e: complex, c_b: complex) -> Real:
+        """Return the power of unit E and of unit B, (channels, 2); 0 where none propagates.
+
+        Outside of the material the power is the normal part γ of the wave vector.
+        """
+        gamma = np.where(self._lit, self._gamma, 0.0)
+        return np.stack([gamma * c_e.real, gamma * c_b.real], axis=-1)

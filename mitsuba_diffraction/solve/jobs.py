@@ -26,6 +26,7 @@ from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
 from .profiles import Profile
+from .sheet import sheet_efficiencies
 from .stations import Complex, Grating, Real, Solver
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
@@ -58,7 +59,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
     content = hashlib.sha256(
-        repr(("amplitudes", method, grating.superstrate, grating.wavelengths)).encode()
+        repr(
+            ("amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin)
+        ).encode()
     )
     profile, material = grating.profile, grating.material
     content.update(repr(profile.period).encode())
@@ -76,7 +79,8 @@ def solver_of(problem: Problem) -> Solver:
 class Solved(NamedTuple):
     """Amplitudes of a place, and the processor seconds that they took.
 
-    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision.
+    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. Those of a sheet, whose
+        light has no phase, are roots of its efficiencies.
     """
 
     values: Complex
@@ -93,7 +97,10 @@ def solve_place(problem: Problem, place: Place) -> Solved:
     start, grating = time.thread_time(), problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
     station = grating.station(place.band, place.kind, place.tau, place.rho, w)
-    values = solver.amplitudes(station).astype(np.complex64).astype(np.complex128)
+    values = solver.amplitudes(station)
+    if grating.thin:
+        values = np.sqrt(sheet_efficiencies(values, station))
+    values = values.astype(np.complex64).astype(np.complex128)
     return Solved(values, time.thread_time() - start)
 
 

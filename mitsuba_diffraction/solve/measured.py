@@ -1,24 +1,11 @@
-"""`read_orders`: a table of orders from efficiencies of another solver, or of a bench.
-
-The file is a long CSV with a header line and the columns
-
-    wavelength_nm, theta_deg, phi_deg, order, R_s, R_p
-
-one line for each propagating order of each light. The light comes from ωi = (sinθ cosφ, sinθ sinφ,
-cosθ), with x along the grating vector and y along the grooves, θ and φ within the superstrate, and
-order m leaves with x = mλ/d − sinθ cosφ. Wavelengths (in vacuum), θ and φ form a regular grid, and
-mirrored φ (φ and −φ) need not be listed. θ below 0 is light from the other side: φ + 180°. R_s and
-R_p are shares of the incident light, for light of s and of p polarisation.
-"""
+"""`read_orders`: a table of orders from efficiencies of another solver, or of a bench."""
 
 from __future__ import annotations
 
 import contextlib
-import csv
-import math
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,45 +13,67 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import QhullError
 
 from ..errors import DiffractionError, warn
-from ..files import read_text
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.table import LARGEST_SUM, Counts, check_outline
+from .efficiencies import ROUNDING, Efficiencies, read_efficiencies
 from .stations import Real
 
-COLUMNS = ("wavelength_nm", "theta_deg", "phi_deg", "order", "R_s", "R_p")
 #: Nodes of the table, to which samples are interpolated linearly.
 COUNTS = Counts(12, 8, 4)
 #: Distance from grazing, in p, within which rounding decides whether an order propagates.
 _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
 _DIGITS = 9
+#: Share of the light that reversed light has elsewhere, above which a file hardly holds powers:
+#: samples 10° apart have 0.02, efficiencies without the ratio of cosines 0.27.
+_ONE_WAY = 0.1
 
 
 class _Samples(NamedTuple):
-    """Light of the file in the coordinates of `cells`, (n,) each; efficiencies by order.
+    """Light of the file, (n,) each, in the coordinates of `cells`.
 
+    Attributes
+    ----------
+    x, y, wavelength : direction cosines of the mirror direction, and nm in vacuum.
+    cell, w : its coordinates.
     s : x/c, which one direction has at all wavelengths.
+    orders : (m,) whole numbers.
+    powers : (n, m, 2), or (n, m, 4) of a sheet; 0 where an order does not propagate.
     """
 
+    x: Real
+    y: Real
+    wavelength: Real
     cell: cells.Cell
     w: Real
     s: Real
-    powers: list[dict[int, tuple[float, float]]]
+    orders: NDArray[np.int64]
+    powers: Real
+
+    def of_order(self, order: int) -> Real:
+        """Return the efficiencies of an order, (n, 2) or (n, 4); 0 if no light has it."""
+        place = np.searchsorted(self.orders, order)
+        if place == len(self.orders) or self.orders[place] != order:
+            return np.zeros((len(self.x), self.powers.shape[-1]))
+        return self.powers[:, place]
 
 
 def read_orders(
     path: str | os.PathLike[str], period: float, *, superstrate: float = 1.0
 ) -> OrderTable:
-    """Return the table of orders of a file of efficiencies; see the module for its columns.
+    """Return the table of orders of a file of efficiencies; see `solve.efficiencies`.
 
     Where the file has light in the plane across the grooves alone (φ = 0), conical light gets the
     efficiencies of the in-plane light with the same orders. That is exact for perfect conductors.
     Directions that the file lacks, all but one perhaps, get the efficiencies of the nearest
     direction in it, order by order. A warning says either.
 
+    With T_s and T_p the table is that of a thin sheet. What it transmits from below follows from
+    reciprocity; it reflects light from below as light from above, at most what is left.
+
     Parameters
     ----------
-    path : CSV file.
+    path : long CSV, or NetCDF.
     period : µm.
     superstrate : index of the medium above, to which θ and φ belong.
 
@@ -72,25 +81,18 @@ def read_orders(
     ------
     DiffractionError
         If the file cannot be read, or its grid has holes; if it has orders that do not propagate,
-        or efficiencies that are negative or sum to above 1.001.
+        lacks one that does, or has efficiencies that are negative or sum to above 1.001.
     """
-    shown = f"'{os.fspath(path)}'"
-    lights = _lights(path, shown)
-    axes = [sorted(set(values)) for values in zip(*lights, strict=True)]
-    if len(lights) < math.prod(map(len, axes)):
-        hole = next(
-            (a, b, c) for a in axes[0] for b in axes[1] for c in axes[2] if (a, b, c) not in lights
-        )
-        raise DiffractionError(
-            f"{shown} has a hole: no line for {hole[0]:g} nm, theta {hole[1]:g}°, phi "
-            f"{hole[2]:g}°; wavelengths and angles must form a regular grid"
-        )
-    wavelengths = (axes[0][0], axes[0][-1])
-    check_outline(period, wavelengths, superstrate)
-    samples = _samples(lights, wavelengths, superstrate * period, shown)
-    in_plane = all(math.isclose(math.sin(math.radians(phi)), 0, abs_tol=1e-9) for phi in axes[2])
+    shown = repr(os.fspath(path))
+    grid = read_efficiencies(path)
+    wavelengths = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
+    thin = grid.values.shape[-1] == 4
+    check_outline(period, wavelengths, superstrate, thin)
+    samples = _samples(grid, superstrate * period, shown)
+    in_plane = bool((np.abs(np.sin(np.radians(grid.phi))) < 1e-9).all())
     last = cells.largest_band(wavelengths, superstrate * period)
-    if _lacks_directions(samples, last):
+    incomplete = _lacks_directions(samples, last)
+    if incomplete:
         warn(
             f"{shown} has no light from some directions, which get the efficiencies of the nearest "
             "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
@@ -100,82 +102,107 @@ def read_orders(
             f"{shown} has light across the grooves only (phi = 0): other light gets the same "
             "efficiencies, which is exact for perfect conductors alone"
         )
-    counts = Counts(*COUNTS[:2], 1 if in_plane or len(axes[0]) == 1 else COUNTS.w)
+    counts = Counts(*COUNTS[:2], 1 if in_plane or len(grid.wavelengths) == 1 else COUNTS.w)
     bands = tuple(_band(k, counts, samples) for k in range(last + 1))
-    header = {"solver": f"imported from {Path(path).name}", "material": "unknown",
-              "profile": "unknown"}  # fmt: skip
-    return OrderTable(period, wavelengths, bands, superstrate, header)
-
-
-def _lights(
-    path: str | os.PathLike[str], shown: str
-) -> dict[tuple[float, float, float], dict[int, tuple[float, float]]]:
-    """Return R_s and R_p by order, of each (wavelength, θ, φ)."""
-    reader = csv.reader(read_text(path).splitlines())
-    names = [name.strip() for name in next(reader, [])]
-    if missing := [name for name in COLUMNS if name not in names]:
-        raise DiffractionError(
-            f"{shown} has no column {missing[0]}; the first line must name {', '.join(COLUMNS)}"
+    header: dict[str, Any] = {
+        "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
+    }  # fmt: skip
+    table = OrderTable(period, wavelengths, bands, superstrate, header, thin)
+    header |= _errors(table, samples)
+    if not incomplete and header["reciprocity_error"] > _ONE_WAY:
+        warn(
+            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
+            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
+            "of cosines; check that, and the signs of the orders and of phi"
         )
-    places = [names.index(name) for name in COLUMNS]
-    lights: dict[tuple[float, float, float], dict[int, tuple[float, float]]] = {}
-    for number, row in enumerate(reader, 2):
-        if not row:
-            continue
-        try:
-            lam, theta, phi, order, r_s, r_p = (float(row[place]) for place in places)
-        except (ValueError, IndexError) as error:
-            raise DiffractionError(
-                f"{shown}, line {number}: expected numbers in {', '.join(COLUMNS)}"
-            ) from error
-        if not (abs(theta) < 90 and lam > 0 and order == round(order) and abs(phi) <= 360):
-            raise DiffractionError(
-                f"{shown}, line {number}: expected wavelength above 0, theta between -90 and 90, "
-                f"phi from -360 to 360 and a whole order, got {lam:g}, {theta:g}, {phi:g}, "
-                f"{order:g}"
-            )
-        if not (0 <= r_s <= LARGEST_SUM and 0 <= r_p <= LARGEST_SUM):
-            raise DiffractionError(
-                f"{shown}, line {number}: efficiencies must be 0 to 1, got {r_s:g}, {r_p:g}"
-            )
-        powers = lights.setdefault((lam, theta, phi), {})
-        if int(order) in powers:
-            raise DiffractionError(f"{shown}, line {number}: order {order:g} is listed twice")
-        powers[int(order)] = (r_s, r_p)
-    if not lights:
-        raise DiffractionError(f"{shown} has no lines of efficiencies")
-    return lights
+    return table
 
 
-def _samples(
-    lights: dict[tuple[float, float, float], dict[int, tuple[float, float]]],
-    wavelengths: tuple[float, float],
-    optical_period: float,
-    shown: str,
-) -> _Samples:
+def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
     """Return all light in the coordinates of the table; check that its orders propagate."""
-    lam, theta, phi = np.array(list(lights)).T
+    axes = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
+    lam, theta, phi = (axis.ravel() for axis in axes)
     sine = np.sin(np.radians(theta))
     x, y = -sine * np.cos(np.radians(phi)), sine * np.sin(np.radians(phi))
+    values = grid.values.reshape(len(lam), len(grid.orders), -1)
+    # order m lies at p − m, which 0 to K hold
+    step, room = lam / (1e3 * optical_period), np.sqrt(1.0 - y**2)
+    highest, lowest = ((end - x) / step for end in (room, -room))
+    known = ~np.isnan(values).any(axis=-1)
+    lit = np.nan_to_num(values).max(axis=-1) > ROUNDING
+    for n in np.flatnonzero((lit & ~_between(grid.orders, lowest, highest, _EDGE)).any(axis=1)):
+        order = grid.orders[lit[n] & ~_between(grid.orders, lowest, highest, _EDGE)[n]][0]
+        raise DiffractionError(
+            f"{shown}, {grid.light(n)}: order {order} does not propagate; check the period, "
+            "and the signs of the orders and of theta"
+        )
+    propagating = np.floor(highest - _EDGE) - np.ceil(lowest + _EDGE) + 1
+    known &= _between(grid.orders, lowest, highest, -_EDGE)
+    for n in np.flatnonzero(known.sum(axis=1) < propagating):
+        listed = set(grid.orders[known[n]].tolist())
+        first = int(np.ceil(lowest[n] + _EDGE))
+        order = next(m for m in range(first, first + len(listed) + 1) if m not in listed)
+        raise DiffractionError(
+            f"{shown}, {grid.light(n)}: order {order} propagates, and has no efficiencies; list "
+            "it, with 0 if it has no light"
+        )
+    powers = np.maximum(np.nan_to_num(values), 0.0)
+    total = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2))
+    if total.max() > LARGEST_SUM:
+        n = int(total.max(axis=1).argmax())
+        raise DiffractionError(
+            f"{shown}, {grid.light(n)}: the orders sum to {total[n].max():.4g}, above {LARGEST_SUM}"
+        )
     cell = cells.to_cell(x, y, lam, optical_period)
-    w = cells.w_of(cell.k_continuous, lam, wavelengths, optical_period)
-    for n, ((a, b, c), powers) in enumerate(lights.items()):
-        where = f"{shown}, {a:g} nm, theta {b:g}°, phi {c:g}°"
-        # order m lies at p − m, which 0 to K hold
-        step, room = a / (1e3 * optical_period), math.sqrt(1.0 - y[n] ** 2)
-        highest, lowest = (room - x[n]) / step, (-room - x[n]) / step
-        if extra := [m for m in powers if not lowest - _EDGE <= m <= highest + _EDGE]:
-            raise DiffractionError(f"{where}: order {extra[0]} does not propagate; check --period")
-        needed = range(math.ceil(lowest + _EDGE), math.floor(highest - _EDGE) + 1)
-        if lost := [m for m in needed if m not in powers]:
-            raise DiffractionError(f"{where}: order {lost[0]} propagates, and has no line")
-        for values in zip(*powers.values(), strict=True):
-            if sum(values) > LARGEST_SUM:
-                raise DiffractionError(
-                    f"{where}: the orders sum to {sum(values):.4g}, above {LARGEST_SUM}"
-                )
-    s = np.round(x / np.sqrt(1.0 - y * y), _DIGITS)
-    return _Samples(cell, w, s, list(lights.values()))
+    ends = float(lam.min()), float(lam.max())
+    w = cells.w_of(cell.k_continuous, lam, ends, optical_period)
+    s = np.round(x / room, _DIGITS)
+    return _Samples(x, y, lam, cell, w, s, grid.orders, powers)
+
+
+def _between(
+    orders: NDArray[np.int64], lowest: Real, highest: Real, edge: float
+) -> NDArray[np.bool_]:
+    """Whether orders (m,) lie between two ends (n,), widened by an edge: (n, m)."""
+    return (orders >= lowest[:, None] - edge) & (orders <= highest[:, None] + edge)
+
+
+def _errors(table: OrderTable, samples: _Samples) -> dict[str, float]:
+    """Compare a table with the file, unpolarised, as `orders.measured_error` does with solutions.
+
+    Light at which a single order propagates is left out, unless there is no other.
+    """
+    sides = (False, True) if table.thin else (False,)
+    missed, light = np.zeros(len(samples.x)), np.zeros(len(samples.x))
+    lone = not samples.powers[:, samples.orders != 0].any()
+    for order in samples.orders:
+        if order == 0 and not lone:
+            continue
+        truth = samples.of_order(int(order))
+        for side in sides:
+            share = truth[:, 2 * side : 2 * side + 2].mean(axis=-1)
+            options = {"transmitted": True} if side else {}
+            got = table.efficiency(samples.x, samples.y, samples.wavelength, order, **options)
+            missed, light = missed + np.abs(got - share), light + share
+    floor = 0.05 * light.mean()
+    return {
+        "error_mean": float(missed.sum() / max(light.sum(), 1e-12)),
+        "error_worst": float(np.quantile(missed / np.maximum(light, max(floor, 1e-12)), 0.95)),
+        "reciprocity_error": _one_way(table),
+    }
+
+
+def _one_way(table: OrderTable) -> float:
+    """Return the mean difference between light and reversed light, unpolarised, over the light."""
+    missed = light = 0.0
+    for band in table.bands:
+        for values in band.kinds:
+            unpolarised = values.mean(axis=(2, -1))  # and over wavelengths
+            ports = cells.reversed_ports(unpolarised.shape[-1], table.sides)
+            reverse = np.flip(unpolarised[..., ports, :][..., ports], 0).swapaxes(-1, -2)
+            missed += float(np.abs(unpolarised - reverse).sum(axis=(-1, -2)).mean())
+            light += float(unpolarised.sum(axis=(-1, -2)).mean())
+    return missed / max(light, 1e-12)
 
 
 def _lacks_directions(samples: _Samples, last: int) -> bool:
@@ -200,7 +227,7 @@ def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.fl
     size, axes = k + 1 - kind, 2 if counts.w == 1 else 3
     grid = np.meshgrid(*(cells.nodes(count) for count in counts), indexing="ij")
     places = np.stack(grid, axis=-1)[..., :axes]
-    values = np.zeros((*counts, size, size, 2))
+    values = np.zeros((*counts, size, size, samples.powers.shape[-1]))
     cell = samples.cell
     coordinates = np.stack([cell.tau, cell.rho, samples.w], axis=-1)[:, :axes]
     several = len(np.unique(samples.s)) > 1
@@ -210,41 +237,52 @@ def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.fl
             # nearer to the grooves' direction than all light of the file: a mirror
             values[:, :, :, j, j] = _mean_sum(samples, int(cell.band.min()))
         elif len(here) and several:
-            known = [[samples.powers[n].get(j - q, (0.0, 0.0)) for q in range(size)] for n in here]
-            values[:, :, :, j] = _interpolated(coordinates[here], np.array(known), places)
+            known = np.stack([samples.of_order(j - q)[here] for q in range(size)], axis=1)
+            values[:, :, :, j] = _interpolated(coordinates[here], known, places)
         else:
             big_k = k + cells.sine_squared(grid[1])
             s = cells.from_cell(k, kind, j, grid[0], grid[1], 2e3 / big_k, 1.0).x  # at c = 1
             for q in range(size):
                 values[:, :, :, j, q] = _of_nearest_direction(samples, j - q, s, big_k)
-    return values.astype(np.float32)
+    return (values if values.shape[-1] == 2 else _sheet(values)).astype(np.float32)
+
+
+def _sheet(values: Real) -> Real:
+    """Return the efficiencies between the ports of a sheet; see `read_orders`.
+
+    values : (τ, ρ, w, j, q, 4) reflected and transmitted light from above.
+    """
+    reflected, through = values[..., :2], values[..., 2:]
+    reverse = np.flip(through, (0, 3, 4)).swapaxes(3, 4).mean(axis=-1, keepdims=True)
+    back = np.broadcast_to(reverse, through.shape)
+    left = np.maximum(1.0 - back.sum(axis=-2, keepdims=True), 0.0)
+    total = np.maximum(reflected.sum(axis=-2, keepdims=True), 1e-12)
+    below = reflected * np.minimum(left / total, 1.0)
+    rows = [np.concatenate(row, axis=-2) for row in ((reflected, through), (back, below))]
+    return np.concatenate(rows, axis=-3)
 
 
 def _of_nearest_direction(samples: _Samples, order: int, s: Real, big_k: Real) -> Real:
     """Return the efficiency of an order in the light of the file nearest in s, at the same K.
 
-    s, big_k : of one shape (…). Returns (…, 2), of s and p.
+    s, big_k : of one shape (…). Returns (…, 2), of s and p, or (…, 4) of a sheet.
     """
     listed = np.unique(samples.s)
     nearest = np.abs(s[..., None] - listed).argmin(axis=-1)
-    values = np.zeros((*s.shape, 2))
+    powers = samples.of_order(order)
+    values = np.zeros((*s.shape, powers.shape[1]))
     for number in np.unique(nearest):
         light = np.flatnonzero(samples.s == listed[number])
         light = light[np.argsort(samples.cell.k_continuous[light])]
-        powers = np.array([samples.powers[n].get(order, (0.0, 0.0)) for n in light])
         here = nearest == number
-        for polarisation in (0, 1):
-            values[here, polarisation] = np.interp(
-                big_k[here], samples.cell.k_continuous[light], powers[:, polarisation]
-            )
+        for kind, column in enumerate(powers[light].T):
+            values[here, kind] = np.interp(big_k[here], samples.cell.k_continuous[light], column)
     return values
 
 
 def _mean_sum(samples: _Samples, band: int) -> Real:
-    """Return the mean sum over orders of a band, for s and p, (2,)."""
-    here = np.flatnonzero(samples.cell.band == band)
-    sums = [np.sum(list(samples.powers[n].values()), axis=0) for n in here]
-    return np.asarray(np.mean(sums, axis=0))
+    """Return the mean sum over orders of a band, for s and p, (2,), or (4,) of a sheet."""
+    return np.asarray(samples.powers[samples.cell.band == band].sum(axis=1).mean(axis=0))
 
 
 def _interpolated(points: Real, values: Real, places: Real) -> Real:

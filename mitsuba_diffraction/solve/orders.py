@@ -22,6 +22,7 @@ from .profiles import Profile
 from .resolution import (
     chosen_resolution,
     coarsest,
+    energy_error,
     reciprocity_error,
     resolution_error,
 )
@@ -36,6 +37,8 @@ WORST = 4.0
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
+#: Least index of a thin sheet: orders of light that goes through depend on n − 1.
+LEAST_INDEX = 1.01
 #: Random directions and wavelengths at which the error is measured.
 SAMPLES = 128
 
@@ -95,17 +98,20 @@ def solve_orders(
     material: str | float | complex | Material = "Al",
     *,
     superstrate: float = 1.0,
+    thin: bool = False,
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] | None = None,
 ) -> OrderTable:
-    """Solve the reflected orders of a grating for all directions and wavelengths.
+    """Solve the orders of a grating for all directions and wavelengths.
 
     Parameters
     ----------
     profile : one period of the grooves, from `solve.profiles`.
     material : a name that Mitsuba knows, an index n + ik, or "none" for a perfect conductor.
     superstrate : index of the clear medium above.
+    thin : whether the material is a thin sheet, whose lower side is flat: the table then has the
+        light on both sides (`sheet`). Otherwise it has the reflected orders.
     settings : wavelengths, tolerance, method.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
@@ -118,8 +124,11 @@ def solve_orders(
     """
     how, work = settings or Settings(), jobs or Jobs()
     tell = announce or _silent
-    check_outline(profile.period, how.wavelengths, superstrate)
-    grating = Grating(profile, material_of(material, how.wavelengths), superstrate, how.wavelengths)
+    check_outline(profile.period, how.wavelengths, superstrate, thin)
+    substance = material_of(material, how.wavelengths)
+    if thin:
+        _check_sheet(substance, how)
+    grating = Grating(profile, substance, superstrate, how.wavelengths, thin)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
     coarse = replace(problem, resolution=how.resolution or coarsest(problem))
@@ -139,8 +148,11 @@ def solve_orders(
         "solver_error": solver_error,
         "tolerance": how.tolerance,
     }
-    made = tuple(_band(band, counts[band], solved, how.polarised) for band in bands)
-    table = OrderTable(profile.period, how.wavelengths, made, superstrate, header)
+    if thin:
+        header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
+    sides = grating.sides
+    made = tuple(_band(band, counts[band], solved, how.polarised, sides) for band in bands)
+    table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
     error = measured_error(table, problem, work)
     mean = max(error.mean, error.polarised or 0.0)
     if mean > how.tolerance or error.most > WORST * how.tolerance:
@@ -156,7 +168,21 @@ def solve_orders(
     }
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
-    return OrderTable(profile.period, how.wavelengths, made, superstrate, header)
+    return OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
+
+
+def _check_sheet(material: Material, settings: Settings) -> None:
+    """Refuse materials that absorb, and what sheets do not have."""
+    index = material.index(settings.wavelengths)
+    if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:
+        raise DiffractionError(
+            f"material {material.name}: light goes through a thin sheet of a clear material only; "
+            f"give its index, a real number of {LEAST_INDEX:g} to 100, such as 1.58"
+        )
+    if settings.polarised:
+        raise DiffractionError(
+            "polarised: tables of thin sheets have efficiencies alone; leave out polarised, or thin"
+        )
 
 
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
@@ -177,11 +203,13 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     missed, light, turned = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
     for n, place in enumerate(places):
         j = int(cell.channel[n])
-        truth = _powers(solved[place])[0, j].mean(axis=-1)  # (q,)
-        orders = j - np.arange(len(truth))
-        got = table.efficiency(x[n], y[n], lam[n], orders)
+        side, count = n % table.sides, int(cell.channels[n])  # from above and below by turns
+        truth = _powers(solved[place])[0, side * count + j].mean(axis=-1)  # (ports,)
+        orders = j - np.arange(count)
+        of = functools.partial(table.efficiency, x[n], y[n], lam[n], orders, from_below=side == 1)
+        got = np.concatenate([of(transmitted=other != side) for other in range(table.sides)])
         # where order 0 is alone, it is the colour
-        coloured = orders != 0 if len(orders) > 1 else np.array([True])
+        coloured = np.tile(orders != 0 if count > 1 else True, table.sides)
         missed[n], light[n] = np.abs(got - truth)[coloured].sum(), truth[coloured].sum()
         if table.polarised:
             matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
@@ -210,10 +238,10 @@ def _counts(
     solved = jobs.amplitudes(problem, places, "choosing nodes")
     values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
     # three variables share the tolerance; rarely seen bands may miss more
-    shares = _band_shares(problem.grating, len(drawn))
+    shares, sides = _band_shares(problem.grating, len(drawn)), problem.grating.sides
     return {
         band: _count(
-            of_band, most, solved, values_of, how.tolerance / np.sqrt(3 * len(drawn) * share)
+            of_band, most, solved, values_of, how.tolerance / np.sqrt(3 * len(drawn) * share), sides
         )
         for (band, of_band), share in zip(drawn.items(), shares, strict=True)
     }
@@ -245,6 +273,7 @@ def _count(
     solved: Mapping[Place, Complex],
     values_of: Callable[[Place, Complex], Real],
     error: float,
+    sides: int,
 ) -> Counts:
     """Return the numbers of nodes that all lines of a band need, for values (w, j, q, n)."""
     needed = [1 if size == 1 else least for size, least in zip(most, FEWEST, strict=True)]
@@ -254,12 +283,13 @@ def _count(
         values = [values_of(place, solved[place]) for place in line.places]
         if line.axis == 0:
             values += [
-                values_of(place, reversed_light(solved[place])) for place in reversed(line.places)
+                values_of(place, reversed_light(solved[place], sides))
+                for place in reversed(line.places)
             ]
         # order 0 is no colour, and is left out
         along = np.concatenate(values)
-        if along.shape[1] > 1:
-            along *= 1.0 - np.eye(along.shape[1])[..., None]
+        if (channels := along.shape[1] // sides) > 1:
+            along *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
         needed[line.axis] = max(needed[line.axis], count_for(along, FEWEST[line.axis], error))
     return Counts(*needed)
 
@@ -271,7 +301,7 @@ def _unpolarised(place: Place, amplitudes: Complex) -> Real:
 
 def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
     """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
-    y = np.maximum(grating.station(*place).along, 1e-3)[:, None, None, None, None]
+    y = grating.station(*place).along[:, None, None, None, None]
     elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
     return elements.reshape(*elements.shape[:3], 16)
 
@@ -288,11 +318,13 @@ def _places(band: int, counts: Counts) -> list[Place]:
     ]
 
 
-def _band(band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool) -> Band:
+def _band(
+    band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool, sides: int
+) -> Band:
     """Return the efficiencies, and Mueller matrices, of a band from those of its stations."""
     kinds, matrices = [], []
     for kind in (cells.A, cells.B) if band else (cells.A,):
-        at_nodes = functools.partial(_at_nodes, band, kind, counts, solved)
+        at_nodes = functools.partial(_at_nodes, band, kind, counts, solved, sides)
         values = at_nodes(_powers)
         total = values.sum(axis=-2, keepdims=True)
         if total.max() > MOST_EXCESS:
@@ -302,8 +334,7 @@ def _band(band: int, counts: Counts, solved: Mapping[Place, Complex], polarised:
             )
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
-            excess = np.maximum(total.max(axis=-1), 1.0)[..., None, None]
-            matrices.append(at_nodes(mueller_of) / excess)
+            matrices.append(at_nodes(lambda amplitudes: mueller_of(_limited(amplitudes))))
     return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 
@@ -312,11 +343,18 @@ def _powers(amplitudes: Complex) -> Real:
     return np.asarray((np.abs(amplitudes) ** 2).sum(axis=-1).swapaxes(2, 3))
 
 
+def _limited(amplitudes: Complex) -> Complex:
+    """Scale amplitudes (w, j, 2, q, 2) whose powers sum to more than 1."""
+    total = _powers(amplitudes).sum(axis=2)
+    return amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None]
+
+
 def _at_nodes(
     band: int,
     kind: int,
     counts: Counts,
     solved: Mapping[Place, Complex],
+    sides: int,
     values_of: Callable[[Complex], Real],
 ) -> NDArray[np.float32]:
     """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …)."""
@@ -326,7 +364,7 @@ def _at_nodes(
     for number, place in enumerate(places):
         n, m = divmod(number, counts.rho)
         values[n, m] = values_of(solved[place])
-        back = values_of(reversed_light(solved[place]))
+        back = values_of(reversed_light(solved[place], sides))
         opposite = counts.tau - 1 - n
         values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
     return values
@@ -339,7 +377,8 @@ def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
         for band in bands
         for kind in ((cells.A, cells.B) if band else (cells.A,))
     ]
-    return reciprocity_error(jobs.solve(problem, places, "checking reciprocity"))
+    solved = jobs.solve(problem, places, "checking reciprocity")
+    return reciprocity_error(solved, problem.grating.sides)
 
 
 def _announce(

@@ -172,7 +172,8 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
             if not rows and any(c.isalpha() for c in text):
                 continue  # names of the columns
             raise DiffractionError(
-                f"'{path}', line {number}: expected two numbers x, z in µm, got {text[:60]!r}"
+                f"'{path}', line {number}: expected two numbers x, z in µm, got {text[:60]!r} "
+                "(solve reads efficiencies with --import)"
             ) from error
         rows.append([x, z])
     if not rows:

@@ -4,6 +4,7 @@
     profile = "lamellar"            # blazed, sinusoidal; or the path of a line, CSV of x, z in µm
     material = "Al"                 # a name, an index such as "1.5" or "0.65+5.6i", or "none"
     superstrate = 1.58              # index of the clear medium above; default 1
+    thin = true                     # light goes through: a sheet of a clear material; default false
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
     polarised = true                # with Mueller matrices; default false
@@ -33,7 +34,7 @@ from .orders import Settings
 from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
-    "method", "profile", "material", "superstrate", "wavelengths", "tolerance", "solver",
+    "method", "profile", "material", "superstrate", "thin", "wavelengths", "tolerance", "solver",
     "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
@@ -44,13 +45,14 @@ class SolvedRecipe:
 
     Attributes
     ----------
-    profile, material, superstrate, settings : arguments of `solve_orders`.
+    profile, material, superstrate, thin, settings : arguments of `solve_orders`.
     output : path of the table.
     """
 
     profile: Profile
     material: str
     superstrate: float
+    thin: bool
     settings: Settings
     output: Path
 
@@ -86,6 +88,7 @@ class SolvedRecipe:
                 profile_of(content.get("profile"), content.get("arguments", {}), file.parent),
                 str(content.get("material", "Al")),
                 float(content.get("superstrate", 1.0)),
+                _flag(content, "thin"),
                 _settings(content),
                 file.parent / str(content.get("output", f"{file.stem}.nc")),
             )
@@ -120,6 +123,14 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     return make(**arguments)
 
 
+def _flag(content: Mapping[str, Any], name: str) -> bool:
+    """Return a key that is true or false; false without it."""
+    value = content.get(name, False)
+    if not isinstance(value, bool):
+        raise DiffractionError(f"{name} = {quoted(value)}: must be true or false")
+    return value
+
+
 def _settings(content: Mapping[str, Any]) -> Settings:
     default = Settings()
     low, high = content.get("wavelengths", default.wavelengths)
@@ -128,5 +139,5 @@ def _settings(content: Mapping[str, Any]) -> Settings:
         float(content.get("tolerance", default.tolerance)),
         str(content.get("solver", default.method)),
         content.get("resolution", default.resolution),
-        bool(content.get("polarised", default.polarised)),
+        _flag(content, "polarised"),
     )

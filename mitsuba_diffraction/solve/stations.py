@@ -24,6 +24,9 @@ Number = TypeVar("Number", np.float64, np.complex128)
 #: There solvers lose digits as 1/cosine, and diffuse light has 1e-3 of its power. Stations beyond
 #: have the efficiencies of this cosine.
 LEAST_COSINE = 0.03
+#: Least normal part of the wave vector of a wave that counts as propagating, over its length; below
+#: that of all channels outside. Of light in less slanted waves it has some 1e-3.
+LEAST_NORMAL = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +39,24 @@ class Grating:
     material : below the profile.
     superstrate : real index of the clear medium above.
     wavelengths : shortest and longest of the table, in vacuum, nm.
+    thin : whether the material is a sheet with a flat lower side (`sheet`).
     """
 
     profile: Profile
     material: Material
     superstrate: float
     wavelengths: tuple[float, float]
+    thin: bool = False
 
     @property
     def optical_period(self) -> float:
         """Period times the superstrate's index, µm."""
         return self.superstrate * self.profile.period
+
+    @property
+    def sides(self) -> int:
+        """Number of sides with light: 2 of a thin sheet, else 1."""
+        return 2 if self.thin else 1
 
     @property
     def is_perfect(self) -> bool:
@@ -64,7 +74,9 @@ class Grating:
         fraction = float(np.clip(begin + t * (end - begin), begin + margin, end - margin))
         big_k = band + r
         lam = np.atleast_1d(cells.wavelength_of(big_k, w, self.wavelengths, self.optical_period))
-        cosine = big_k * lam / (2e3 * self.optical_period)
+        longest = 2e3 * self.optical_period / big_k
+        cosine = np.minimum(lam / longest, np.sqrt(1.0 - cells.LEAST_ALONG**2))
+        lam = cosine * longest
         index = self.material.index(lam)
         return Station(
             big_k,
@@ -72,7 +84,8 @@ class Grating:
             band + 1 - kind,
             lam / (1e3 * self.superstrate),
             None if index is None else index / self.superstrate,
-            np.sqrt(np.maximum(1.0 - cosine**2, 0.0)),
+            np.sqrt(1.0 - cosine**2),
+            self.thin,
         )
 
 
@@ -89,6 +102,7 @@ class Station:
     indices : (n,) n + ik of the material over that of the medium above; None for a perfect
         conductor, of which only the first wavelength is solved.
     along : (n,) direction cosine y along the grooves.
+    thin : whether light comes from within the material as well.
     """
 
     extent: float
@@ -97,11 +111,27 @@ class Station:
     wavelengths: Real
     indices: NDArray[np.complex128] | None
     along: Real
+    thin: bool = False
 
     @property
     def sines(self) -> Real:
         """Return s of each channel, (channels,), descending."""
-        return np.asarray(1.0 - 2.0 * (np.arange(self.channels) + self.fraction) / self.extent)
+        return self.sines_of(np.arange(self.channels))
+
+    @property
+    def inside(self) -> NDArray[np.int64]:
+        """Numbers of the channels in which light of any wavelength propagates within a sheet."""
+        if not self.thin or self.indices is None:
+            return np.arange(0)
+        steepest = float(
+            np.sqrt((self.indices.real**2 - self.along**2) / (1 - self.along**2)).max()
+        )
+        middle, half = 0.5 * self.extent - self.fraction, 0.5 * self.extent * steepest
+        return np.arange(int(np.ceil(middle - half)), int(np.floor(middle + half)) + 1)
+
+    def sines_of(self, channels: NDArray[np.int64]) -> Real:
+        """Return s of channels by number, also of those that propagate within a sheet alone."""
+        return np.asarray(1.0 - 2.0 * (channels + self.fraction) / self.extent)
 
 
 class Solver(Protocol):
@@ -112,7 +142,10 @@ class Solver(Protocol):
         """Name, version and settings, for the header of tables."""
 
     def amplitudes(self, station: Station) -> Complex:
-        """Return the amplitudes between all channels, whose |·|² are efficiencies.
+        """Return the amplitudes between all ports, whose |·|² are efficiencies.
+
+        Ports are the channels above, then, of a thin station, its channels `inside` the material.
+        Those that do not propagate at a wavelength have zeros.
 
         Light along d is a sum of E along e and E along d × e, with e the direction of the grooves
         (y) made perpendicular to d: its E, or its B, lies along the grooves, as far as it can. In
@@ -121,15 +154,18 @@ class Solver(Protocol):
 
         Returns
         -------
-        (wavelengths, channels in, 2, channels out, 2) : outgoing over incident field, of waves that
+        (wavelengths, ports in, 2, ports out, 2) : outgoing over incident field, of waves that
             carry unit power through the surface. A perfect conductor has one wavelength, for all.
         """
 
 
-def reversed_light(values: NDArray[Number]) -> NDArray[Number]:
+def reversed_light(values: NDArray[Number], sides: int = 1) -> NDArray[Number]:
     """Return the amplitudes, or efficiencies, of the reversed light, at 1 − t, by reciprocity.
+
+    sides : 2 of efficiencies of a sheet, whose ports are those of `cells`.
 
     The amplitude from channel j and polarisation a to q and b is the amplitude from last − q and b
     to last − j and a (Petit 1980, "Electromagnetic theory of gratings", section 1.4).
     """
-    return np.flip(values, (1, 3)).transpose(0, 3, 4, 1, 2)
+    ports = cells.reversed_ports(values.shape[1], sides)
+    return values[:, ports][:, :, :, ports].transpose(0, 3, 4, 1, 2)

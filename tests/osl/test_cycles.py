@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from mitsuba_diffraction.tables.orders import Band, OrderTable
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
+from tests.support.patches import DEFAULTS, PATCH
 
 pytestmark = pytest.mark.thorough
 
@@ -59,7 +62,10 @@ def test_order_follows_the_grating_equation(tmp_path):
     one = table_of(lambda n: np.eye(n, k=-1) if n > 1 else np.zeros((1, 1)))
     width, theta = 65.0, 40.0
     seen = plane_seen(
-        exported(one, tmp_path, coherence_width=width), [theta], sky="x", WorkingSpace="ACEScg"
+        exported(one, tmp_path, coherence_width=width),
+        [theta],
+        sky=(1.0, 0.0, 0.0, 1.0, 1),
+        WorkingSpace="ACEScg",
     )
     spectrum = drawn_spectrum()
     u = (np.arange(4000) + 0.5) / 4000
@@ -70,3 +76,44 @@ def test_order_follows_the_grating_equation(tmp_path):
     expected = 1.0 + 1e-3 * mean / PERIOD - np.sin(np.radians(theta))
     # four standard errors, of some 0.001 of the light; a wavelength of 3 nm
     assert np.all(np.abs(seen.mean[0] - expected) < 4 * seen.error[0] + 1e-3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_lobe_is_as_wide_as_the_window_has_it(tmp_path, axis):
+    """Second moments of a mirror's lobe: variance 1/(2σ²k²) of each direction cosine, at 50°."""
+    width, theta = 12.0, 50.0
+    centre = np.sin(np.radians(theta)) if axis == 0 else 0.0
+    squared = (1.0 - axis, axis, 0.0, centre, 2)  # the mirror direction is at −x
+    mirror = exported(OrderTable.mirror(PERIOD), tmp_path, coherence_width=width)
+    seen = plane_seen(mirror, [theta], sky=squared, samples=512)
+    variance = (1e-3 * np.array(RGB_WAVELENGTHS) / (0.5 * np.pi * width)) ** 2 / 2
+    # mean of λ² over a channel is up to 1 % above the square of its mean; and noise
+    assert seen.mean[0] == pytest.approx(variance, rel=0.04)
+
+
+@pytest.mark.parametrize("material", ["none", "dielectric"])
+def test_patch_reflects_as_in_mitsuba(tmp_path, material):
+    """A patch of a flat mirror is white; a rough dielectric has the albedo of Mitsuba's BSDF."""
+    if material == "none":
+        flat = md.HeightField(np.zeros((32, 32)), 0.08)
+        bsdf = mi.load_dict(md.bsdf_dict(flat, coherence_width=5, material="none"))
+        expected = 1.0
+    else:
+        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False))
+        expected = albedo(bsdf, 30.0)
+    seen = plane_seen(md.osl.export(bsdf, tmp_path), [30], WorkingSpace="Linear Rec.2020")
+    assert seen.mean == pytest.approx(expected, rel=0.02)
+
+
+def albedo(bsdf, degrees, count=100_000):
+    """Mean of drawn weights over the visible, of light from x."""
+    rng = np.random.default_rng(3)
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    angle = np.radians(degrees)
+    si.wi = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    si.n, si.sh_frame = mi.Normal3f(0, 0, 1), mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.wavelengths = mi.UnpolarizedSpectrum(550.0)
+    first, *second = (mi.Float(x) for x in rng.random((3, count)).astype(np.float32))
+    _, weight = bsdf.sample(mi.BSDFContext(), si, first, mi.Point2f(*second))
+    return float(np.mean(np.array(weight)))

@@ -86,6 +86,11 @@ def test_document_names_files_and_sockets(tmp_path, some_variant):
     assert not [path for path in exported.document.parent.iterdir() if path.name.startswith(".")]
 
 
+def test_sheets_are_refused(tmp_path, some_variant):
+    with pytest.raises(DiffractionError, match="sheet"):
+        md.osl.export(mi.load_dict(md.bsdf_dict(thin_grating(thin=True))), tmp_path)
+
+
 @pytest.mark.parametrize("name", ["", "1cd", "a b", "../cd"])
 def test_name_must_be_that_of_a_shader(tmp_path, some_variant, name):
     with pytest.raises(DiffractionError, match="name="):

@@ -12,6 +12,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single, polar, rough_patch, uniform_directions
+from tests.support.stokes import REVERSAL, bases, rotation
 from tests.support.variants import interaction, runs
 
 pytestmark = pytest.mark.thorough
@@ -20,8 +21,6 @@ PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1, 0.6)
 WIDTH = 3.0
 LAM = np.array([450.0, 520.0, 610.0, 680.0])
 CONDUCTOR = {"eta": 0.9, "k": 6.0}
-#: Reversed light has the same s, so the other p.
-REVERSAL = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 @pytest.fixture
@@ -80,23 +79,6 @@ def test_matrices_have_the_unpolarised_light_s_second_order(polarised):
     assert both[lit] == pytest.approx(
         factor[:, None, None] * first[lit], rel=1e-4, abs=1e-7 * first.max()
     )
-
-
-def bases(direction: Array) -> Array:
-    """Mitsuba's axes of Stokes vectors of light along directions (n, 3)."""
-    found = [mi.mueller.stokes_basis(mi.Vector3f(*d)) for d in direction.tolist()]
-    return np.array([np.array(basis, float).ravel() for basis in found])
-
-
-def rotation(start: Array, to: Array, direction: Array) -> Array:
-    """What takes Stokes vectors about axes `start` to those about `to`, (n, 4, 4)."""
-    cosine = np.sum(to * start, axis=-1)
-    sine = np.sum(to * np.cross(direction, start), axis=-1)
-    double = 2.0 * np.arctan2(sine, cosine)
-    found = np.tile(np.eye(4), (len(start), 1, 1))
-    found[:, 1, 1] = found[:, 2, 2] = np.cos(double)
-    found[:, 1, 2], found[:, 2, 1] = np.sin(double), -np.sin(double)
-    return found
 
 
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])

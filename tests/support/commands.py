@@ -120,10 +120,11 @@ def small_tree(folder: Path) -> Path:
         shutil.copy(folder / "scan.spm", folder / name)
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
-    # efficiencies as the page's program writes them
-    program = next(code for code in blocks("docs/orders.md", "python") if "import csv" in code)
+    # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
-        exec(program, {})
+        for program in blocks("docs/orders.md", "python"):
+            if "import csv" in program or "netcdf_file" in program:
+                exec(program, {})
     # what `plan` writes, which is not run here
     shutil.copy(folder / "precompute" / "elaphe_like.toml", folder / "snake.toml")
     return folder

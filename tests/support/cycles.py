@@ -54,16 +54,16 @@ for degrees in tilts:
     nodes, links = world.node_tree.nodes, world.node_tree.links
     nodes.clear()
     background = nodes.new("ShaderNodeBackground")
-    if sky == "x":  # radiance 1 + x of the direction
-        place = nodes.new("ShaderNodeTexCoord")
-        split = nodes.new("ShaderNodeSeparateXYZ")
-        add = nodes.new("ShaderNodeMath")
-        add.inputs[1].default_value = 1.0
-        links.new(place.outputs["Generated"], split.inputs[0])
-        links.new(split.outputs["X"], add.inputs[0])
-        links.new(add.outputs[0], background.inputs["Color"])
-    else:
-        background.inputs["Color"].default_value = (1, 1, 1, 1)
+    place = nodes.new("ShaderNodeTexCoord")
+    along, add, power = nodes.new("ShaderNodeVectorMath"), *map(nodes.new, 2 * ["ShaderNodeMath"])
+    along.operation, along.inputs[1].default_value = "DOT_PRODUCT", sky[:3]
+    add.inputs[1].default_value = sky[3]
+    links.new(place.outputs["Generated"], along.inputs[0])
+    links.new(along.outputs["Value"], add.inputs[0])
+    power.operation, power.inputs[1].default_value = "MULTIPLY", 1.0
+    for n in range(sky[4]):
+        links.new(add.outputs[0], power.inputs[n])
+    links.new(power.outputs[0], background.inputs["Color"])
     sink = nodes.new("ShaderNodeOutputWorld")
     links.new(background.outputs[0], sink.inputs["Surface"])
     tilt = math.radians(degrees)
@@ -83,6 +83,10 @@ for degrees in tilts:
 """
 
 
+#: Radiance 1.
+WHITE = (0.0, 0.0, 0.0, 1.0, 1)
+
+
 class Seen(NamedTuple):
     """Radiance of a plane in linear RGB, (tilts, 3): mean over pixels, and its standard error."""
 
@@ -93,7 +97,7 @@ class Seen(NamedTuple):
 def plane_seen(
     exported: Exported,
     tilts: list[float],
-    sky: str = "white",
+    sky: tuple[float, float, float, float, int] = WHITE,
     samples: int = 256,
     pixels: int = 12,
     **values: object,
@@ -101,7 +105,7 @@ def plane_seen(
     """Render a plane whose patch has x along the world's, seen from some angles towards x.
 
     tilts : degrees from the normal.
-    sky : "white", or "x" for a radiance of 1 + x of the direction.
+    sky : (a, b, c, d, n) of the radiance (a x + b y + c z + d)ⁿ of a direction; n is 1 or 2.
     values : of sockets, by identifier.
     """
     folder = Path(exported.document).parent

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.boundary import mueller, polarisation_axes, small_slope, turn
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions
@@ -63,6 +66,60 @@ def thin_grating(
     return OrderTable(period, wavelengths, bands, superstrate, header, thin)
 
 
+def shallow_grating(
+    index: complex,
+    strength: float = 0.0,
+    counts: Counts = Counts(20, 12, 4),  # noqa: B008 - immutable
+    superstrate: float = 1.0,
+    period: float = 0.6,
+    wavelengths: tuple[float, float] = (500.0, 600.0),
+) -> OrderTable:
+    """A polarised table of the first-order small-slope model: a mirror with weak orders ±1.
+
+    index : over that of the superstrate.
+    strength : amplitude of orders ±1, over the root of both cosines and the boundary's matrix.
+    """
+    optical = superstrate * period
+
+    def matrices(k: int, kind: int) -> np.ndarray:
+        channels = np.arange(k + 1 - kind)
+        tau, rho, w = (cells.nodes(n) for n in counts)
+        tau, rho, w = (part[..., None] for part in np.meshgrid(tau, rho, w, indexing="ij"))
+        big_k = k + cells.sine_squared(rho)
+        lam = cells.wavelength_of(big_k, w, wavelengths, optical)
+        longest = 2e3 * optical / big_k * np.sqrt(1.0 - cells.LEAST_ALONG**2)
+        at = cells.from_cell(k, kind, channels, tau, rho, np.minimum(lam, longest), optical)
+        z = np.sqrt(np.maximum(1.0 - at.x**2 - at.y**2, 0.0))
+        wi, wo = (np.stack([sign * at.x, sign * at.y, z], axis=-1) for sign in (-1.0, 1.0))
+        wi, wo = wi[..., :, None, :], wo[..., None, :, :]
+        jones = groove_matrices(wi, wo, small_slope(wi, wo, index))
+        first = strength * np.sqrt(z[..., :, None] * z[..., None, :])
+        order = np.abs(channels[:, None] - channels)
+        factor = np.select([order == 0, order == 1], [1.0, first], 0.0)
+        return mueller(factor[..., None, None] * jones)
+
+    bands = []
+    for k in range(cells.largest_band(wavelengths, optical) + 1):
+        of_kinds = [matrices(k, kind) for kind in ((cells.A, cells.B) if k else (cells.A,))]
+        first = [of_kind[..., 0, :2] for of_kind in of_kinds]
+        powers = [np.stack([m[..., 0] + m[..., 1], m[..., 0] - m[..., 1]], -1) for m in first]
+        singles = [[part.astype(np.float32) for part in parts] for parts in (powers, of_kinds)]
+        bands.append(Band(k, *singles[0], mueller=tuple(singles[1])))
+    return OrderTable(period, wavelengths, tuple(bands), superstrate, {"profile": "shallow"})
+
+
+def groove_matrices(wi: Array, wo: Array, jones: Array) -> Array:
+    """Jones matrices about the axes of tables, from those about s and p."""
+    s_in, s_out = polarisation_axes(wi, wo)
+    return turn(groove_axis(wo), s_out, wo) @ jones @ turn(s_in, groove_axis(wi), -wi)
+
+
+def groove_axis(direction: Array) -> Array:
+    """y made perpendicular to directions (…, 3)."""
+    across = np.array([0.0, 1.0, 0.0]) - direction[..., 1:2] * direction
+    return across / np.linalg.norm(across, axis=-1, keepdims=True)
+
+
 def load(table: Any, **parameters: Any) -> Any:
     """A table or heights as a BSDF of the current variant."""
     return mi.load_dict(md.bsdf_dict(table, **parameters))
@@ -75,6 +132,21 @@ def on_all_sides(wi: Array, wo: Array) -> tuple[Array, Array]:
     wi[:, 2] *= np.where(n % 2, -1.0, 1.0)
     wo[:, 2] *= np.where(n // 2 % 2, -1.0, 1.0)
     return wi, wo
+
+
+def reference_on_all_sides(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+    """The reference of a thin sheet, times |cosθo|, for directions above or below."""
+    values, up = np.zeros(len(wi)), np.array([1.0, 1.0, -1.0])
+    for from_below, transmitted in itertools.product((False, True), (False, True)):
+        here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
+        efficiency = functools.partial(
+            table.efficiency, from_below=from_below, transmitted=transmitted
+        )
+        came = wi[here] * up if from_below else wi[here]
+        left = wo[here] * up if from_below != transmitted else wo[here]
+        lam = wavelength[here]
+        values[here] = md.reference.orders_brdf(efficiency, table.period, came, left, lam)
+    return values * np.abs(wo[:, 2])
 
 
 def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:

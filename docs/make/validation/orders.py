@@ -3,8 +3,7 @@
 | table | solver beside it |
 | --- | --- |
 | cd, dvd | coupled waves in layers, which suit vertical walls |
-| sinusoidal | Rayleigh's expansion, reduced |
-| blazed | integral method at twice the points: coupled waves converge too slowly on sloped metal |
+| blazed, sinusoidal | Chandezon's method, which suits slopes |
 """
 
 from __future__ import annotations
@@ -19,18 +18,17 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of
-from mitsuba_diffraction.solve.profiles import Profile
 from mitsuba_diffraction.solve.recipes import SolvedRecipe
-from mitsuba_diffraction.solve.stations import Grating
+from mitsuba_diffraction.solve.stations import Grating, Solver, Station
 from mitsuba_diffraction.tables.orders import cells
 
-from . import rayleigh
 from .cases import PIXELS
+from .chandezon import Chandezon
 from .model import efficiencies
+from .published import light_of
 
 Real = NDArray[np.float64]
 
@@ -38,10 +36,15 @@ FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
 TABLES = ("cd", "dvd", "blazed", "sinusoidal")
 MOUNTS = ((0, 0), (30, 0), (30, 50), (30, 90), (60, 0), (60, 50), (60, 90))
-WAVELENGTHS = (450.0, 530.0, 610.0)
+WAVELENGTHS = (460.0, 530.0, 610.0)
 # orders beyond are left out, as in `compare`: an error of little light
 _HORIZON = np.cos(np.radians(75.0))
-_HARMONICS, _COUPLED, _POINTS = 41, 60, 320
+#: Harmonics on either side, of coupled waves and of Chandezon's method.
+COUPLED, CHANDEZON = 60, 20
+#: Wavelength of the efficiencies side by side, nm.
+SHOWN = 530.0
+#: Random directions and wavelengths where absorption is compared.
+SAMPLES = 200
 
 
 class Deviation(NamedTuple):
@@ -53,6 +56,31 @@ class Deviation(NamedTuple):
 
     colours: float
     sum: float
+
+
+class Efficiencies(NamedTuple):
+    """Efficiencies of an order by the default model, the table, and the solver beside."""
+
+    order: int
+    model: float
+    table: float
+    truth: float
+
+
+class Absorption(NamedTuple):
+    """Absorbed share of diffuse light, and the table's deviation from its own solver.
+
+    absorbed : mean share.
+    bias : deviation of that mean, as a share of it.
+    mean, most, largest : magnitude of the deviation, as a share of the incident light: mean, the
+        one that 95 % of directions keep, and largest.
+    """
+
+    absorbed: float
+    bias: float
+    mean: float
+    most: float
+    largest: float
 
 
 @dataclass(frozen=True)
@@ -99,6 +127,39 @@ class Case:
             for m, s in zip(missed.sum(axis=0) / light, sums.max(axis=0), strict=True)
         ]
 
+    def side_by_side(self, theta: float, phi: float) -> list[Efficiencies]:
+        """Return the efficiencies of order 0 and of the strongest other one, at `SHOWN`."""
+        row = self._efficiencies(theta, phi, SHOWN)
+        strongest = int(np.argmax(np.where(row.coloured, row.truth, -1.0)))
+        shown = [int(np.flatnonzero(row.order == 0)[0])]
+        if row.coloured[strongest]:
+            shown.append(strongest)
+        return [
+            Efficiencies(
+                int(row.order[n]), float(row.model[n]), float(row.table[n]), float(row.truth[n])
+            )
+            for n in shown
+        ]
+
+    def absorption(self, samples: int = SAMPLES) -> Absorption:
+        """Return the absorption at random directions of diffuse light and wavelengths."""
+        rng, table = np.random.default_rng(1), self.table
+        radius, turn = np.sqrt(rng.random(samples)), 2 * np.pi * rng.random(samples)
+        x, y = radius * np.cos(turn), radius * np.sin(turn)
+        lam = rng.uniform(*table.wavelengths, samples)
+        resolution = self.recipe.settings.resolution
+        assert resolution is not None
+        solver = IntegralSolver(self.recipe.profile, resolution)
+        absorbed, missed = np.empty(samples), np.empty(samples)
+        for n in range(samples):
+            truth = self._by_solver(solver, x[n], y[n], lam[n])
+            absorbed[n] = 1.0 - sum(truth.values())
+            missed[n] = 1.0 - table.efficiency(x[n], y[n], lam[n], list(truth)).sum() - absorbed[n]
+        size = np.abs(missed)
+        bias = missed.mean() / absorbed.mean()
+        values = (absorbed.mean(), bias, size.mean(), np.quantile(size, 0.95), size.max())
+        return Absorption(*map(float, values))
+
     def _efficiencies(self, theta: float, phi: float, wavelength: float) -> _Row:
         recipe, table = self.recipe, self.table
         sine, turn = np.sin(np.radians(theta)) / recipe.superstrate, np.radians(phi)
@@ -113,6 +174,15 @@ class Case:
         solved = table.efficiency(-wi[0], wi[1], wavelength, order)
         return _Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
 
+    def _by_solver(self, solver: Solver, x: float, y: float, lam: float) -> dict[int, float]:
+        """Return the efficiencies of all orders at the station of the table for this light."""
+        recipe, alone = self.recipe, (lam, lam)
+        material = material_of(recipe.material, alone)
+        grating = Grating(recipe.profile, material, recipe.superstrate, alone)
+        cell = cells.to_cell(x, y, lam, grating.optical_period)
+        place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho)
+        return _orders(solver, grating.station(*place, [0.0]), int(cell.channel))
+
     def _index(self, wavelength: float) -> complex:
         """Return the index over that of the superstrate."""
         recipe = self.recipe
@@ -120,26 +190,24 @@ class Case:
         assert index is not None
         return complex(index) / recipe.superstrate
 
+    @cached_property
+    def solver(self) -> Solver:
+        """The solver beside."""
+        if self.name in ("cd", "dvd"):
+            return CoupledWaves(self.recipe.profile, COUPLED)
+        return Chandezon(self.recipe.profile, CHANDEZON)
+
     def truth(self, wi: Real, wavelength: float) -> dict[int, float]:
         """Return the efficiencies of all orders by the solver beside, for unpolarised light."""
-        recipe = self.recipe
-        if self.name == "sinusoidal":
-            index, inside = self._index(wavelength), wavelength / recipe.superstrate
-            orders = rayleigh.solve(self.field, index, inside, wi, _HARMONICS)
-            power = boundary.unpolarised(orders.jones) * orders.wo[:, 2] / wi[2]
-            return dict(zip(orders.order[:, 0].tolist(), power.tolist(), strict=True))
-        solver = _solver(recipe.profile, self.name)
-        alone = (wavelength, wavelength)
-        grating = Grating(
-            recipe.profile, material_of(recipe.material, alone), recipe.superstrate, alone
-        )
-        cell = cells.to_cell(-wi[0], wi[1], wavelength, grating.optical_period)
-        station = grating.station(
-            int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), [0.0]
-        )
-        channel = int(cell.channel)
-        power = (np.abs(solver.amplitudes(station)[0, channel]) ** 2).mean(axis=0).sum(axis=-1)
-        return {channel - q: float(value) for q, value in enumerate(power)}
+        inside = 1e-3 * wavelength / self.recipe.superstrate
+        light = light_of(self.table.period, inside, self._index(wavelength), -wi[0], wi[1])
+        return _orders(self.solver, light.station, light.channel)
+
+
+def _orders(solver: Solver, station: Station, channel: int) -> dict[int, float]:
+    """Return the efficiencies of all orders, for light through a channel."""
+    power = (np.abs(solver.amplitudes(station)[0, channel]) ** 2).mean(axis=0).sum(axis=-1)
+    return {channel - q: float(value) for q, value in enumerate(power)}
 
 
 class _Row(NamedTuple):
@@ -161,7 +229,3 @@ class _Row(NamedTuple):
 
     def missed(self, values: Real) -> float:
         return float(np.abs(values - self.truth)[self.coloured].sum())
-
-
-def _solver(profile: Profile, name: str) -> CoupledWaves | IntegralSolver:
-    return IntegralSolver(profile, _POINTS) if name == "blazed" else CoupledWaves(profile, _COUPLED)

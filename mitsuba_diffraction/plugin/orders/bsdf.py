@@ -28,13 +28,10 @@ The model is a sum of lobes, one for each order m, of the efficiency η_m of the
 
 The table's clear layer (superstrate) is a coat with a flat face: a mirror of the same coherence
 width. Light that the face sends back to the grating is summed over all orders and reflections, in
-powers. RGB variants sum f over daylight. Efficiencies are those of unpolarised light: polarised
-variants depolarise it, and warn once. Wavelengths outside the table have the efficiencies of the
-nearest in it. f is reciprocal as far as the table is, at the centres of lobes.
-
-A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
-normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
-is the reflection, component 1 the transmission.
+powers. RGB variants sum f over daylight. Polarised variants have the Mueller matrices of a table of
+`solve --polarised`; with another table they depolarise the light, and warn once. Wavelengths
+outside the table have the efficiencies of the nearest in it. f is reciprocal as far as the table
+is, at the centres of lobes.
 
 XML and the same in Python:
 
@@ -86,8 +83,9 @@ from ..types import (
     Vector2f,
     Vector3f,
 )
-from .lobes import lobes_of
+from .lobes import DaylightLobes, Lobes, SpectralLobes
 from .parameters import Parameters
+from .polarised import PolarisedLobes
 
 
 class DiffractionOrders(mi.BSDF):
@@ -108,7 +106,7 @@ class DiffractionOrders(mi.BSDF):
         super().__init__(props)
         self.table, self.orientation = read.table, read.orientation
         self.coherence_width, self._wavelength = read.coherence_width, read.wavelength
-        self._lobes = lobes_of(self.table, self.coherence_width, self._wavelength)
+        self._lobes = _lobes_of(read)
         self.nested: BSDF = read.nested  # or None
         self.parameters: list[Changeable] = [*self.orientation.changeable]
         if self.nested is not None:
@@ -117,7 +115,7 @@ class DiffractionOrders(mi.BSDF):
         components = nesting.components_of(self.nested)
         self.m_components = components  # at once: reading it makes a copy
         self.m_flags = nesting.flags_of(components)
-        if mi.is_polarized:
+        if mi.is_polarized and not self.table.polarised:
             _warn_of_polarisation()
         check_parameters([self])
         self.derive()
@@ -147,8 +145,9 @@ class DiffractionOrders(mi.BSDF):
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
         """See `Nesting.diffracted_both`."""
-        light = self._lobes.reflected(Pair(si, wo, self._frame(si, active), active), si)
-        return mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(light.value))), light.density
+        pair = Pair(si, wo, self._frame(si, active), active)
+        light = self._lobes.reflected(pair, si, mode=ctx.mode)
+        return light.value, light.density
 
     def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """Draw an order by its efficiency, and a direction in its lobe; see `Nesting.draw`."""
@@ -231,6 +230,14 @@ class DiffractionOrders(mi.BSDF):
         return f"DiffractionOrders[\n{lines}]"
 
 
+def _lobes_of(read: Parameters) -> Lobes:
+    """Return the lobes of the current variant."""
+    if mi.is_rgb:
+        return DaylightLobes(read.table, read.coherence_width)
+    kind = PolarisedLobes if mi.is_polarized and read.table.polarised else SpectralLobes
+    return kind(read.table, read.coherence_width, read.wavelength)
+
+
 _warned: list[bool] = []
 
 
@@ -239,6 +246,6 @@ def _warn_of_polarisation() -> None:
     if not _warned:
         _warned.append(True)
         warn(
-            "diffraction_orders has efficiencies of unpolarised light: in this polarised variant "
-            "it depolarises the light that it reflects"
+            "a table of diffraction_orders has no Mueller matrices: in this polarised variant it "
+            "depolarises light; solve gratings with --polarised (thin sheets have none)"
         )

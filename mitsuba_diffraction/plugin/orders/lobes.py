@@ -22,7 +22,7 @@ from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..directions import Pair
 from ..memory import index_between, read_record, upload
 from ..sampling import BELOW_ONE, invert
-from ..types import Colour, Float, Index, Interaction, Mask, Vector2f
+from ..types import Colour, Float, Index, Interaction, Mask, Spectrum, Vector2f
 from .lookup import OrderLookup, Row, order_lookup
 
 #: Efficiency and probability of an order, from wavelength and order.
@@ -41,12 +41,29 @@ class Reflected(NamedTuple):
 
     Attributes
     ----------
-    value : f cosθo, per channel.
+    value : f cosθo.
     density : of `Lobes.draw`, per solid angle.
     """
 
-    value: Colour
+    value: Spectrum
     density: Float
+
+
+class Lit(NamedTuple):
+    """Light of a pair of directions at one wavelength.
+
+    Attributes
+    ----------
+    row : efficiencies of the incident light.
+    value : f cosθo.
+    peak : factor from efficiencies times lobes to f cosθo.
+    terms : order, lobe, and efficiency of each lobe that reaches the pair.
+    """
+
+    row: Row
+    value: Float
+    peak: Float
+    terms: list[tuple[Float, Float, Float]]
 
 
 class Draw(NamedTuple):
@@ -64,11 +81,18 @@ class Draw(NamedTuple):
 class Lobes(Protocol):
     """Light of all orders in the variant's channels, and directions drawn by it."""
 
-    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
+    def reflected(
+        self,
+        pair: Pair,
+        si: Interaction,
+        below: Mask | None = None,
+        mode: mi.TransportMode = mi.TransportMode.Radiance,
+    ) -> Reflected:
         """Return value and density of a pair.
 
         below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
             sheet.
+        mode : whether light comes along ωo (radiance) or along ωi (importance).
         """
 
     def draw(
@@ -89,9 +113,11 @@ class _Window:
     period : µm.
     """
 
+    lookup_kind: type[OrderLookup] = OrderLookup
+
     def __init__(self, table: OrderTable, coherence_width: float) -> None:
         self.sigma, self.period = sigma_of(coherence_width), table.period
-        self.lookup: OrderLookup = order_lookup(table)
+        self.lookup = order_lookup(table, self.lookup_kind)
         self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
         # where an order's neighbour adds to its lobe
         self._overlaps = 0.25 * self._sharpness < _FAR
@@ -128,26 +154,40 @@ class SpectralLobes(_Window):
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
+    def reflected(
+        self,
+        pair: Pair,
+        si: Interaction,
+        below: Mask | None = None,
+        mode: mi.TransportMode = mi.TransportMode.Radiance,
+    ) -> Reflected:
         """See `Lobes.reflected`; the density is the mean over wavelengths."""
-        values, density = [], mi.Float(0.0)
+        lit: list[Lit] = []
+        density = mi.Float(0.0)
         wavelengths = self._wavelengths(si)
         for wavelength in wavelengths:
             row = self.lookup.row(pair.incident, pair.cos_i, wavelength)
             position = pair.uv * (1e3 * self.period * dr.rcp(wavelength))
             light, chance, near = mi.Float(0.0), mi.Float(0.0), mi.Mask(False)
+            terms = []
             for order in self.orders(position.x):
                 lobe = self.lobe(position, order)
                 share = self.lookup.order(row, order, lobe > 0.0, below)
                 near |= lobe > 0.0
                 light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
+                terms.append((order, lobe, share.efficiency))
             peak = dr.square((2e3 * math.sqrt(math.pi) * self.sigma) * dr.rcp(wavelength))
             peak *= pair.cos_o
-            values.append(light * peak)
+            lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
         mean = density * (1.0 / len(wavelengths))
-        return Reflected(mi.UnpolarizedSpectrum(values), dr.detach(mean))
+        return Reflected(self.spectrum(pair, mode, lit), dr.detach(mean))
+
+    def spectrum(self, pair: Pair, mode: mi.TransportMode, lit: list[Lit]) -> Spectrum:
+        """Return f cosθo of all wavelengths, depolarised in polarised variants."""
+        values = [light.value for light in lit]
+        return mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(values)))
 
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
@@ -188,7 +228,13 @@ class DaylightLobes(_Window):
         self._bins = len(weights.cumulative) - 1
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
-    def reflected(self, pair: Pair, si: Interaction, below: Mask | None = None) -> Reflected:
+    def reflected(
+        self,
+        pair: Pair,
+        si: Interaction,
+        below: Mask | None = None,
+        mode: mi.TransportMode = mi.TransportMode.Radiance,
+    ) -> Reflected:
         """See `Lobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
         # before the loops: a cached property that a loop computed would belong to it
@@ -306,10 +352,3 @@ def _added(
     light = lobe * value
     added = [dr.fma(w, light, total) for w, total in zip(weights, colours, strict=False)]
     return [*added, dr.fma(weights[CHANNELS - 1], lobe * share, density)]
-
-
-def lobes_of(table: OrderTable, coherence_width: float, wavelength: float) -> Lobes:
-    """Return the lobes of the current variant; wavelength : nm, of mono variants."""
-    if mi.is_rgb:
-        return DaylightLobes(table, coherence_width)
-    return SpectralLobes(table, coherence_width, wavelength)

@@ -27,6 +27,8 @@ class Row:
 
     Attributes
     ----------
+    kind : of the band, and A or B; see `tables.orders.grids.Corners`.
+    cell : number of the cell.
     start : record of port 0.
     channel : j of the incident light.
     channels : number of channels of a side.
@@ -35,6 +37,8 @@ class Row:
     face : share of the light that the coat's face reflects, 0 without a coat.
     """
 
+    kind: Index
+    cell: Index
     start: Index
     channel: Index
     channels: Index
@@ -71,6 +75,10 @@ class OrderLookup:
     Parameters
     ----------
     table : the table; its superstrate is a coat with a flat face.
+
+    Attributes
+    ----------
+    index : of the superstrate.
     """
 
     def __init__(self, table: OrderTable) -> None:
@@ -82,14 +90,14 @@ class OrderLookup:
         self._last = float(table.last_band)
         self._ends = table.wavelengths
         self._steps = 1e-3 / table.period
-        self._index, self._least_c = table.superstrate, least_c(table.superstrate)
+        self.index, self._least_c = table.superstrate, least_c(table.superstrate)
         self._parts = records.values.shape[1] // 8
         self._sides = table.sides
 
     @property
     def coated(self) -> bool:
         """Whether a flat face lies above the grating."""
-        return self._index != 1.0
+        return self.index != 1.0
 
     def row(self, incident: Vector2f, cos_i: Float, wavelength: Float) -> Row:
         """Return the row of light from ωi.
@@ -99,7 +107,7 @@ class OrderLookup:
         wavelength : in vacuum, nm.
         """
         vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
-        x, y = (incident.x * (-1.0 / self._index), incident.y * (1.0 / self._index))
+        x, y = (incident.x * (-1.0 / self.index), incident.y * (1.0 / self.index))
         c = dr.sqrt(dr.maximum(dr.fma(-y, y, 1.0), _LEAST))
         inverse = self._period * dr.rcp(wavelength)
         big_k = 2.0 * c * inverse
@@ -125,12 +133,24 @@ class OrderLookup:
         ports, port = channels * self._sides, mi.UInt32(channel)
         if self._sides == 2:
             port += dr.select(cos_i < 0.0, channels, 0)
-        row = cell * ports + port
-        start = read(mi.UInt32, self._starts, kind) + row * (ports + 1)
+        start = read(mi.UInt32, self._starts, kind) + (cell * ports + port) * (ports + 1)
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
-        return Row(start, mi.UInt32(channel), channels, weights, incident, vacuum, face)
+        lit = mi.UInt32(channel), channels, weights, incident, vacuum, face
+        return Row(kind, cell, start, *lit)
+
+    @staticmethod
+    def port(
+        row: Row, order: Float, active: Mask = True, below: Mask | None = None
+    ) -> tuple[Index, Mask]:
+        """Return the port of an order, 0 or that below if it does not propagate, and whether."""
+        q = mi.Float(row.channel) - order
+        propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
+        q = mi.UInt32(dr.select(propagates, q, 0.0))
+        if below is not None:
+            q += dr.select(below, row.channels, 0)
+        return q, propagates
 
     def order(
         self, row: Row, order: Float, active: Mask = True, below: Mask | None = None
@@ -139,11 +159,7 @@ class OrderLookup:
 
         below : whether it leaves below a sheet; None without a sheet.
         """
-        q = mi.Float(row.channel) - order
-        propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
-        q = mi.UInt32(dr.select(propagates, q, 0.0))
-        if below is not None:
-            q += dr.select(below, row.channels, 0)
+        q, propagates = self.port(row, order, active, below)
         if not self.coated:
             efficiency = dr.select(propagates, self._between(row, q, 0, propagates), 0.0)
             return Share(efficiency, efficiency)
@@ -203,7 +219,7 @@ class OrderLookup:
 
     def _through(self, cosine: Float) -> Float:
         """Return the unpolarised transmittance of the coat's face, for the cosine outside."""
-        s, p = transmittances(cosine, mi.Float(self._index))
+        s, p = transmittances(cosine, mi.Float(self.index))
         return 0.5 * (s + p)
 
     def _w(self, wavelength: Float, big_k: Float) -> Float:
@@ -224,9 +240,12 @@ _lookups: weakref.WeakKeyDictionary[OrderTable, dict[str, OrderLookup]] = (
 )
 
 
-def order_lookup(table: OrderTable) -> OrderLookup:
-    """Return the table in the current variant's memory, shared by all BSDFs of the table."""
+def order_lookup(table: OrderTable, kind: type[OrderLookup]) -> OrderLookup:
+    """Return the table in the current variant's memory, shared by all BSDFs of the table.
+
+    kind : of the look-up, which table and variant decide.
+    """
     variants = _lookups.setdefault(table, {})
     if mi.variant() not in variants:
-        variants[mi.variant()] = OrderLookup(table)
+        variants[mi.variant()] = kind(table)
     return variants[mi.variant()]

@@ -42,6 +42,9 @@ Whole = NDArray[np.int64]
 
 #: Kinds, as numbers: that of the channel count band + 1, and that of the channel count band.
 A, B = 0, 1
+#: Least direction cosine y of light that is solved, for the ratios of `polarised`: in its powers
+#: nobody sees it (1e-5).
+LEAST_ALONG = 3e-3
 #: Least width of a kind or y-range, against division by 0: rounding in double precision.
 _LEAST = 1e-12
 

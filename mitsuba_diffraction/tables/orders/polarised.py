@@ -42,7 +42,7 @@ def smooth_elements(table: OrderTable, band: Band, kind: int) -> Array:
     big_k = (band.k + cells.sine_squared(rho))[:, None]
     lam = cells.wavelength_of(big_k, w, table.wavelengths, table.optical_period)
     c = big_k * lam / (2e3 * table.optical_period)
-    y = np.sqrt(np.maximum(1.0 - c * c, _LEAST))[:, :, None, None, None]
+    y = np.sqrt(np.maximum(1.0 - c * c, cells.LEAST_ALONG**2))[:, :, None, None, None]
     matrices = band.mueller[kind]
     return np.where(ODD.ravel(), 1.0 / y, 1.0) * matrices.reshape(*matrices.shape[:-2], 16)
 

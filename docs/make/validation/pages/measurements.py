@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .. import cells, coated, filmed, models, orders, statistics, transmitted
+from .. import cells, coated, filmed, models, orders, published, statistics, transmitted
 from ..cases import FEW_WAVELENGTHS, Grating
 from ..compare import Comparison, compare
 from ..goals import Sides
@@ -36,6 +36,16 @@ class Measurements:
     def mounts(self) -> tuple[tuple[int, int], ...]:
         """Directions of light on the tables of solved orders: θ and φ, degrees."""
         return orders.MOUNTS[: 1 if self.quick else None]
+
+    @property
+    def absorption_samples(self) -> int:
+        """Random directions in which absorption is compared."""
+        return 4 if self.quick else orders.SAMPLES
+
+    @property
+    def published(self) -> tuple[published.Published, ...]:
+        """Efficiencies printed by others."""
+        return published.PUBLISHED[1 if self.quick else 0 :][: 1 if self.quick else None]
 
     @cached_property
     def perfect(self) -> Comparison:

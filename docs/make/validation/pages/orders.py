@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 from .. import orders
+from ..published import Published
 from .markdown import percent, table
 from .measurements import Measurements
 
 
 def write(measured: Measurements) -> str:
     """Write the page."""
-    rows = []
-    for case in measured.solved_orders:
-        for theta, phi in measured.mounts:
-            model, solved = case.deviations(theta, phi)
-            values = (model.colours, solved.colours, model.sum, solved.sum)
-            rows.append([case.name, f"{theta}°, {phi}°", *map(percent, values)])
-    header = [
-        "table", "θ, φ", "colours, default", "colours, solved", "sum, default", "sum, solved",
-    ]  # fmt: skip
     facts = [
         [
             case.name,
@@ -28,24 +20,91 @@ def write(measured: Measurements) -> str:
         ]
         for case in measured.solved_orders
     ]
+    absorption = [
+        [case.name, *map(percent, case.absorption(measured.absorption_samples))]
+        for case in measured.solved_orders
+    ]
     return f"""# Solved orders
 
 The shipped tables of `diffraction_orders` and the default model, beside solutions that did not make
-the tables ([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` lie under polycarbonate.
+the tables ([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` are lamellar, and lie
+under polycarbonate.
 
-{table(header, rows)}
+{_deviations(measured)}
 
 θ and φ are the light's in air, φ from the direction across the grooves. Wavelengths are
 {", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. The deviation of *colours* is that of all
 orders but 0 that leave within 75°, as a share of their light ([validation.md](../validation.md)).
 *Sum* is the largest deviation of the sum over all orders, which is 1 less the absorption.
 
-The solver beside `cd` and `dvd` is coupled waves in layers, and beside `sinusoidal` Rayleigh's
-expansion. No independent solver here converges on sloped metal for both polarisations: beside
-`blazed` is the integral method at twice the points, which checks interpolation and convergence
-alone.
+The tables come from a boundary integral method. The solver beside `cd` and `dvd` is coupled waves
+in layers, and beside `blazed` and `sinusoidal` Chandezon's method, which uses coordinates that
+follow the grooves. Neither shares code or equations with the integral method.
 
-What is left is interpolation, most of it beside surface plasmons. The tables' own figures, measured
-at random directions and wavelengths:
+## Side by side
 
-{table(["table", "profile", "error, mean", "error, 95 %", "reciprocity"], facts)}"""
+Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpolarised light.
+
+{_side_by_side(measured)}
+
+## Absorption
+
+The share of light that no order has, beside the solver of the table itself, at random directions
+of diffuse light and wavelengths ({measured.absorption_samples} of them). *Bias* is the deviation of
+the mean, as a share of what is absorbed. The other deviations are shares of the incident light.
+
+{table(["table", "absorbed", "bias", "mean", "95 %", "largest"], absorption)}
+
+The largest lie beside surface plasmons, which are narrower than the distance of nodes.
+
+## Interpolation
+
+What is left is interpolation. The tables' own figures, measured at random directions and
+wavelengths:
+
+{table(["table", "profile", "error, mean", "error, 95 %", "reciprocity"], facts)}
+
+## Published efficiencies
+
+The solvers beside numbers that others printed. Their tolerance is that of the printed numbers:
+their digits, or the error of the method behind them.
+
+{_published(measured.published)}"""
+
+
+def _deviations(measured: Measurements) -> str:
+    rows = []
+    for case in measured.solved_orders:
+        for theta, phi in measured.mounts:
+            model, solved = case.deviations(theta, phi)
+            values = (model.colours, solved.colours, model.sum, solved.sum)
+            rows.append([case.name, f"{theta}°, {phi}°", *map(percent, values)])
+    header = [
+        "table", "θ, φ", "colours, default", "colours, solved", "sum, default", "sum, solved",
+    ]  # fmt: skip
+    return table(header, rows)
+
+
+def _side_by_side(measured: Measurements) -> str:
+    rows = []
+    for case in measured.solved_orders:
+        for theta, phi in measured.mounts:
+            for order in case.side_by_side(theta, phi):
+                number = f"{order.order}".replace("-", "−")
+                values = [f"{v:.4f}" for v in (order.model, order.table, order.truth)]
+                rows.append([case.name, f"{theta}°, {phi}°", number, *values])
+    return table(["table", "θ, φ", "order", "default", "solved", "truth"], rows)
+
+
+def _published(cases: tuple[Published, ...]) -> str:
+    parts = []
+    for case in cases:
+        solved = [(solver.name, case.solved(solver)) for solver in case.solvers()]
+        rows = [
+            [f"{m}, {name}".replace("-", "−"), f"{printed:g}"]
+            + [f"{values[m, name]:.5f}" for _, values in solved]
+            for (m, name), printed in case.printed.items()
+        ]
+        header = ["order", "printed", *(name for name, _ in solved)]
+        parts.append(f"{case.source}: {case.grating}.\n\n{table(header, rows)}")
+    return "\n\n".join(parts)

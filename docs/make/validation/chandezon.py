@@ -1,0 +1,213 @@
+"""Rigorous solutions of sloped gratings by Chandezon's method, in coordinates that follow them.
+
+The surface is r(u) = (X, Z), and points are r(u) + v d with a constant direction d. A vertical d is
+the method of Chandezon, Dupuis, Cornet and Maystre 1982 (J. Opt. Soc. Am. 72, 839); a tilted d also
+takes grooves with one vertical wall (Plumey, Guizal and Chandezon 1997, J. Opt. Soc. Am. A 14,
+610). Steps of u are short beside edges (Vallius 2002, J. Opt. Soc. Am. A 19, 1726).
+
+With r' = B d + J d⊥ and d⊥ across d, a field F(u) exp(iρv) of harmonics α in u obeys
+
+    (α − ρB) J⁻¹ (α − ρB) F = (k² − ρ²) J F,                                            (1)
+
+where B and J stand for their Toeplitz matrices. They multiply derivatives of the field along and
+across d, which are continuous in a medium, so that Laurent's rule holds (Li 1996, J. Opt. Soc. Am.
+A 13, 1870). In all mounts E and B along the grooves obey (1), with k across the grooves.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import toeplitz
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.solve.profiles import Profile
+from mitsuba_diffraction.solve.stations import Station
+
+Complex = NDArray[Any]
+Real = NDArray[np.float64]
+
+# Samples of a period, from which Fourier coefficients are taken
+_SAMPLES = 8192
+# Steps of u at edges over the even steps
+_AT_EDGES = 0.02
+# Sides must turn by less: d lies above all of them
+_WIDEST = np.radians(175.0)
+
+
+class Chandezon:
+    """Chandezon's method for one profile; a `solve.stations.Solver`.
+
+    Parameters
+    ----------
+    profile : one period of the grooves: smooth, or of few straight sides.
+    harmonics : spatial frequencies on either side of the middle one.
+
+    Raises
+    ------
+    DiffractionError
+        If grooves have vertical walls on both sides, or are undercut.
+    """
+
+    def __init__(self, profile: Profile, harmonics: int) -> None:
+        self.period, self.harmonics = profile.period, harmonics
+        x, z = profile.closed
+        angles = np.arctan2(np.diff(z), np.diff(x))
+        if np.ptp(angles) > _WIDEST:
+            raise DiffractionError(
+                f"{profile.name} has walls on both sides, which Chandezon's method cannot solve"
+            )
+        middle = 0.5 * (angles.min() + angles.max())
+        self._curve = curve = _smooth(x, z) if profile.corners == 0 else _with_edges(x, z)
+        #: J and B of the samples.
+        self._across = curve.slope_x * np.cos(middle) + curve.slope_z * np.sin(middle)
+        self._along = curve.slope_z * np.cos(middle) - curve.slope_x * np.sin(middle)
+
+    @property
+    def name(self) -> str:
+        """Name and settings."""
+        return f"Chandezon's method, {2 * self.harmonics + 1} harmonics"
+
+    def amplitudes(self, station: Station) -> Complex:
+        """Return the amplitudes between all channels; see `stations.Solver`.
+
+        Raises
+        ------
+        DiffractionError
+            If the material is a perfect conductor.
+        """
+        if station.indices is None:
+            raise DiffractionError("Chandezon's method needs a material with an index")
+        k = np.pi * station.extent / self.period
+        first = station.channels // 2 - self.harmonics
+        numbers = np.arange(first, first + 2 * self.harmonics + 1)
+        sines = 1.0 - 2.0 * (numbers + station.fraction) / station.extent
+        alpha = np.asarray(k * sines, np.float64)
+        places = np.arange(station.channels) - first
+        beta = np.sqrt(k**2 - alpha[places] ** 2)
+        down = self._plane_waves(alpha, places, -beta)
+        above = self._modes(alpha, k**2, 1.0)
+        pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
+        flux = np.sqrt(beta / beta[:, None])
+        results = []
+        for wavelength, index, y in pairs:
+            squared = (2.0 * np.pi / wavelength) ** 2 * (index**2 - y**2)
+            below = self._modes(alpha, squared, -1.0)
+            fields = _reflected(above, below, down, alpha * y, index**2, k**2 / squared)
+            results.append(flux[:, None, :, None] * fields)
+        return np.stack(results)
+
+    def _modes(self, alpha: Real, squared: complex, sign: float) -> _Waves:
+        """Return the modes of (1) of a medium of this k², upwards (sign 1) or downwards (−1).
+
+        Those that decay least approximate the waves that propagate, which are known and come last.
+        """
+        n = len(alpha)
+        across, along = (_toeplitz(values, n) for values in (self._across, self._along))
+        inverse = np.linalg.inv(across)
+        quadratic = along @ inverse @ along + across
+        linear = alpha[:, None] * (inverse @ along) + (along @ inverse) * alpha
+        constant = squared * across - alpha[:, None] * inverse * alpha
+        lower = np.linalg.solve(quadratic, np.hstack([constant, linear]))
+        rho, vectors = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
+        z = np.sqrt(squared - alpha**2 + 0j)
+        known = np.flatnonzero(z.imag == 0.0)
+        order = np.argsort(-sign * rho.imag)[: n - len(known)]
+        rho, field = rho[order], vectors[:n, order]
+        # derivative along d⊥, over i
+        beside = inverse @ (alpha[:, None] * field - rho * (along @ field))
+        waves = self._plane_waves(alpha, known, sign * z[known].real)
+        normal = 1j * (rho * (across @ field) - along @ beside)
+        return _Waves(np.hstack([field, waves.field]), np.hstack([normal, waves.normal]))
+
+    def _plane_waves(self, alpha: Real, places: NDArray[np.int64], beta: Real) -> _Waves:
+        """Return the waves exp(iαx + iβz) of some places on the surface."""
+        curve, columns = self._curve, []
+        for place, b in zip(places, beta, strict=True):
+            a = alpha[place]
+            wave = np.exp(1j * (a * (curve.x - curve.u) + b * curve.z))
+            normal = 1j * (b * curve.slope_x - a * curve.slope_z) * wave
+            frequencies = place - np.arange(len(alpha))
+            columns.append([_coefficients(values)[frequencies] for values in (wave, normal)])
+        shape = (len(places), 2, len(alpha))
+        return _Waves(*np.array(columns, complex).reshape(shape).transpose(1, 2, 0))
+
+
+class _Curve(NamedTuple):
+    """Samples of r(u) and r', lengths in µm."""
+
+    u: Real
+    x: Real
+    z: Real
+    slope_x: Real
+    slope_z: Real
+
+
+class _Waves(NamedTuple):
+    """Harmonics (n, waves) of fields on the surface, and of |r'| times the normal derivative."""
+
+    field: Complex
+    normal: Complex
+
+
+def _reflected(
+    above: _Waves, below: _Waves, down: _Waves, along: Real, epsilon: complex, ratio: complex
+) -> Complex:
+    """Return the fields (j, 2, q, 2) of the last waves above, in light of the waves `down`.
+
+    along : α y. ratio : k² above over that below.
+
+    Unknowns are E and B on the surface, along −y: that of light whose E is along d × y. Those
+    across the grooves are (ik₀y ∂_u E + ik₀ ∂_n B)/k² and (ik₀y ∂_u B − ik₀ε ∂_n E)/k².
+    """
+    upper = np.linalg.solve(above.field.T, above.normal.T).T
+    lower = ratio * np.linalg.solve(below.field.T, below.normal.T).T
+    turn = np.diag(-1j * along * (1.0 - ratio))
+    system = np.block([[turn, lower - upper], [upper - epsilon * lower, turn]])
+    source = down.normal - upper @ down.field
+    none, count = np.zeros_like(source), source.shape[1]
+    surface = np.linalg.solve(system, np.block([[none, source], [-source, none]]))
+    incident = np.block([[down.field, none], [none, down.field]])
+    e, b = np.split(surface - incident, 2)
+    waves = np.stack([np.linalg.solve(above.field, part)[-count:] for part in (e, b)], axis=1)
+    return np.asarray(waves.reshape(count, 2, 2, count).transpose(3, 2, 0, 1))
+
+
+def _smooth(x: Real, z: Real) -> _Curve:
+    """Return a profile without edges over even steps of x; slopes from its vertices."""
+    period = x[-1] - x[0]
+    u = x[0] + _places() * period
+    slope = np.interp(u, 0.5 * (x[1:] + x[:-1]), np.diff(z) / np.diff(x), period=period)
+    return _Curve(u, u, np.interp(u, x, z), np.ones_like(u), slope)
+
+
+def _with_edges(x: Real, z: Real) -> _Curve:
+    """Return a profile of straight sides; short ones have a larger share of u than of length."""
+    t, period = _places(), x[-1] - x[0]
+    shares = np.sqrt(np.hypot(np.diff(x), np.diff(z)))
+    ends = np.rint(np.append(0.0, np.cumsum(shares / shares.sum())) * _SAMPLES) / _SAMPLES
+    side = np.searchsorted(ends, t) - 1
+    width = np.diff(ends)[side]
+    place = 2.0 * np.pi * (t - ends[side]) / width
+    moved = (place - (1.0 - _AT_EDGES) * np.sin(place)) / (2.0 * np.pi)
+    rate = (1.0 - (1.0 - _AT_EDGES) * np.cos(place)) / (width * period)
+    dx, dz = np.diff(x)[side], np.diff(z)[side]
+    return _Curve(t * period, x[side] + moved * dx, z[side] + moved * dz, rate * dx, rate * dz)
+
+
+def _places() -> Real:
+    return np.asarray((np.arange(_SAMPLES) + 0.5) / _SAMPLES)
+
+
+def _coefficients(values: Complex) -> Complex:
+    """Return the means of f exp(−2πimu/d); m is the index, counted from the end below 0."""
+    m = np.fft.fftfreq(_SAMPLES, 1.0 / _SAMPLES)
+    return np.asarray(np.fft.fft(values) / _SAMPLES * np.exp(-1j * np.pi * m / _SAMPLES))
+
+
+def _toeplitz(values: Real, n: int) -> Complex:
+    """Return the matrix of a product with f; the numbers of channels rise towards −x."""
+    c = _coefficients(values)
+    return np.asarray(toeplitz(c[-np.arange(n)], c[:n]))

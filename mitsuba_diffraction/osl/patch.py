@@ -1,0 +1,197 @@
+"""Textures and constants of a diffraction table: powers of a patch's orders, densities of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError, warn
+from ..optics.blend import NODES_PER_OCTAVE
+from ..optics.fresnel import reflectance
+from ..tables.powers import order_0_power
+from ..tables.table import DiffractionTable
+
+#: Nodes of an interval of κ, Chebyshev's of the first kind on 0 to 1, in the channels of a pixel.
+NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+#: Phase (rad) of the highest over the deepest point that an interval of κ spans: a cosine of it is
+#: off by 0.003.
+_PHASE = 2.0
+#: Orders drawn in a sample, each of a wavelength.
+DRAWS = 8
+#: Bands of κ, each with a density to draw from, up to 3/4 of the largest as in `tables.sampling`.
+BANDS, BANDED = 4, 0.75
+#: Part of the density that is the mean over all κ, so that no order with power has none.
+_EVEN = 0.1
+#: Orders 0 over κ.
+ORDER_0_NODES = 256
+#: Width of the texture of draws, a power of 2: coordinates of its pixels are exact.
+DRAWS_WIDTH = 1024
+
+
+class PatchTextures(NamedTuple):
+    """Textures of a patch.
+
+    Attributes
+    ----------
+    powers : (intervals · ny, nx, 4) float16, |a_j|² times `scale` at four nodes of κ.
+    draws : (height, DRAWS_WIDTH, 4) float32, cells of alias tables, those of a band from a row of
+        its own on: threshold, the other order, and the orders' probabilities.
+    intervals, scale : of `powers`.
+    rows : rows of `draws` of a band.
+    order_0 : (ORDER_0_NODES,) |a_0|² at even steps from κ = 0 to the largest.
+    """
+
+    powers: NDArray[np.float16]
+    draws: NDArray[np.float32]
+    intervals: int
+    scale: float
+    rows: int
+    order_0: NDArray[np.float64]
+
+
+def check_patch(bsdf: Any) -> None:
+    """Refuse a BSDF of the plugin `diffraction` with features that the shader lacks."""
+    lacking = {
+        "coat_ior": bsdf.coat is not None,
+        "a thin film (film_ior)": type(bsdf.fresnel).__name__ == "UnderFilm",
+        "shadowing='vcavity'": bsdf.vcavity,
+        "layering='thesis'": hasattr(bsdf.layering, "weight"),
+        "speckle (coherence='patch' or 'surface')": bsdf.table.grid.coherent
+        or bsdf.window_positions is not None,
+        "a height_scale or lateral_scale that varies": bsdf.scale_range().varies,
+    }
+    for feature, present in lacking.items():
+        if present:
+            raise DiffractionError(
+                f"{feature} cannot be shown in OSL: export the surface without, or render it with "
+                "Mitsuba"
+            )
+    bsdf.table.require_whole("an export needs")
+    if bsdf.second_order_index is not None:
+        warn(
+            "the second order of small slope (second_order) is left out in OSL: colours in oblique "
+            "light differ by several per cent; gratings can be solved instead (docs/orders.md)"
+        )
+
+
+def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:
+    """Return the mean of 1 − R over diffuse light, 0 of what lets no light through."""
+    if index is None or np.any(np.imag(index) > 0.0):
+        return 0.0
+    cosine = np.sqrt((np.arange(64) + 0.5) / 64)
+    return float(np.mean(1.0 - reflectance(cosine, float(np.real(index[0])))))
+
+
+def patch_textures(table: DiffractionTable) -> PatchTextures:
+    """Resample the powers of all orders but order 0 over κ, and tabulate densities of them."""
+    largest = table.expansion.kappa_max
+    depth = 2.0 * table.expansion.half_range
+    intervals = max(1, math.ceil(largest * depth / _PHASE))
+    kappas = largest * (np.arange(intervals)[:, None] + NODES) / intervals
+    powers = np.stack([powers_at(table, kappa) for kappa in kappas.ravel()])
+    scale = 3e4 / max(float(powers.max()), 1e-30)
+    pixels = (powers * scale).reshape(intervals, 4, *powers.shape[1:])
+    pixels = pixels.transpose(0, 2, 3, 1).reshape(-1, powers.shape[2], 4).astype(np.float16)
+    flat = powers.reshape(len(powers), -1).astype(np.float64)
+    shares = flat / np.maximum(flat.sum(axis=1, keepdims=True), 1e-30)
+    distance = np.abs(kappas.ravel() / largest - BANDED * (np.arange(BANDS) + 0.5)[:, None] / BANDS)
+    near = np.maximum(1.0 - distance / (BANDED * 1.5 / BANDS), 0.0)
+    cells = -(-flat.shape[1] // DRAWS_WIDTH) * DRAWS_WIDTH
+    bands = np.zeros((BANDS, cells, 4), np.float32)
+    for n, weights in enumerate(near / near.sum(axis=1, keepdims=True)):
+        density = (1.0 - _EVEN) * (weights @ shares) + _EVEN * shares.mean(axis=0)
+        bands[n, : flat.shape[1]] = _alias(density / max(density.sum(), 1e-30))
+    order_0 = order_0_power(table, np.linspace(0.0, largest, ORDER_0_NODES))
+    draws = bands.reshape(-1, DRAWS_WIDTH, 4)
+    return PatchTextures(pixels, draws, intervals, scale, cells // DRAWS_WIDTH, order_0)
+
+
+def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
+    """Return |a_j(κ)|² of all orders but order 0, (ny, nx); kappa : rad/µm."""
+    interval = int(table.expansion.interval(kappa))
+    weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
+    parts = table.coefficients[interval].astype(np.float32) @ weights
+    if table.expansion.kind == "power":
+        return np.maximum(parts[..., 0], 0.0)
+    return np.asarray(np.sum(parts**2, axis=-1))
+
+
+def interpolated(textures: PatchTextures, largest: float, kappa: float) -> NDArray[np.float64]:
+    """Return the powers that the shader reads, (ny, nx); largest : κ of the table."""
+    place = np.clip(kappa / largest, 0.0, 1.0) * textures.intervals
+    interval = min(int(place), textures.intervals - 1)
+    rows = len(textures.powers) // textures.intervals
+    four = textures.powers[interval * rows : (interval + 1) * rows].astype(np.float64)
+    distance = place - interval - NODES
+    weights = [
+        np.prod(np.delete(distance, n)) / np.prod(NODES[n] - np.delete(NODES, n)) for n in range(4)
+    ]
+    return np.asarray(np.maximum(four @ weights, 0.0) / textures.scale)
+
+
+def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, float]:
+    """Return errors of the powers that the shader reads, summed over orders; shares of light."""
+    largest = table.expansion.kappa_max
+    errors = []
+    for kappa in largest * (np.arange(12) + 0.5) / 12:
+        exact = powers_at(table, float(kappa)).astype(np.float64)
+        errors.append(np.abs(interpolated(textures, largest, float(kappa)) - exact).sum())
+    return {"mean": float(np.mean(errors)), "worst κ": float(np.max(errors))}
+
+
+def patch_constants(
+    table: DiffractionTable, textures: PatchTextures, stretch: float
+) -> dict[str, float | int]:
+    """Return the constants of `shaders/patch.osl`; lengths in µm.
+
+    stretch : factor on lengths in the patch's plane.
+    """
+    rows, columns = table.grid.shape
+    roughness = table.roughness
+    return {
+        "DRAWS": DRAWS,
+        "ORDERS": rows * columns,
+        "COLUMNS": columns,
+        "ROWS": rows,
+        "LAST_X": table.grid.last[0],
+        "LAST_Y": table.grid.last[1],
+        "SPACING_X": table.spacing[0] / stretch,
+        "SPACING_Y": table.spacing[1] / stretch,
+        "KAPPA_MAX": table.expansion.kappa_max,
+        "INTERVALS": textures.intervals,
+        "SCALE": textures.scale,
+        "BANDS": BANDS,
+        "BANDED": BANDED,
+        "DRAWS_WIDTH": DRAWS_WIDTH,
+        "DRAWS_ROWS": textures.rows,
+        "FIRST_OCTAVE": roughness.first,
+        "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
+        "ROUGHNESS_NODES": len(roughness.nodes),
+        "ORDER_0_NODES": ORDER_0_NODES,
+        **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
+    }
+
+
+def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return an alias table (n, 4): threshold, other, probability of itself and of the other.
+
+    A cell drawn evenly keeps itself below the threshold, else it is the other (Vose 1991).
+    """
+    count = len(probabilities)
+    scaled = probabilities * count
+    threshold, other = np.ones(count), np.arange(count)
+    small = [int(n) for n in np.flatnonzero(scaled < 1.0)]
+    large = [int(n) for n in np.flatnonzero(scaled >= 1.0)]
+    left = scaled.tolist()
+    while small and large:
+        less, more = small.pop(), large[-1]
+        threshold[less], other[less] = left[less], more
+        left[more] -= 1.0 - left[less]
+        if left[more] < 1.0:
+            small.append(large.pop())
+    return np.stack(
+        [threshold, other, probabilities, probabilities[other]], axis=1, dtype=np.float32
+    )

@@ -1,0 +1,61 @@
+"""`export-osl` from the outside."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from mitsuba_diffraction import OrderTable
+from mitsuba_diffraction.cli import main
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    file = tmp_path / "my grating.nc"
+    OrderTable.mirror(1.6).save(file)
+    return file
+
+
+def test_shader_and_all_that_it_reads_are_written(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
+) -> None:
+    out, report = tmp_path / "blender" / "grating", tmp_path / "report.json"
+    command = ["export-osl", str(source), "-o", str(out), "--orientation", "90", "--json",
+               str(report)]  # fmt: skip
+    assert main(command) == 0
+    shader = out / "diffraction_my_grating.osl"
+    assert capsys.readouterr().out.startswith(f"{shader}: ")
+    document = json.loads(shader.with_suffix(".json").read_text(encoding="utf-8"))
+    rotation = next(item for item in document["inputs"] if item["identifier"] == "Rotation")
+    assert rotation["default"] == 90.0
+    for file in document["textures"].values():
+        pixels = OpenEXR.File(str(out / file)).channels()["RGBA"].pixels
+        assert np.isfinite(pixels).all()
+    assert (out / "blender_material.py").exists()
+    assert json.loads(report.read_text(encoding="utf-8"))["error"]["mean"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["missing.nc"], 1, "missing.nc"),
+        (["{source}", "-o", "{source}"], 1, "it is a file"),
+        (["{source}", "-o", "{source}/in"], 1, "cannot write"),
+        (["{source}", "--name", "1st"], 1, "name="),
+        (["{source}", "--material", "Al", "--int-ior", "1.5"], 2, "not allowed with"),
+    ],
+)
+def test_wrong_input_is_one_line_and_leaves_nothing(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str], options: list[str], code: int, words: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["export-osl", *(o.format(source=source) for o in options)]) == code
+    said = capsys.readouterr().err.strip().splitlines()
+    assert words in said[-1]
+    assert "Traceback" not in "".join(said)
+    assert list(tmp_path.iterdir()) == [source]

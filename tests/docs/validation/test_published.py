@@ -1,0 +1,70 @@
+"""Solvers beside printed efficiencies, and Chandezon's method beside the integral method."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from docs.make.validation.chandezon import Chandezon
+from docs.make.validation.published import PUBLISHED, light_of
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.solve.stations import reversed_light
+
+pytest.importorskip("gratinglab")
+
+CONICAL, SHALLOW, DEEP = PUBLISHED
+ALUMINIUM = 0.97 + 6.4j
+
+
+def misses(case, solver):
+    solved = case.solved(solver)
+    return max(abs(solved[key] - printed) for key, printed in case.printed.items())
+
+
+@pytest.mark.parametrize("case", [CONICAL, SHALLOW], ids=["conical", "shallow"])
+def test_the_integral_method_finds_printed_efficiencies(case):
+    assert misses(case, IntegralSolver(case.profile, case.points)) < case.tolerance
+
+
+def test_chandezon_s_method_finds_printed_efficiencies_in_a_conical_mount():
+    assert misses(CONICAL, Chandezon(CONICAL.profile, 15)) < CONICAL.tolerance
+
+
+def test_coupled_waves_find_printed_efficiencies_of_walls_of_metal():
+    # TM of 121 harmonics misses the exact value by 1.0e-3 in the table of Lalanne and Hugonin, too
+    for case in (SHALLOW, DEEP):
+        assert misses(case, CoupledWaves(case.profile, 60)) < 1.2e-3
+
+
+@pytest.mark.parametrize(
+    ("profile", "points", "tolerance"),
+    # the integral method nears Chandezon's as points⁻³
+    [(sinusoidal(0.9, 0.12), 150, 5e-4), (blazed(1.6667, 0.2939), 240, 4e-3)],
+    ids=["sinusoidal", "blazed"],
+)
+def test_chandezon_s_method_agrees_with_the_integral_method_in_conical_mounts(
+    profile, points, tolerance
+):
+    station = light_of(profile.period, 0.55, ALUMINIUM, 0.4, 0.5).station
+    amplitudes = Chandezon(profile, 15).amplitudes(station)
+    others = IntegralSolver(profile, points).amplitudes(station)
+    # phases and polarisations too
+    assert np.abs(amplitudes - others).max() < tolerance
+
+
+def test_chandezon_s_method_is_reciprocal():
+    profile = blazed(0.8, 0.1)
+    there, back = (
+        Chandezon(profile, 15).amplitudes(light_of(0.8, 0.5, 1.5, x, 0.3).station)
+        for x in (0.2, -0.2)
+    )
+    # exact but for truncation
+    assert np.allclose(np.abs(there), np.abs(reversed_light(back)), atol=1e-4)
+
+
+def test_walls_on_both_sides_are_refused():
+    with pytest.raises(DiffractionError, match="walls on both sides"):
+        Chandezon(lamellar(1.0, 0.1), 10)

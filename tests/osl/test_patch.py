@@ -1,0 +1,77 @@
+"""Textures of patches against the table, and surfaces that the shader lacks."""
+
+from __future__ import annotations
+
+import json
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.osl.patch import DRAWS_WIDTH, interpolated, patch_textures, powers_at
+from tests.support.patches import DEEP, DEFAULTS, PATCH
+
+TABLE = md.DiffractionTable.build(DEEP, **DEFAULTS)
+TEXTURES = patch_textures(TABLE)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.floats(0.0, 1.0))
+def test_powers_are_those_of_the_table(share):
+    kappa = share * TABLE.expansion.kappa_max
+    exact = powers_at(TABLE, kappa)
+    read = interpolated(TEXTURES, TABLE.expansion.kappa_max, kappa)
+    # a cubic over a phase of 2 rad is off by 0.003 where two heights differ by the whole depth
+    assert np.abs(read - exact).sum() < 0.003
+
+
+def test_draws_have_the_probabilities_that_weigh_them():
+    cells = TEXTURES.draws.reshape(-1, TEXTURES.rows * DRAWS_WIDTH, 4)
+    count = int(np.prod(TABLE.grid.shape))
+    for threshold, other, itself, alias in cells[:, :count].astype(float).transpose(0, 2, 1):
+        drawn = threshold / count + np.bincount(other.astype(int), (1 - threshold) / count, count)
+        # single precision
+        assert drawn == pytest.approx(itself, abs=2e-7)
+        assert np.array_equal(alias, itself[other.astype(int)])
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"coat_ior": 1.4}, {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
+        {"shadowing": "vcavity"},
+        {"pigment": {"type": "diffuse"}},
+        {"plugin": "diffraction_dielectric", "energy_conserving": False},
+    ],
+    ids=lambda value: next(iter(value)),
+)  # fmt: skip
+def test_surfaces_that_the_shader_lacks_are_refused(tmp_path, some_variant, parameters):
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, **parameters))
+    with pytest.raises(DiffractionError) as refused:
+        md.osl.export(bsdf, tmp_path / "out")
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=True))
+    with pytest.warns(md.DiffractionWarning, match="second_order"):
+        md.osl.export(bsdf, tmp_path)
+
+
+def test_other_plugins_are_refused(tmp_path, some_variant):
+    with pytest.raises(DiffractionError, match="diffraction"):
+        md.osl.export(mi.load_dict({"type": "diffuse"}), tmp_path)
+
+
+def test_patch_has_a_height_scale(tmp_path, some_variant):
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, height_scale=0.5, second_order=False))
+    exported = md.osl.export(bsdf, tmp_path, "skin")
+    document = json.loads(exported.document.read_text(encoding="utf-8"))
+    values = {item["identifier"]: item["default"] for item in document["inputs"]}
+    assert values["HeightScale"] == 0.5
+    assert set(document["textures"]) == {"PowersFile", "DrawsFile"}
