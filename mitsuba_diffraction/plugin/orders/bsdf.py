@@ -33,6 +33,10 @@ powers. RGB variants sum f over daylight. Polarised variants have the Mueller ma
 outside the table have the efficiencies of the nearest in it. f is reciprocal as far as the table
 is, at the centres of lobes.
 
+A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
+normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
+is the reflection, component 1 the transmission. It depolarises light.
+
 XML and the same in Python:
 
     <bsdf type="diffraction_orders">
