@@ -150,7 +150,7 @@ class DiffractionOrders(mi.BSDF):
     ) -> tuple[Spectrum, Float]:
         """See `Nesting.diffracted_both`."""
         pair = Pair(si, wo, self._frame(si, active), active)
-        light = self._lobes.reflected(pair, si, mode=ctx.mode)
+        light = self._lobes.reflected(pair, si, None, ctx)
         return light.value, light.density
 
     def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
