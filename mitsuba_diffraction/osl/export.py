@@ -187,6 +187,7 @@ def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
     table = bsdf.table
     textures = patch_textures(table)
     index = indices_of(bsdf.fresnel, drawn_spectrum().wavelengths)
+    assert index is None or isinstance(index, np.ndarray)  # a film is refused
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     arrays = {
         "Eta": np.real(parts),
