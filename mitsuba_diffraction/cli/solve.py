@@ -85,7 +85,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     group.add_argument(
         "--polarised", action="store_true", default=None,
-        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+        help="with Mueller matrices, for polarised variants; about 20 times as large",
     )  # fmt: skip
     group.add_argument(
         "--import", dest="imports", action="store_true",

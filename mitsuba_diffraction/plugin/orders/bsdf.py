@@ -247,5 +247,5 @@ def _warn_of_polarisation() -> None:
         _warned.append(True)
         warn(
             "a table of diffraction_orders has no Mueller matrices: in this polarised variant it "
-            "depolarises the light that it reflects; solve it again with --polarised"
+            "depolarises light; solve gratings with --polarised (thin sheets have none)"
         )

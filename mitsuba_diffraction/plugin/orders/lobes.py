@@ -182,11 +182,9 @@ class SpectralLobes(_Window):
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
         mean = density * (1.0 / len(wavelengths))
-        return Reflected(self.spectrum(pair, below, mode, lit), dr.detach(mean))
+        return Reflected(self.spectrum(pair, mode, lit), dr.detach(mean))
 
-    def spectrum(
-        self, pair: Pair, below: Mask | None, mode: mi.TransportMode, lit: list[Lit]
-    ) -> Spectrum:
+    def spectrum(self, pair: Pair, mode: mi.TransportMode, lit: list[Lit]) -> Spectrum:
         """Return f cosθo of all wavelengths, depolarised in polarised variants."""
         values = [light.value for light in lit]
         return mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(values)))

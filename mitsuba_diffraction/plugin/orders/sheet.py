@@ -91,7 +91,7 @@ def _requested(ctx: Context, passed: Mask) -> Mask:
     """Mask of the lanes whose component a context asks for; passed : whether light goes through."""
     reflection = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
     transmission = ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1)
-    return (passed & transmission) | (~passed & reflection)
+    return dr.select(passed, mi.Mask(transmission), mi.Mask(reflection))
 
 
 def diffraction_orders(props: Properties) -> DiffractionOrders:
