@@ -2,9 +2,9 @@
 
     python inside.py jobs.json
 
-jobs.json is a list of views with the picture to write, the samples, the seed and the working space.
-Pictures are linear sRGB. Filters, clamps, denoising and adaptive samples are off, so that pixels are means of
-radiance, as Mitsuba's. Imports nothing of the package: bpy alone.
+jobs.json is a list of views with the picture to write, the samples, the seed and the working
+space. Pictures are linear sRGB. Filters, clamps, denoising and adaptive samples are off, so that
+pixels are means of radiance, as Mitsuba's. Imports nothing of the package: bpy alone.
 """
 
 from __future__ import annotations
