@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..plugin.dictionary import ORDERS, PLUGINS
+from ..tables.orders import OrderTable
 from ..tables.orders.file import is_order_table
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
@@ -24,6 +26,7 @@ FITTED = "fitted_mesh"
 MATERIAL = "material:"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
+REFLECTING, TRANSMITTING = PLUGINS
 # With one of these the surface is opaque, and nothing lies beneath it.
 _CONDUCTORS = ("material", "eta", "k")
 
@@ -76,8 +79,8 @@ def _boolean(props: Any, name: str) -> bool:
 def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     """Put surfaces on the BSDFs or shapes of these ids.
 
-    A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor
-    or a table of orders replaces it.
+    A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor,
+    a table of orders, or a dielectric that light goes through (`thin`) replaces it.
 
     state : `mi.parser.ParserState`.
     materials : `FILE[,parameter=value…]` by id.
@@ -179,24 +182,25 @@ def _targets(node: Any) -> list[int]:
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
     """Return the properties of a BSDF for `FILE[,parameter=value…]`.
 
-    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders. In place of another
-    diffracting surface it keeps the orientation of that one.
+    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders, or
+    `diffraction_dielectric` if the parameter `thin` is set. In place of another diffracting surface
+    it keeps the orientation of that one.
     """
     file, *parameters = _COMMA.split(text)
-    solved = is_order_table(file)
-    props = mi.Properties("diffraction_orders" if solved else "diffraction")
+    pairs = [parameter.partition("=")[::2] for parameter in parameters]
+    values = {name.strip(): _value(value.strip()) for name, value in pairs}
+    names, solved = list(values), is_order_table(file)
+    plugin = TRANSMITTING if "thin" in names else REFLECTING
+    props = mi.Properties(ORDERS if solved else plugin)
     props["table" if solved else "heightfield"] = str(Path(file).absolute())
-    names = []
-    for parameter in parameters:
-        name, _, value = parameter.partition("=")
-        name = name.strip()
-        names.append(name)
-        props[name] = _value(value.strip())
+    for name, value in values.items():
+        props[name] = value
     if beneath is not None and "orientation" not in names:
         old = state.nodes[beneath].props
         if old.plugin_name().startswith("diffraction") and "orientation" in old:
             props["orientation"] = old["orientation"]
-    if beneath is not None and not solved and not set(names) & set(_CONDUCTORS):
+    opaque = solved or plugin == TRANSMITTING or set(names) & set(_CONDUCTORS)
+    if beneath is not None and not opaque:
         props["beneath"] = mi.Properties.ResolvedReference(beneath)
     return props
 
@@ -212,6 +216,10 @@ def _value(text: str) -> float | bool | str:
 
 
 def _two_sided(state: Any, surface: Any) -> Any:
+    """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
+    name = surface.plugin_name()
+    if name == TRANSMITTING or (name == ORDERS and OrderTable.load(surface["table"]).thin):
+        return surface
     props = mi.Properties("twosided")
     props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))
     return props

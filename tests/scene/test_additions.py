@@ -75,3 +75,19 @@ def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
     assert "DiffractionOrders[" in text
     assert "orientation = 30" in text
     assert "Diffraction[" not in text
+
+
+@pytest.mark.parametrize("thin", [True, False], ids=["table", "heights"])
+def test_light_goes_through_a_sheet_that_replaces_a_material(surface, thin):
+    thin_grating(0.6, counts=(2, 2, 1), thin=True).save(surface / "sheet.nc")
+    scene = (
+        '<scene version="3.0.0"><bsdf type="diffuse" id="pane"/>'
+        '<shape type="disk"><ref id="pane"/></shape></scene>'
+    )
+    (surface / "scene.xml").write_text(scene)
+    settings = "pixel_size=0.08,coherence_width=4,energy_conserving=false,thin=true,int_ior=1.5"
+    text = surface / "sheet.nc" if thin else f"{surface / 'grating.npy'},{settings}"
+    loaded = load_scene(surface / "scene.xml", {"material:pane": str(text)})
+    flags = loaded.shapes()[0].bsdf().flags()
+    assert mi.has_flag(flags, mi.BSDFFlags.Transmission)
+    assert not mi.has_flag(flags, mi.BSDFFlags.Diffuse)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +132,21 @@ def on_all_sides(wi: Array, wo: Array) -> tuple[Array, Array]:
     wi[:, 2] *= np.where(n % 2, -1.0, 1.0)
     wo[:, 2] *= np.where(n // 2 % 2, -1.0, 1.0)
     return wi, wo
+
+
+def reference_on_all_sides(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+    """The reference of a thin sheet, times |cosθo|, for directions above or below."""
+    values, up = np.zeros(len(wi)), np.array([1.0, 1.0, -1.0])
+    for from_below, transmitted in itertools.product((False, True), (False, True)):
+        here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
+        efficiency = functools.partial(
+            table.efficiency, from_below=from_below, transmitted=transmitted
+        )
+        came = wi[here] * up if from_below else wi[here]
+        left = wo[here] * up if from_below != transmitted else wo[here]
+        lam = wavelength[here]
+        values[here] = md.reference.orders_brdf(efficiency, table.period, came, left, lam)
+    return values * np.abs(wo[:, 2])
 
 
 def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:

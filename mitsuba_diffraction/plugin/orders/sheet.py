@@ -59,7 +59,7 @@ class OrdersSheet(DiffractionOrders):
         below = mi.Mask(wo.z < 0.0)
         above = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
         pair = Pair(si, above, self._frame(si, lit), lit)
-        light = self._lobes.reflected(pair, si, below, ctx.mode)
+        light = self._lobes.reflected(pair, si, below, ctx)
         return dr.select(lit, light.value, 0.0), dr.select(lit, light.density, 0.0)
 
     def sample(
@@ -91,7 +91,7 @@ def _requested(ctx: Context, passed: Mask) -> Mask:
     """Mask of the lanes whose component a context asks for; passed : whether light goes through."""
     reflection = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
     transmission = ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1)
-    return (passed & transmission) | (~passed & reflection)
+    return dr.select(passed, mi.Mask(transmission), mi.Mask(reflection))
 
 
 def diffraction_orders(props: Properties) -> DiffractionOrders:

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, reference
-from tests.support.orders import PERIOD, lit_pairs, load, on_all_sides, thin_grating
+from mitsuba_diffraction import DiffractionError
+from tests.support.orders import (
+    lit_pairs,
+    load,
+    on_all_sides,
+    reference_on_all_sides,
+    thin_grating,
+)
 from tests.support.variants import evaluate
 
 SHEET = thin_grating(thin=True)
-
-
-def expected_values(table, wi, wo, wavelength):
-    """The reference of light on any side, times |cosθo|."""
-    values = np.zeros(len(wi))
-    up = np.array([1.0, 1.0, -1.0])
-    for from_below, transmitted in itertools.product((False, True), (False, True)):
-        here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
-        efficiency = functools.partial(
-            table.efficiency, from_below=from_below, transmitted=transmitted
-        )
-        above = wi[here] * up if from_below else wi[here]
-        left = wo[here] * up if from_below != transmitted else wo[here]
-        values[here] = reference.orders_brdf(efficiency, PERIOD, above, left, wavelength[here])
-    return values * np.abs(wo[:, 2])
 
 
 def test_values_are_the_references_on_both_sides_and_weights_are_one(some_variant):
@@ -38,7 +28,7 @@ def test_values_are_the_references_on_both_sides_and_weights_are_one(some_varian
     values, pdf, again, pdf_again, drawn, _, weights = evaluate(
         load(SHEET), wi, wo, samples, wavelength
     )
-    expected = expected_values(SHEET, wi, wo, wavelength[:, 0])
+    expected = reference_on_all_sides(SHEET, wi, wo, wavelength[:, 0])
     # linear interpolation between the corners of cells
     assert np.abs(values[:, 0] - expected).sum() <= 1e-3 * expected.sum()
     assert np.array_equal(values, again)
