@@ -1,0 +1,180 @@
+"""Tables and pictures of docs/blender.md: Cycles beside Mitsuba, noise, and the example .blend.
+
+python -m docs.make.figures.blender [-o docs] [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+from PIL import Image
+
+import mitsuba_diffraction as md
+from docs.make.blender.compare import Comparison, compare
+from docs.make.blender.program import run_in_blender, seconds
+from docs.make.blender.views import LIGHTS, Surface, View
+from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.errors import DiffractionError
+
+from . import pages
+
+#: Folder of exported surfaces, kept for the next run.
+_FOLDER = Path("out/blender")
+_SHOWCASE = Path(__file__).parents[1] / "blender/showcase.py"
+_SPACES = ("Linear Rec.2020", "Linear Rec.709")
+_MOST = 100_000  # bytes of a picture
+_PIGMENT = [0.1, 0.05, 0.02]
+
+
+@dataclass(frozen=True)
+class Example:
+    """A surface that is compared.
+
+    Attributes
+    ----------
+    source : of the export, under the project.
+    shape : that shows it.
+    turn, tangent : of the material in Blender, for the same direction as in Mitsuba.
+    """
+
+    source: str
+    shape: str
+    turn: float = 0.0
+    tangent: str = "uv"
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the export."""
+        return _FOLDER / Path(self.source).stem
+
+    def export(self) -> None:
+        """Export the surface unless it is there."""
+        if not list(self.folder.glob("*.osl")):
+            words = ["export-osl", self.source, "-o", str(self.folder)]
+            if program(words) != 0:
+                raise DiffractionError(f"'{' '.join(words)}' failed; see above")
+
+    def surface(self) -> Surface:
+        """Return the material of both renderers."""
+        inputs: dict[str, object] = {"Rotation (°)": self.turn}
+        cycles = {"folder": str(self.folder.resolve()), "tangent": self.tangent, "inputs": inputs}
+        if self.source.endswith(".nc"):
+            table = md.OrderTable.load(self.source)
+            return Surface(md.bsdf_dict(table, orientation=self.angle), cycles)
+        inputs["Pigment"] = _PIGMENT
+        pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": _PIGMENT}}
+        patch = str(Path(self.source).resolve())
+        return Surface({"type": "diffraction", "heightfield": patch, "nested": pigment}, cycles)
+
+    @property
+    def angle(self) -> float:
+        """Orientation in Mitsuba, whose disk has its tangent along the radius."""
+        return 0.0 if self.tangent != "uv" else self.turn
+
+
+EXAMPLES = {
+    "disc": Example("precompute/orders/cd.nc", "disk", -90.0, "radial-z"),
+    "grating": Example("precompute/orders/blazed.nc", "rectangle", 90.0),
+    "scale": Example("precompute/elaphe_like.toml", "sphere"),
+}
+#: Surface of the ball in the middle of the example .blend.
+FOIL = Example("precompute/orders/sinusoidal.nc", "sphere")
+_HEADER = ("surface", "light", "ΔE2000 beyond noise", "in Linear Rec.709", "noise")
+_NOISE = ("surface", "light", "16 samples", "64", "256", "seconds for 480 × 320 at 256")
+
+
+def differences(samples: tuple[int, int], folder: Path) -> tuple[str, list[Comparison]]:
+    """Return the table of differences, and the comparisons in the first working space.
+
+    samples : of Mitsuba and of Cycles.
+    """
+    keys = [(name, light) for name in EXAMPLES for light in LIGHTS]
+    surfaces = {name: example.surface() for name, example in EXAMPLES.items()}
+    views = [View(EXAMPLES[name].shape, light, surfaces[name], 48, 32) for name, light in keys]
+    by_space = [
+        compare(views, folder, mitsuba_samples=samples[0], cycles_samples=samples[1],
+                working_space=space)
+        for space in _SPACES
+    ]  # fmt: skip
+    rows = [
+        (
+            name,
+            light,
+            f"{first.beyond_noise:.1f}",
+            f"{second.beyond_noise:.1f}",
+            f"{first.noise:.1f}",
+        )
+        for (name, light), first, second in zip(keys, *by_space, strict=True)
+    ]
+    return pages.table(_HEADER, rows), by_space[0]
+
+
+def noise(folder: Path) -> str:
+    """Return the table of noise over samples, with the time of a picture on one core."""
+    rows = []
+    for name, example in EXAMPLES.items():
+        for light in LIGHTS:
+            view = View(example.shape, light, example.surface(), 96, 64)
+            cells, times = [], []
+            for count in (16, 64, 256):
+                small = replace(view, width=48, height=32) if count == 256 else view
+                found = compare([small], folder, mitsuba_samples=256, cycles_samples=count)[0]
+                cells.append(f"{found.noise_of_cycles:.1f}")
+                times.append(found.seconds.processor / (small.width * small.height * count))
+            # without the time to build the scene, which small pictures show most
+            rows.append((name, light, *cells, f"{min(times) * 480 * 320 * 256:.0f}"))
+    return pages.table(_NOISE, rows)
+
+
+def side_by_side(compared: Sequence[Comparison], target: Path) -> None:
+    """Write pictures of Mitsuba (above) and of Cycles (below), each pair at its own exposure."""
+    columns = []
+    for comparison in compared:
+        both = np.concatenate([comparison.mitsuba, comparison.cycles])
+        shown = np.clip(both / np.percentile(both.mean(axis=-1), 97.0), 0.0, 1.0)
+        columns.append(
+            np.where(shown < 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
+        )
+    image = Image.fromarray((255.0 * np.concatenate(columns, axis=1) + 0.5).astype(np.uint8))
+    file = _FOLDER / "side_by_side.png"
+    image.resize((4 * image.width, 4 * image.height), Image.Resampling.NEAREST).save(file)
+    pages.write_jpeg(file, target, width=1152, most=_MOST)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Compare, render, write the pictures and the page, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.blender")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
+    parser.add_argument("--quick", action="store_true", help="small and noisy")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        mi.set_variant("llvm_ad_rgb")
+        _FOLDER.mkdir(parents=True, exist_ok=True)
+        for example in (*EXAMPLES.values(), FOIL):
+            example.export()
+        table, compared = differences((512, 64) if args.quick else (8192, 1024), _FOLDER)
+        images = args.output / "images/blender"
+        images.mkdir(parents=True, exist_ok=True)
+        side_by_side(compared, images / "comparison.jpg")
+        pages.update(args.output / "blender.md", {"differences": table, "noise": noise(_FOLDER)})
+        surfaces = [EXAMPLES["disc"], FOIL, EXAMPLES["scale"]]
+        picture = _FOLDER / "showcase.png"
+        words = [*(str(example.folder) for example in surfaces), "--output",
+                 str(_FOLDER / "showcase.blend"), "--picture", str(picture),
+                 "--samples", "16" if args.quick else "256"]  # fmt: skip
+        time = seconds(run_in_blender(_SHOWCASE, words))[0]
+        print(f"{picture}: {time.clock:.0f} s, {time.processor:.0f} s of processor")
+        pages.write_jpeg(picture, images / "showcase.jpg", most=_MOST)
+
+    return pages.exit_code("blender", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
