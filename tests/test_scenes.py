@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights.recipes import Recipe
-from mitsuba_diffraction.scene.parameters import parameters_of
+from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
+from mitsuba_diffraction.tables.orders.file import is_order_table
 from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 
 # the look-alikes are as steep as the real scales, which the package says every time
@@ -15,12 +17,9 @@ pytestmark = [
     pytest.mark.usefixtures("coarse"),
 ]
 
+SOLVED = ("cd", "cd_window", "grating", "grating_window", "orders_on_wall")
 LARGE = ("sphere", "snake", "xenopeltis")
 STUDIO = (
-    "cd",
-    "cd_window",
-    "grating",
-    "grating_window",
     "hologram",
     "material_ball",
     "own_mesh",
@@ -56,6 +55,19 @@ def test_its_patch_is_a_recipe(name: str) -> None:
     assert Recipe.load(SCENES / str(defaults["patch"])).generator
     advised = {"level", "periodic", "coherence_width"}  # by messages on heights
     assert {"spp", "resx", "resy", "patch", "pixel_size", "max_height", *advised} <= set(defaults)
+
+
+@pytest.mark.parametrize("name", SOLVED)
+def test_its_table_has_solved_orders(name: str) -> None:
+    defaults = parameters_of(SCENES / f"{name}.xml")
+    assert defaults is not None
+    assert is_order_table(SCENES / str(defaults["table"]))
+    assert {"spp", "resx", "resy", "table", "coherence_width"} <= set(defaults)
+
+
+def test_heights_for_a_scene_of_solved_orders_have_a_way() -> None:
+    with pytest.raises(DiffractionError, match="--material ID=FILE"):
+        check_parameters(SCENES / "cd.xml", {"patch": "scan.png"})
 
 
 @pytest.mark.usefixtures("variant")

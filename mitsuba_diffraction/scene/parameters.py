@@ -49,6 +49,8 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
             option = f"--{name.replace('_', '-')} {values[name]}"
             hint = f"; or run 'mitsuba-diffraction precompute FILE {option} -o TABLE.exr' first, "
             hint += "and give -D patch=TABLE.exr"
+        elif name == "patch":
+            hint = "; put heights on the id of a BSDF or shape: --material ID=FILE,material=Al"
         raise DiffractionError(
             f"-D {name}: '{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
         )

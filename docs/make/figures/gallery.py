@@ -98,8 +98,9 @@ PICTURES = (
     ),
     _scene(
         "cd", "A compact disc under a lamp",
-        "Colours appear where the tracks run across the plane of lamp and camera. `--denoise` "
-        "writes the picture without grain, shown here, beside the noisy one.",
+        "Colours appear where the tracks run across the plane of lamp and camera. The tracks have "
+        "[solved orders](orders.md). `--denoise` writes the picture without grain, shown here, "
+        "beside the noisy one.",
         "--denoise",
     ),
     _scene(
@@ -108,8 +109,8 @@ PICTURES = (
     ),
     _scene(
         "grating", "A blazed grating under a lamp",
-        "400 lines a millimetre; the first order is the lamp's spectrum, the second begins above "
-        "it.",
+        "600 lines a millimetre, with [solved orders](orders.md): the first is the lamp's "
+        "spectrum.",
     ),
     _scene(
         "grating_window", "The grating under a window",
@@ -124,6 +125,11 @@ PICTURES = (
         "film", "A diffraction film before lamps",
         "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
         "between its spectra.",
+    ),
+    _scene(
+        "orders_on_wall", "Orders on a wall",
+        "The same grating before a wall, in a narrow beam. [A file of efficiencies]"
+        "(orders.md#efficiencies-from-another-program-or-measured) takes its place by one option.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",

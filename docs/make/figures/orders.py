@@ -1,6 +1,6 @@
 """Pictures of solved orders beside those of the model, and their difference: docs/orders.md.
 
-python -m docs.make.figures.orders [--quick]
+python -m docs.make.figures.orders [--quick] [--only cd]
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import matplotlib.pyplot as plt
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -22,6 +25,8 @@ from PIL import Image
 from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
+from mitsuba_diffraction.optics.display import natural
+from mitsuba_diffraction.scene.load import load_scene, set_variant
 from mitsuba_diffraction.scene.pictures import read_exr
 
 from . import pages
@@ -30,25 +35,35 @@ from .pages import exit_code, write_jpeg
 #: Largest size of a picture, bytes.
 _MOST = 150_000
 #: Side of the blocks that are compared, pixels.
-_BLOCK = 5
+_BLOCK = 6
+#: ΔE2000 at the end of the colour bar.
+_END = 20.0
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene, rendered with the model and with a table.
+    """A scene, rendered with its table of orders and with the model.
 
     Attributes
     ----------
+    name : of the scene's file and of the picture.
     title : heading of the row.
-    file, surface, table : scene, id of its BSDF, and the table of orders, under the project.
+    surface : id of the BSDF of the grating.
+    shape : id of the shape on which colours are compared.
     recipe : of heights with the table's profile, for the model.
+    parameters : of the BSDF with the model.
+    flags : size and samples.
+    difference : what a viewer sees.
     """
 
+    name: str
     title: str
-    file: str
     surface: str
-    table: str
+    shape: str
     recipe: str
+    parameters: str
+    flags: tuple[str, ...]
+    difference: str
 
 
 _RECIPE = """generator = "{}"
@@ -57,31 +72,42 @@ output = "model.exr"
 
 [arguments]
 """
+_BLAZED = _RECIPE.format("blazed") + "period = 1.6667\ndepth = 0.2939\npixels_per_period = 60\n"
 SCENES = (
     Scene(
-        "CD", "scenes/cd.xml", "tracks", "precompute/orders/cd.nc",
+        "cd", "CD", "tracks", "data",
         _RECIPE.format("lamellar") + "period = 1.6\ndepth = 0.12\npixels_per_period = 64\n",
+        "material=Al,coat_ior=1.58", ("resx=450", "resy=330", "spp=128"),
+        "Order 2, the green and violet fan behind the hole, is missing in the model, whose "
+        "grooves, half as wide as their period, have no even orders. In the light of the "
+        "surroundings the solved disc is grey, where the model is blue in front and behind.",
     ),
     Scene(
-        "blazed grating, 600 lines/mm, Al", "scenes/grating.xml", "rulings",
-        "precompute/orders/blazed.nc",
-        _RECIPE.format("blazed") + "period = 1.6667\ndepth = 0.2939\npixels_per_period = 60\n",
+        "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
+        "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=256"),
+        "Order 1 has the same hues at the same places, for these follow from the grating equation. "
+        "Its brightness differs.",
+    ),
+    Scene(
+        "orders_on_wall", "the same grating before a wall", "rulings", "wall", _BLAZED,
+        "material=Al", ("resx=450", "resy=210", "spp=512"),
+        "The model gives other shares of the light to the orders on the left, which the blaze "
+        "makes weak.",
     ),
 )  # fmt: skip
-_INTRODUCTION = (
-    "Left: the model of `diffraction`. Right: solved orders of the same profile, in the same "
-    "light. Ridges half as wide as the period have no second order in the model."
-)
 _HOW = (
-    "`python -m docs.make.figures.orders` makes the pictures and the table, of blocks of 5 pixels "
-    "whose light differs by more than 2 %."
+    "ΔE2000 is that of blocks of {} pixels on the disc, grating or wall, as a display shows them, "
+    "with the noise of both pictures in it. `python -m docs.make.figures.orders` makes pictures "
+    "and table."
 )
-_HEADER = ("scene", "mean ΔE2000", "95th percentile", "seconds, model", "seconds, solved")
+_HEADER = (
+    "scene", "mean ΔE2000", "95th percentile", "processor time, solved / model",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """Linear sRGB (ny, nx, 3) of blocks of pixels, the file for a display, and the time, s."""
+    """Linear sRGB (ny, nx, 3) of blocks of pixels, file for a display, and processor time, s."""
 
     pixels: NDArray[np.float32]
     display: Path
@@ -90,58 +116,80 @@ class Rendered:
 
 def row(scene: Scene, output: Path, folder: Path, flags: Sequence[str]) -> tuple[str, ...]:
     """Render both, write the picture, and return the row of the table."""
-    recipe = folder / "recipe.toml"
+    recipe = folder / f"{scene.name}.toml"
     recipe.write_text(scene.recipe, encoding="utf-8")
-    material = ["--material", f"{scene.surface}={scene.table}"]
-    name = Path(scene.file).stem
-    model = _render(scene, folder / f"{name}_model.exr", ["-D", f"patch={recipe}", *flags])
-    solved = _render(scene, folder / f"{name}_solved.exr", [*material, *flags])
-    _side_by_side(model, solved, output / f"{name}.jpg")
-    difference = delta_e(solved.pixels, model.pixels)
-    changed = difference[np.isfinite(difference) & _diffracts(model, solved)]
+    material = f"{scene.surface}={recipe},{scene.parameters}"
+    options = [word for flag in flags for word in ("-D", flag)]
+    model = _render(scene, folder / "model.exr", [*options, "--material", material])
+    solved = _render(scene, folder / "solved.exr", options)
+    difference = delta_e(natural(solved.pixels), natural(model.pixels), exposure=1.0, least=0.0)
+    _show(model, solved, difference, output / f"{scene.name}.jpg")
+    changed = difference[_is_on(scene, flags)]
     return (
         scene.title,
         f"{changed.mean():.1f}",
         f"{np.percentile(changed, 95):.1f}",
-        f"{model.seconds:.0f}",
-        f"{solved.seconds:.0f}",
+        f"{solved.seconds / model.seconds:.2f}",
     )
 
 
-def _blocks(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+def _blocks(pixels: NDArray[Any]) -> NDArray[np.float32]:
     """Return means over blocks of pixels, in which noise is below the differences."""
     rows, columns = (size // _BLOCK for size in pixels.shape[:2])
-    cut = pixels[: rows * _BLOCK, : columns * _BLOCK, :3]
-    return cut.reshape(rows, _BLOCK, columns, _BLOCK, 3).mean(axis=(1, 3))
+    cut = np.asarray(pixels, np.float32)[: rows * _BLOCK, : columns * _BLOCK]
+    return cut.reshape(rows, _BLOCK, columns, _BLOCK, -1).mean(axis=(1, 3))
 
 
-def _diffracts(model: Rendered, solved: Rendered) -> NDArray[np.bool_]:
-    """Mask of the blocks whose light differs by more than their noise: those of the grating."""
-    both = 0.5 * (model.pixels + solved.pixels).sum(axis=-1)
-    apart = np.abs(model.pixels - solved.pixels).sum(axis=-1)
-    return np.asarray(apart > 0.02 * both)
+def _is_on(scene: Scene, flags: Sequence[str]) -> NDArray[np.bool_]:
+    """Mask of the blocks whose corners the camera sees on the shape."""
+    set_variant(None)
+    loaded = load_scene(_file(scene), dict(flag.split("=", 1) for flag in flags))
+    sensor = loaded.sensors()[0]
+    width, height = sensor.film().size()
+    x, y = np.meshgrid(np.arange(0, width + 1, _BLOCK), np.arange(0, height + 1, _BLOCK))
+    place = mi.Point2f(x.ravel() / width, y.ravel() / height)
+    ray, _ = sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
+    (shape,) = (shape for shape in loaded.shapes() if shape.id() == scene.shape)
+    on = np.array(loaded.ray_intersect(ray).shape == mi.ShapePtr(shape)).reshape(x.shape)
+    return np.asarray(on[1:, 1:] & on[1:, :-1] & on[:-1, 1:] & on[:-1, :-1])
 
 
-def _render(scene: Scene, output: Path, flags: Sequence[str]) -> Rendered:
-    words = ["render", scene.file, "-o", str(output), *flags]
-    for _ in range(2):  # the second is without the time to compile
-        start = time.perf_counter()
+def _file(scene: Scene) -> Path:
+    return Path("scenes") / f"{scene.name}.xml"
+
+
+def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
+    words = ["render", str(_file(scene)), "-o", str(output), *options]
+    seconds = 0.0
+    for few in (["-s", "1"], []):  # the first compiles, and builds tables
+        start = time.process_time()
         with contextlib.redirect_stdout(io.StringIO()):
-            if program(words) != 0:
+            if program([*words, *few]) != 0:
                 raise DiffractionError(f"'{' '.join(words)}' failed; see above")
-        seconds = time.perf_counter() - start
-    return Rendered(_blocks(np.array(read_exr(output))), output.with_suffix(".png"), seconds)
+        seconds = time.process_time() - start
+    pixels = _blocks(np.array(read_exr(output))[..., :3])
+    return Rendered(pixels, output.with_suffix(".png"), seconds)
 
 
-def _side_by_side(model: Rendered, solved: Rendered, target: Path) -> None:
-    with Image.open(model.display) as left, Image.open(solved.display) as right:
-        joined = Image.new("RGB", (left.width + right.width + 8, left.height), "white")
-        joined.paste(left.convert("RGB"), (0, 0))
-        joined.paste(right.convert("RGB"), (left.width + 8, 0))
+def _show(model: Rendered, solved: Rendered, difference: NDArray[np.float32], target: Path) -> None:
+    """Write both pictures and a map of their difference side by side."""
     target.parent.mkdir(parents=True, exist_ok=True)
+    with Image.open(model.display) as picture:
+        height = 4.6 * picture.height / picture.width + 0.35
+    fig, axes = plt.subplots(1, 3, figsize=(14.4, height), dpi=100, layout="constrained")
+    for ax, title, rendered in zip(axes, ("model", "solved"), (model, solved), strict=False):
+        with Image.open(rendered.display) as picture:
+            ax.imshow(np.asarray(picture.convert("RGB")))
+        ax.set_title(title)
+    drawn = axes[2].imshow(difference, cmap="magma", vmin=0.0, vmax=_END)
+    axes[2].set_title("difference")
+    fig.colorbar(drawn, ax=axes[2], label="ΔE2000", extend="max")
+    for ax in axes:
+        ax.axis("off")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "joined.png"
-        joined.save(file)
+        fig.savefig(file)
+        plt.close(fig)
         write_jpeg(file, target, most=_MOST)
 
 
@@ -150,21 +198,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.orders")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
     parser.add_argument("--quick", action="store_true", help="small and noisy")
+    parser.add_argument(
+        "--only", choices=[scene.name for scene in SCENES], help="one picture, and not the page"
+    )
     args = parser.parse_args(argv)
-    small = ["-D", "resx=300", "-D", "resy=220"]
-    flags = [*small, "-D", "spp=64"] if args.quick else ["-D", "spp=96"]
+    images = args.output / "images/orders"
 
     def work() -> None:
+        rows, shown = [], []
         with tempfile.TemporaryDirectory() as folder:
-            images_folder = args.output / "images/orders"
-            rows = [row(scene, images_folder, Path(folder), flags) for scene in SCENES]
-        shown = [
-            f"![{scene.title}: the model, and solved orders](images/orders/{name}.jpg)"
-            for scene in SCENES
-            for name in [Path(scene.file).stem]
-        ]
-        page = "\n\n".join([_INTRODUCTION, *shown, pages.table(_HEADER, rows), _HOW])
-        pages.update(args.output / "orders.md", {"orders": page})
+            for scene in SCENES:
+                if args.only in (None, scene.name):
+                    flags = ("resx=90", "resy=70", "spp=8") if args.quick else scene.flags
+                    rows.append(row(scene, images, Path(folder), flags))
+                    print("  ".join(rows[-1]), flush=True)
+                title = scene.title[0].upper() + scene.title[1:]
+                shown.append(f"![{title}: model, solved orders, difference]"
+                             f"(images/orders/{scene.name}.jpg)")  # fmt: skip
+                shown.append(f"{title}. {scene.difference}")
+        if args.only is None:
+            page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
+            pages.update(args.output / "orders.md", {"orders": page})
 
     return exit_code("orders", work)
 
