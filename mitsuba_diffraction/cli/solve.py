@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..system import cores
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -221,7 +222,9 @@ def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
         return
     from ..solve.jobs import processes
 
-    jobs = args.jobs or 1
+    jobs, most = args.jobs or 1, 4 * cores()
+    if jobs > most:
+        args.parser.error(f"argument --jobs: expected 1 to {most}, 4 for each core, got {jobs}")
     with processes(jobs) as pool:
         yield pool, jobs
 

@@ -24,7 +24,7 @@ from ..directions import Pair
 from ..fresnel import amplitudes, squared
 from ..layers import refracted, transmittances
 from ..memory import read, read_record, upload
-from ..types import Float, Mask, Spectrum, Vector3f
+from ..types import Context, Float, Mask, Spectrum, Vector3f
 from .lobes import Lit, SpectralLobes
 from .lookup import OrderLookup, Row
 
@@ -81,10 +81,10 @@ class PolarisedLobes(SpectralLobes):
     lookup_kind = PolarisedLookup
     lookup: PolarisedLookup
 
-    def spectrum(self, pair: Pair, mode: mi.TransportMode, lit: list[Lit]) -> Spectrum:
+    def spectrum(self, pair: Pair, ctx: Context, lit: list[Lit]) -> Spectrum:
         """See `SpectralLobes.spectrum`."""
         index = self.lookup.index
-        path, y = _Path(pair, mode, index), pair.incident.y * (-1.0 / index)
+        path, y = _Path(pair, ctx, index), pair.incident.y * (-1.0 / index)
         total, left = mi.Spectrum(0.0), [light.value for light in lit]
         faces = [mi.Float(0.0) for _ in lit]
         for number in range(len(lit[0].terms)):
@@ -109,11 +109,11 @@ class PolarisedLobes(SpectralLobes):
 class _Path:
     """Light of a pair of directions, and the axes that Jones matrices are about."""
 
-    def __init__(self, pair: Pair, mode: mi.TransportMode, index: float) -> None:
+    def __init__(self, pair: Pair, ctx: Context, index: float) -> None:
         grooves = pair.frame.from_table(mi.Vector2f(0.0, 1.0))
         self._grooves = mi.Vector3f(grooves.x, grooves.y, 0.0)
         self._ends = -pair.wi, pair.wo
-        self._reversed = mode == mi.TransportMode.Radiance
+        self._reversed = ctx.mode == mi.TransportMode.Radiance
         self._index, self._cosine = index, pair.cos_i
         if index != 1.0:
             self._faces = self._passage(-pair.wi, True), self._passage(pair.wo, False)

@@ -11,6 +11,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.boundary import mueller
 from mitsuba_diffraction.optics.fresnel import amplitudes
+from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.directions import Array, as_single, polar
 from tests.support.orders import load, shallow_grating
 from tests.support.stokes import bases, rotation
@@ -57,6 +58,13 @@ def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
     assert found == pytest.approx(normalised(np.moveaxis(weight, (3, 2), (0, 1))), abs=3e-3)
 
 
+def test_a_table_of_efficiencies_depolarises(polarised):
+    values = matrices(load(OrderTable.mirror(0.6)), WI, WI * [-1, -1, 1], "Radiance")
+    assert np.all(values[..., 0, 0] > 0.0)
+    values[..., 0, 0] = 0.0
+    assert np.all(values == 0.0)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarised, mode):
     heights = 5e-4 * np.cos(2.0 * np.pi * np.arange(16) / 16)
@@ -100,3 +108,12 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
         turned = rotation(s, bases(last), last)[0] @ expected @ rotation(bases(first), s, first)[0]
         # in 16 cells, at 70° near the face's critical angle: 1.2e-2, 2.5e-4 in 64
         assert found == pytest.approx(turned / turned[0, 0], abs=0.015)
+
+
+def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
+    table, wo = shallow_grating(INDEX, 0.1), WI * [-1, -1, 1]
+    polarised_light = matrices(load(table), WI, wo, "Radiance")[..., 0, 0]
+    mi.set_variant("llvm_ad_spectral")
+    si = interaction(WI, np.tile(LAM, (len(WI), 1)))
+    value = np.array(load(table).eval(mi.BSDFContext(), si, mi.Vector3f(wo.T)), float).T
+    assert polarised_light == pytest.approx(value, rel=1e-5)  # single precision
