@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..system import cores
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -85,7 +86,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     group.add_argument(
         "--polarised", action="store_true", default=None,
-        help="with Mueller matrices, for polarised variants; the table is about 10 times as large",
+        help="with Mueller matrices, for polarised variants; about 20 times as large",
     )  # fmt: skip
     group.add_argument(
         "--import", dest="imports", action="store_true",
@@ -221,7 +222,9 @@ def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
         return
     from ..solve.jobs import processes
 
-    jobs = args.jobs or 1
+    jobs, most = args.jobs or 1, 4 * cores()
+    if jobs > most:
+        args.parser.error(f"argument --jobs: expected 1 to {most}, 4 for each core, got {jobs}")
     with processes(jobs) as pool:
         yield pool, jobs
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
-from ..optics.colour import RGB_WAVELENGTHS, WORKING_SPACES
+from ..optics.colour import WORKING_SPACES
 from .orders import interpolation_error, order_constants, order_texture
 from .patch import check_patch, mean_transmittance, patch_constants, patch_error, patch_textures
 from .sockets import (
@@ -187,6 +187,7 @@ def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
     table = bsdf.table
     textures = patch_textures(table)
     index = indices_of(bsdf.fresnel, drawn_spectrum().wavelengths)
+    assert index is None or isinstance(index, np.ndarray)  # a film is refused
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     arrays = {
         "Eta": np.real(parts),
@@ -224,11 +225,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
     ]
     declarations = [socket.declaration() for socket in sockets]
     parameters = [*declarations, *arrays, *shader.arrays, "output closure color BSDF = 0"]
-    constants = {
-        "N_NODES": NODES,
-        **dict(zip(("RED", "GREEN", "BLUE"), (1e-3 * x for x in RGB_WAVELENGTHS), strict=True)),
-        **shader.constants,
-    }
+    constants = {"N_NODES": NODES, **shader.constants}
     lines = [f"#define {key} {_literal(value)}" for key, value in constants.items()]
     lines += [f'#define SPACE_{n} "{space}"' for n, space in enumerate(WORKING_SPACES)]
     folder = resources.files(__package__).joinpath("shaders")

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from ..tables.orders import OrderTable, cells
 from ..tables.orders.grids import face_transmittance, least_c, rows
 from ..tables.orders.table import Counts
+from .spectrum import NODES, drawn_spectrum
 
 #: Cells along τ, ρ and w of a table in air, and under a clear layer; fewer in large tables.
 _CELLS, _UNDER_LAYER = Counts(16, 12, 6), Counts(12, 8, 10)
 #: Most pixels of the texture, 8 bytes each.
 _MOST_PIXELS = 4 << 20
-#: Closures of a sample: Cycles has at most 64, and the mirror and the pigment take four.
-_CLOSURES = 58
+#: Lobes of a sample: Cycles has at most 64 closures, a lobe takes two, and the pigment takes one.
+_LOBES = 31
 _MOST_SAMPLES = 4
 #: Transmittance of the layer's face below which light counts as trapped.
 _TRAPPED = 2e-3
@@ -105,7 +106,6 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
     """Return the constants of `shaders/orders.osl`; lengths in nm but for PERIOD, µm."""
     low, high = table.wavelengths
     height, width = texture.pixels.shape[:2]
-    orders = 2 * math.floor(1e3 * table.period / max(low, 380.0)) + 1
     return {
         "PERIOD": table.period,
         "OPTICAL_PERIOD": 1e3 * table.optical_period,
@@ -120,10 +120,21 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
         "WIDTH": width,
         "HEIGHT": height,
         "TILES_ACROSS": texture.tiles_across,
-        "SAMPLES": max(1, min(_MOST_SAMPLES, _CLOSURES // orders)),
+        "SAMPLES": _samples(table.period),
         "LEAST": 1e-5,
         "PIGMENT_SHARE": _mean_remainder(table),
     }
+
+
+def _samples(period: float) -> int:
+    """Return the number of wavelengths whose orders are lobes of a sample; period : µm."""
+    wavelengths = drawn_spectrum().wavelengths
+    for count in range(_MOST_SAMPLES, 1, -1):
+        # the shortest wavelength of each stratum has the most orders
+        shortest = np.interp(np.arange(count) / count, np.linspace(0, 1, NODES), wavelengths)
+        if np.sum(np.floor(2e3 * period / shortest) + 1) <= _LOBES:
+            return count
+    return 1
 
 
 def _mean_remainder(table: OrderTable) -> float:

@@ -25,8 +25,8 @@ class Spectrum(NamedTuple):
     Attributes
     ----------
     wavelengths : (NODES,) nm.
-    colours : by working space (NODES, 3), linear RGB, none negative. Means of their linear
-        interpolation over u are white, (1, 1, 1).
+    colours : by working space (NODES, 3), linear RGB, negative outside its gamut. Means of their
+        linear interpolation over u are white, (1, 1, 1).
     """
 
     wavelengths: NDArray[np.float64]
@@ -34,22 +34,17 @@ class Spectrum(NamedTuple):
 
 
 def drawn_spectrum() -> Spectrum:
-    """Tabulate wavelengths and weights under daylight.
-
-    Cycles drops negative weights of closures. Colours outside a space's gamut are clipped, and each
-    channel is scaled to a mean of 1, so that white stays white: lines of the channel become darker
-    by the clipped light, 33 % of red in Rec.709 and 8 % in Rec.2020.
-    """
+    """Tabulate wavelengths and weights under daylight."""
     lam = np.arange(ENDS[0] + 0.5 * _STEP, ENDS[1], _STEP)
-    clipped = {space: np.maximum(linear_in(space, response(lam)), 0.0) for space in WORKING_SPACES}
-    density = np.mean([colours @ _IMPORTANCE for colours in clipped.values()], axis=0)
+    exact = {space: linear_in(space, response(lam)) for space in WORKING_SPACES}
+    density = np.mean([np.abs(colours) @ _IMPORTANCE for colours in exact.values()], axis=0)
     density = np.maximum(density, 1e-3 * density.max())  # keeps the map invertible at the ends
     cumulative = np.append(0.0, np.cumsum(density))
     cumulative /= cumulative[-1]
     u = np.linspace(0.0, 1.0, NODES)
     wavelengths = np.interp(u, cumulative, np.append(lam - 0.5 * _STEP, ENDS[1]))
     return Spectrum(
-        wavelengths, {space: _weights(u, cumulative, values) for space, values in clipped.items()}
+        wavelengths, {space: _weights(u, cumulative, values) for space, values in exact.items()}
     )
 
 

@@ -20,7 +20,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError
+from ..errors import DiffractionError, one_line
 from ..progress import Progress, silent
 from .coupled import CoupledWaves
 from .integral import IntegralSolver
@@ -34,18 +34,34 @@ METHODS: dict[str, Callable[[Profile, int], Solver]] = {
     "integral": IntegralSolver,
     "coupled": CoupledWaves,
 }
+#: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
+MOST_RESOLUTION = {"integral": 1000, "coupled": 200}
 # Threads that libraries of linear algebra start in each process, which would compete for the cores
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Grating, solver and its resolution; `digest` is that of the grating and the solver."""
+    """Grating, solver and its resolution; `digest` is that of the grating and the solver.
+
+    Raises
+    ------
+    DiffractionError
+        If the resolution is above `MOST_RESOLUTION`.
+    """
 
     grating: Grating = field(compare=False)
     method: str
     resolution: int
     digest: str
+
+    def __post_init__(self) -> None:
+        if self.resolution > MOST_RESOLUTION[self.method]:
+            raise DiffractionError(
+                f"{self.grating.profile.name} would be solved at resolution {self.resolution}, and "
+                f"{self.method} solves up to {MOST_RESOLUTION[self.method]}: check that its "
+                "lengths are in µm; it may be too deep, or too rough, for the shortest wavelength"
+            )
 
 
 def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
@@ -92,12 +108,25 @@ def solve_place(problem: Problem, place: Place) -> Solved:
 
     Values are rounded as they are stored, so that a table is the same whether or not it was
     interrupted.
+
+    Raises
+    ------
+    DiffractionError
+        If the solver fails on the profile.
     """
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
     station = grating.station(place.band, place.kind, place.tau, place.rho, w)
-    values = solver.amplitudes(station)
+    try:
+        values = solver.amplitudes(station)
+    except DiffractionError:
+        raise
+    except (ValueError, np.linalg.LinAlgError) as error:  # numbers that are not finite
+        raise DiffractionError(
+            f"{problem.method} cannot solve {grating.profile.name} ({one_line(str(error))}); check "
+            "that its line neither touches nor nearly touches itself"
+        ) from error
     if grating.thin:
         values = np.sqrt(sheet_efficiencies(values, station))
     values = values.astype(np.complex64).astype(np.complex128)

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
-from ..heights.lengths import number_between
+from ..errors import DiffractionError, quoted
+from ..heights.lengths import count_between, number_between
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import Counts, check_outline
-from .jobs import Jobs, Problem, problem_of, solver_of
+from .jobs import MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import FEWEST, MOST, Line, Place, count_for, lines
 from .profiles import Profile
@@ -87,10 +87,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         number_between(self.tolerance, "tolerance", 1e-4, 0.2)
-        if self.resolution is not None and not 4 <= self.resolution <= 4000:
-            raise DiffractionError(
-                f"resolution={self.resolution} must be 4 to 4000 points (or harmonics)"
-            )
+        if self.resolution is not None:
+            count_between(self.resolution, "resolution", 4, max(MOST_RESOLUTION.values()))
 
 
 def solve_orders(
@@ -122,6 +120,11 @@ def solve_orders(
         If an argument is out of its range, the solver is not installed or does not converge, or the
         measured error of the table is above the tolerance.
     """
+    if not isinstance(profile, Profile):
+        raise DiffractionError(
+            f"solve_orders: expected a profile, as of md.profiles.lamellar, got {quoted(profile)}; "
+            "a recipe is solved by 'mitsuba-diffraction solve'"
+        )
     how, work = settings or Settings(), jobs or Jobs()
     tell = announce or _silent
     check_outline(profile.period, how.wavelengths, superstrate, thin)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, warn
 from ..files import read_text
 from ..heights.lengths import number_between
 
@@ -21,6 +21,10 @@ _SINUSOID = 256
 CORNER = 10.0
 #: Vertices of a profile at most: a measured line has some thousands.
 MOST_VERTICES = 10_000
+# Angle between sides from which on they lie on each other, degrees.
+_FOLDED = 179.9
+# Difference of the ends of a measured line, over its depth, from which on it is no period.
+_STEP = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +44,7 @@ class Profile:
     ------
     DiffractionError
         If there are fewer than two vertices, a number is not finite, the polygon does not fit into
-        the period, or crosses itself.
+        the period, crosses itself, or turns back on itself.
     """
 
     x: Real
@@ -64,7 +68,11 @@ class Profile:
         if x.min() < -slack or x.max() > self.period + slack:
             raise DiffractionError(
                 f"{self.name}: x runs from {x.min():g} to {x.max():g} µm, but one period is 0 to "
-                f"{self.period:g} µm; give one period, or the right one with --period"
+                f"{self.period:g} µm; give one period, in µm, or the right one with --period"
+            )
+        if (np.abs(self._turns()) > _FOLDED).any():
+            raise DiffractionError(
+                f"{self.name}: the line turns back on itself; leave out its spikes"
             )
         if self._crosses_itself():
             raise DiffractionError(
@@ -93,10 +101,13 @@ class Profile:
     @property
     def corners(self) -> int:
         """Number of vertices that turn by more than `CORNER` degrees."""
-        x, z = self.closed
-        angles = np.arctan2(np.diff(z), np.diff(x))
-        turns = np.angle(np.exp(1j * np.diff(angles, append=angles[0])))
-        return int((np.degrees(np.abs(turns)) > CORNER).sum())
+        return int((np.abs(self._turns()) > CORNER).sum())
+
+    def _turns(self) -> Real:
+        """Angles between sides, degrees; points that are listed twice make no side."""
+        x, z = (np.diff(values) for values in self.closed)
+        angles = np.arctan2(z, x)[(x != 0) | (z != 0)]
+        return np.asarray(np.degrees(np.angle(np.exp(1j * np.diff(angles, append=angles[:1])))))
 
     def _crosses_itself(self) -> bool:
         """Whether two sides cross; a line whose x never turns back cannot."""
@@ -159,7 +170,8 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     Raises
     ------
     DiffractionError
-        If the file cannot be read, a line has no two numbers, or the line is no `Profile`.
+        If the file cannot be read, a line has no two numbers, or the line is no `Profile`, or less
+        than half a period.
     """
     rows: list[list[float]] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):
@@ -180,10 +192,22 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
         raise DiffractionError(f"'{path}' has no points; expected two columns x, z in µm")
     x, z = np.array(rows).T
     x = x - x.min()
+    if len(x) > 2 and x.max() < 0.5 * period:
+        raise DiffractionError(
+            f"'{path}': x covers {x.max():g} µm of a period of {period:g} µm; give one whole "
+            "period, in µm, or the right one with --period"
+        )
     # the end of a period is the beginning of the next
     if len(x) > 2 and abs(x[-1] - period) < 1e-6 * period and abs(z[-1] - z[0]) < 1e-6 * period:
         x, z = x[:-1], z[:-1]
-    return Profile(x, z, period, f"'{os.fspath(path)}'")
+    profile = Profile(x, z, period, f"'{os.fspath(path)}'")
+    step = abs(z[-1] - z[0])
+    if len(x) > 2 and x[-1] > (1.0 - 1e-6) * period and step > _STEP * profile.depth:
+        warn(
+            f"'{path}': the line ends {step:g} µm {'above' if z[-1] > z[0] else 'below'} its "
+            "beginning, where a vertical wall joins the periods; level the line if there is none"
+        )
+    return profile
 
 
 def polygon(points: ArrayLike, period: float) -> Profile:

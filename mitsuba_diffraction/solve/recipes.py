@@ -30,6 +30,9 @@ from typing import Any
 
 from ..errors import DiffractionError, one_line, quoted
 from ..files import read_text
+from ..heights.lengths import number_between
+from ..heights.recipes import SOLVED
+from ..tables.orders.table import WAVELENGTHS
 from .orders import Settings
 from .profiles import GENERATORS, Profile, read_profile
 
@@ -68,10 +71,15 @@ class SolvedRecipe:
         file, shown = Path(path), repr(os.fspath(path))
         try:
             content = tomllib.loads(read_text(file))
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise DiffractionError(
                 f"{shown} is not a recipe (TOML): {one_line(str(error))}"
             ) from error
+        if content.get("method") != SOLVED:
+            raise DiffractionError(
+                f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
+                "mitsuba-diffraction precompute"
+            )
         for key in content:
             if key not in _KEYS:
                 near = difflib.get_close_matches(key, _KEYS, 1)
@@ -79,20 +87,23 @@ class SolvedRecipe:
                 raise DiffractionError(
                     f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
                 )
-        if content.get("method") != "solved":
-            raise DiffractionError(
-                f'{shown}: this recipe has no line method = "solved"; build its table by precompute'
-            )
+        output, arguments = content.get("output", f"{file.stem}.nc"), content.get("arguments", {})
         try:
+            if not (isinstance(output, str) and output.endswith(".nc")):
+                raise DiffractionError(
+                    f"output: expected the name of a table (.nc), got {quoted(output)}"
+                )
+            if not isinstance(arguments, dict):
+                raise DiffractionError(f"arguments: expected a section, got {quoted(arguments)}")
             return cls(
-                profile_of(content.get("profile"), content.get("arguments", {}), file.parent),
+                profile_of(content.get("profile"), arguments, file.parent),
                 str(content.get("material", "Al")),
-                float(content.get("superstrate", 1.0)),
+                number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
                 _settings(content),
-                file.parent / str(content.get("output", f"{file.stem}.nc")),
+                file.parent / output,
             )
-        except (DiffractionError, TypeError, ValueError) as error:
+        except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error
 
 
@@ -116,6 +127,7 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
             raise DiffractionError(f"profile {name!r} has no {key!r}; it has {', '.join(known)}")
     if "period" not in arguments:
         raise DiffractionError(f"profile {name!r} needs its period in µm")
+    number_between(arguments["period"], f"profile {name!r}: period", 0.01, 1e3, " µm")
     if make is None:
         return read_profile(folder / name, arguments["period"])
     if "depth" not in arguments:
@@ -133,10 +145,15 @@ def _flag(content: Mapping[str, Any], name: str) -> bool:
 
 def _settings(content: Mapping[str, Any]) -> Settings:
     default = Settings()
-    low, high = content.get("wavelengths", default.wavelengths)
+    wavelengths = content.get("wavelengths", default.wavelengths)
+    if not isinstance(wavelengths, list | tuple) or len(wavelengths) != 2:
+        raise DiffractionError(
+            f"wavelengths: expected two numbers, nm, such as [380, 730], got {quoted(wavelengths)}"
+        )
+    low, high = (number_between(value, "wavelengths", *WAVELENGTHS, " nm") for value in wavelengths)
     return Settings(
-        (float(low), float(high)),
-        float(content.get("tolerance", default.tolerance)),
+        (low, high),
+        content.get("tolerance", default.tolerance),
         str(content.get("solver", default.method)),
         content.get("resolution", default.resolution),
         _flag(content, "polarised"),

@@ -67,7 +67,7 @@ def test_mean_of_the_spectrum_is_white():
     spectrum = drawn_spectrum()
     u = np.linspace(0.0, 1.0, NODES)
     for colours in spectrum.colours.values():
-        assert colours.min() >= 0.0
+        assert colours.mean(axis=1).min() > 0.0  # Cycles draws by it
         # linear between nodes, as the shader interpolates
         assert np.trapezoid(colours, u, axis=0) == pytest.approx(1.0, abs=1e-6)
     assert np.all(np.diff(spectrum.wavelengths) > 0)

@@ -20,6 +20,7 @@ pytest.importorskip("gratinglab")
 # two bands and a perfect conductor, which has no third variable: a second's work
 PROFILE = sinusoidal(0.5, 0.05)
 LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
+SPIKE = np.array([[0, 0.4, 0.4, 0.4, 0.9], [0, 0, 0.1, 0, 0]])
 SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05, polarised=True)
 
 
@@ -63,11 +64,15 @@ def test_the_error_compares_with_new_solutions(table):
         (lambda: Profile(np.array([0, 2.0]), np.zeros(2), 1.0), "one period"),
         (lambda: Profile(np.array([0, np.nan]), np.zeros(2), 1.0), "finite"),
         (lambda: Profile(LOOP[0], LOOP[1], 1.0), "cross"),
+        (lambda: Profile(SPIKE[0], SPIKE[1], 1.0), "turns back"),
         (lambda: md.solve_orders(PROFILE, "Unobtainium"), "no conductor"),
         (lambda: md.solve_orders(PROFILE, "-1"), "index"),
         (lambda: md.solve_orders(PROFILE, "Al", settings=Settings((50.0, 700.0))), "nm"),
         (lambda: Settings(tolerance=2.0), "tolerance"),
         (lambda: md.solve_orders(PROFILE, settings=Settings(method="guess")), "unknown"),
+        (lambda: md.solve_orders(lamellar(1.0, 90.0)), "lengths are in µm"),
+        (lambda: md.solve_orders(lamellar(900.0, 0.1)), "orders of shorter periods"),
+        (lambda: md.solve_orders("cd.toml"), "expected a profile"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_solved_is_refused_in_one_line(make, message):
@@ -84,3 +89,30 @@ def test_a_line_is_read_with_its_undercut(tmp_path):
     assert len(profile.x) == 4
     assert profile.depth == pytest.approx(0.1)
     assert (np.diff(profile.x) < 0).any()
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ("0,1\n800,1\n800,0\n", "one period is 0 to 1.6 µm"),
+        ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
+        ("x,z\n0,1\n0.3\n", "line 3"),
+        ("0,1,2\n", "line 1"),
+        ("0,nan\n1,0\n", "finite"),
+        ("# nothing\n", "no points"),
+        ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "--import"),
+    ],
+)
+def test_lines_that_are_no_period_are_refused(points, message, tmp_path):
+    file = tmp_path / "groove.csv"
+    file.write_text(points)
+    with pytest.raises(DiffractionError, match=message) as caught:
+        read_profile(file, 1.6)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_line_whose_ends_differ_gets_a_wall_and_a_warning(tmp_path):
+    file = tmp_path / "groove.csv"
+    file.write_text("0,0\n0.5,0.1\n1,0.02\n")
+    with pytest.warns(md.DiffractionWarning, match="vertical wall"):
+        assert read_profile(file, 1.0).depth == pytest.approx(0.1)

@@ -10,6 +10,7 @@ evaluation, thesis      pages about the thesis' methods: the grating equation; a
 cluster, wide           a film on workers; a scan of 16,384² points, whole and by windows
 sheets                  transmitted orders of thin sheets, model and solution
 parameters              the reference of the plugin's parameters, from its own docstring
+polarised               degree of polarisation of a grating's orders
 notebooks               notebooks, run anew
 pages                   what they share: parts of pages, JPEG, measured patches, errors in one line
 """

@@ -85,14 +85,14 @@ SCENES = (
     Scene(
         "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
         "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=256"),
-        "Order 1 has the same hues at the same places, for these follow from the grating equation. "
-        "Its brightness differs.",
+        "A viewer hardly sees a difference. Hues follow from the grating equation, and the blaze "
+        "makes order 1 bright in both pictures.",
     ),
     Scene(
         "orders_on_wall", "the same grating before a wall", "rulings", "wall", _BLAZED,
         "material=Al", ("resx=450", "resy=210", "spp=512"),
-        "The model gives other shares of the light to the orders on the left, which the blaze "
-        "makes weak.",
+        "Order 1, the first on the right, is alike. Weak orders are not: those on the left are too "
+        "dark in the model, and its order 0 is blue instead of pink.",
     ),
     Scene(
         "spectrometer", "clear grating, 600 lines/mm", "rulings", "screen",

@@ -67,15 +67,19 @@ class Efficiencies(NamedTuple):
     truth: float
 
 
-class Absorption(NamedTuple):
-    """Absorbed share of diffuse light, and the table's deviation from its own solver.
+class Diffuse(NamedTuple):
+    """Deviation of a table from its own solver in diffuse light of all its wavelengths.
 
-    absorbed : mean share.
+    light : which light, in words.
+    colours : mean deviation of all orders but 0, as a share of their light.
+    absorbed : mean absorbed share.
     bias : deviation of that mean, as a share of it.
-    mean, most, largest : magnitude of the deviation, as a share of the incident light: mean, the
-        one that 95 % of directions keep, and largest.
+    mean, most, largest : deviation of the absorbed share, in shares of the incident light: mean,
+        the one that 95 % of directions keep, and largest.
     """
 
+    light: str
+    colours: float
     absorbed: float
     bias: float
     mean: float
@@ -141,24 +145,44 @@ class Case:
             for n in shown
         ]
 
-    def absorption(self, samples: int = SAMPLES) -> Absorption:
-        """Return the absorption at random directions of diffuse light and wavelengths."""
+    def diffuse(self, samples: int = SAMPLES) -> list[Diffuse]:
+        """Return the deviations from the table's own solver, of each kind of light."""
+        most = 1.0 / self.recipe.superstrate
+        if most == 1.0:
+            return [self._diffuse(samples, "all", 0.0, 1.0)]
+        return [
+            self._diffuse(samples, "through the face", 0.0, most),
+            self._diffuse(samples, "trapped by the face", most, 1.0),
+        ]
+
+    def _diffuse(self, samples: int, light: str, least: float, most: float) -> Diffuse:
+        """Compare light of these sines, in random directions and wavelengths."""
         rng, table = np.random.default_rng(1), self.table
-        radius, turn = np.sqrt(rng.random(samples)), 2 * np.pi * rng.random(samples)
+        radius = np.sqrt(rng.uniform(least**2, most**2, samples))
+        turn = rng.uniform(0.0, 2.0 * np.pi, samples)
         x, y = radius * np.cos(turn), radius * np.sin(turn)
         lam = rng.uniform(*table.wavelengths, samples)
         resolution = self.recipe.settings.resolution
         assert resolution is not None
         solver = IntegralSolver(self.recipe.profile, resolution)
-        absorbed, missed = np.empty(samples), np.empty(samples)
+        absorbed, deviation, missed, colours = np.zeros((4, samples))
         for n in range(samples):
-            truth = self._by_solver(solver, x[n], y[n], lam[n])
-            absorbed[n] = 1.0 - sum(truth.values())
-            missed[n] = 1.0 - table.efficiency(x[n], y[n], lam[n], list(truth)).sum() - absorbed[n]
-        size = np.abs(missed)
-        bias = missed.mean() / absorbed.mean()
-        values = (absorbed.mean(), bias, size.mean(), np.quantile(size, 0.95), size.max())
-        return Absorption(*map(float, values))
+            by_order = self._by_solver(solver, x[n], y[n], lam[n])
+            order, truth = np.array(list(by_order)), np.array(list(by_order.values()))
+            values = table.efficiency(x[n], y[n], lam[n], order)
+            absorbed[n], deviation[n] = 1.0 - truth.sum(), truth.sum() - values.sum()
+            missed[n] = np.abs(values - truth)[order != 0].sum()
+            colours[n] = truth[order != 0].sum()
+        size = np.abs(deviation)
+        return Diffuse(
+            light,
+            float(missed.sum() / colours.sum()),
+            float(absorbed.mean()),
+            float(deviation.mean() / absorbed.mean()),
+            float(size.mean()),
+            float(np.quantile(size, 0.95)),
+            float(size.max()),
+        )
 
     def _efficiencies(self, theta: float, phi: float, wavelength: float) -> _Row:
         recipe, table = self.recipe, self.table

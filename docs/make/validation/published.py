@@ -24,7 +24,8 @@ class Published(NamedTuple):
     source : where they are printed.
     grating : in words.
     station : of the light, which comes in through channel 0; order −q leaves through channel q.
-    printed : efficiencies by order and polarisation, s or p in the plane across the grooves.
+    printed : efficiencies by order and polarisation, s or p in the plane across the grooves, or "u"
+        for unpolarised light.
     tolerance : error of the printed numbers: their digits, or of the method that made them.
     points, harmonics : of the integral method and of coupled waves.
     """
@@ -48,7 +49,8 @@ class Published(NamedTuple):
     def solved(self, solver: Solver) -> dict[tuple[int, str], float]:
         """Return the efficiencies that are printed, by a solver."""
         powers = (np.abs(solver.amplitudes(self.station)[0, 0]) ** 2).sum(axis=-1)
-        return {(m, name): float(powers["sp".index(name), -m]) for m, name in self.printed}
+        of_light = {"s": powers[0], "p": powers[1], "u": powers.mean(axis=0)}
+        return {(m, name): float(of_light[name][-m]) for m, name in self.printed}
 
 
 class Light(NamedTuple):
@@ -69,18 +71,29 @@ def light_of(period: float, wavelength: float, index: complex, x: float, y: floa
     return Light(Station(extent, fraction, channels, *arrays), int(place))
 
 
-def _lamellar(source: str, depth: float, printed: dict[tuple[int, str], float]) -> Published:
-    # four digits, or five; a depth of one wavelength is a resonance
-    tolerance, points = (1e-4, 300) if depth < 0.5 else (7e-4, 450)
-    grating = f"lamellar 1/{depth:g} µm, duty 0.5, n = 0.22 + 6.71i, 1 µm at 30°"
-    station = light_of(1.0, 1.0, _METAL, 0.5, 0.0).station
+def _lamellar(
+    source: str,
+    depth: float,
+    printed: dict[tuple[int, str], float],
+    tolerance: float,
+    resolutions: tuple[int, int],
+    phi: float = 0.0,
+) -> Published:
+    """Return a case of grooves of metal, one wavelength wide, in light at 30°."""
+    grating = f"lamellar 1/{depth:g} µm, duty 0.5, n = 0.22 + 6.71i, 1 µm at 30°, φ = {phi:g}°"
+    turn = np.radians(phi)
+    station = light_of(1.0, 1.0, _METAL, 0.5 * np.cos(turn), 0.5 * np.sin(turn)).station
     profile = lamellar(1.0, depth)
-    return Published(source, grating, profile, station, printed, tolerance, points, 60)
+    return Published(source, grating, profile, station, printed, tolerance, *resolutions)
 
 
+_RETICOLO = (
+    "RETICOLO V10 (Hugonin and Lalanne 2021, arXiv:2101.00901) with 41 harmonics, in "
+    "scripts/reference/reticolo.json of the repository PericleV/spr-forge"
+)
 _ANGLE = np.radians(75.0)
 
-#: Published efficiencies. Granet and Guizal have the exact values from Li's modal method.
+#: Published efficiencies. Granet and Guizal, and Lalanne and Hugonin, print those of modal methods.
 PUBLISHED = (
     Published(
         "Johnson 2005, GD-Calc, gdc_demo1a, for table 2 of Li 1993 (J. Opt. Soc. Am. A 10, 2581)",
@@ -99,10 +112,17 @@ PUBLISHED = (
         "Granet and Guizal 1996 (J. Opt. Soc. Am. A 13, 1019), table 1",
         0.1,
         {(0, "p"): 0.6312, (-1, "p"): 0.3408},
+        1e-4,
+        (300, 60),
     ),
     _lamellar(
         "Lalanne and Hugonin 2000 (J. Opt. Soc. Am. A 17, 1033), tables 1 and 2",
         1.0,
         {(0, "p"): 0.84848, (-1, "s"): 0.73428},
+        1e-5,
+        (450, 60),
     ),
+    # means of the printed 0.241297, 0.714287; 0.675345, 0.222996 and of those at 60°
+    _lamellar(_RETICOLO, 1.0, {(0, "u"): 0.477792, (-1, "u"): 0.449170}, 2.5e-3, (300, 20), 30.0),
+    _lamellar(_RETICOLO, 1.0, {(0, "u"): 0.622969, (-1, "u"): 0.279407}, 2.5e-3, (300, 20), 60.0),
 )  # fmt: skip

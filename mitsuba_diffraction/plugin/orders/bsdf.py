@@ -33,6 +33,10 @@ powers. RGB variants sum f over daylight. Polarised variants have the Mueller ma
 outside the table have the efficiencies of the nearest in it. f is reciprocal as far as the table
 is, at the centres of lobes.
 
+A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
+normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
+is the reflection, component 1 the transmission. It depolarises light.
+
 XML and the same in Python:
 
     <bsdf type="diffraction_orders">
@@ -146,7 +150,7 @@ class DiffractionOrders(mi.BSDF):
     ) -> tuple[Spectrum, Float]:
         """See `Nesting.diffracted_both`."""
         pair = Pair(si, wo, self._frame(si, active), active)
-        light = self._lobes.reflected(pair, si, mode=ctx.mode)
+        light = self._lobes.reflected(pair, si, None, ctx)
         return light.value, light.density
 
     def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
@@ -247,5 +251,5 @@ def _warn_of_polarisation() -> None:
         _warned.append(True)
         warn(
             "a table of diffraction_orders has no Mueller matrices: in this polarised variant it "
-            "depolarises the light that it reflects; solve it again with --polarised"
+            "depolarises light; solve gratings with --polarised (thin sheets have none)"
         )

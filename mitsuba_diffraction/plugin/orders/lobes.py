@@ -22,9 +22,11 @@ from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..directions import Pair
 from ..memory import index_between, read_record, upload
 from ..sampling import BELOW_ONE, invert
-from ..types import Colour, Float, Index, Interaction, Mask, Spectrum, Vector2f
+from ..types import Colour, Context, Float, Index, Interaction, Mask, Spectrum, Vector2f
 from .lookup import OrderLookup, Row, order_lookup
 
+#: Mask of lanes whose ωo lies below a sheet; None without a sheet.
+Below = Mask | None
 #: Efficiency and probability of an order, from wavelength and order.
 Shares = Callable[[Float, Float], tuple[Float, Float]]
 #: Term of a sum: from its number and the sums, the next number and the sums with it added.
@@ -81,18 +83,12 @@ class Draw(NamedTuple):
 class Lobes(Protocol):
     """Light of all orders in the variant's channels, and directions drawn by it."""
 
-    def reflected(
-        self,
-        pair: Pair,
-        si: Interaction,
-        below: Mask | None = None,
-        mode: mi.TransportMode = mi.TransportMode.Radiance,
-    ) -> Reflected:
+    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
         """Return value and density of a pair.
 
         below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
             sheet.
-        mode : whether light comes along ωo (radiance) or along ωi (importance).
+        ctx : says whether light comes along ωo (radiance) or along ωi (importance).
         """
 
     def draw(
@@ -154,13 +150,7 @@ class SpectralLobes(_Window):
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def reflected(
-        self,
-        pair: Pair,
-        si: Interaction,
-        below: Mask | None = None,
-        mode: mi.TransportMode = mi.TransportMode.Radiance,
-    ) -> Reflected:
+    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
         """See `Lobes.reflected`; the density is the mean over wavelengths."""
         lit: list[Lit] = []
         density = mi.Float(0.0)
@@ -182,11 +172,9 @@ class SpectralLobes(_Window):
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
         mean = density * (1.0 / len(wavelengths))
-        return Reflected(self.spectrum(pair, below, mode, lit), dr.detach(mean))
+        return Reflected(self.spectrum(pair, ctx, lit), dr.detach(mean))
 
-    def spectrum(
-        self, pair: Pair, below: Mask | None, mode: mi.TransportMode, lit: list[Lit]
-    ) -> Spectrum:
+    def spectrum(self, pair: Pair, ctx: Context, lit: list[Lit]) -> Spectrum:
         """Return f cosθo of all wavelengths, depolarised in polarised variants."""
         values = [light.value for light in lit]
         return mi.Spectrum(mi.depolarizer(mi.UnpolarizedSpectrum(values)))
@@ -230,13 +218,7 @@ class DaylightLobes(_Window):
         self._bins = len(weights.cumulative) - 1
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
-    def reflected(
-        self,
-        pair: Pair,
-        si: Interaction,
-        below: Mask | None = None,
-        mode: mi.TransportMode = mi.TransportMode.Radiance,
-    ) -> Reflected:
+    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
         """See `Lobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
         # before the loops: a cached property that a loop computed would belong to it

@@ -29,7 +29,6 @@ class Row:
     ----------
     kind : of the band, and A or B; see `tables.orders.grids.Corners`.
     cell : number of the cell.
-    port : of the incident light.
     start : record of port 0.
     channel : j of the incident light.
     channels : number of channels of a side.
@@ -40,7 +39,6 @@ class Row:
 
     kind: Index
     cell: Index
-    port: Index
     start: Index
     channel: Index
     channels: Index
@@ -140,7 +138,7 @@ class OrderLookup:
         if self.coated:
             face = 1.0 - self._through(cos_i)
         lit = mi.UInt32(channel), channels, weights, incident, vacuum, face
-        return Row(kind, cell, port, start, *lit)
+        return Row(kind, cell, start, *lit)
 
     @staticmethod
     def port(

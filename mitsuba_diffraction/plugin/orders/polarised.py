@@ -24,11 +24,11 @@ from ..directions import Pair
 from ..fresnel import amplitudes, squared
 from ..layers import refracted, transmittances
 from ..memory import read, read_record, upload
-from ..types import Float, Mask, Spectrum, Vector3f
+from ..types import Context, Float, Mask, Spectrum, Vector3f
 from .lobes import Lit, SpectralLobes
 from .lookup import OrderLookup, Row
 
-_LEAST = 1e-12
+_LEAST, _DARK = 1e-12, 1e-30
 
 
 class Wave(NamedTuple):
@@ -53,17 +53,17 @@ class PolarisedLookup(OrderLookup):
         self._matrix_starts = upload(mi.UInt32, records.starts)
         self._matrices = upload(mi.Float16, records.values)
 
-    def wave(self, row: Row, order: Float, y: Float, active: Mask, below: Mask | None) -> Wave:
+    def wave(self, row: Row, order: Float, y: Float, active: Mask) -> Wave:
         """Return the light of an order; y : direction cosine of the light along the grooves."""
-        q, active = self.port(row, order, active, below)
-        ports = row.channels * self._sides
-        first = read(mi.UInt32, self._matrix_starts, row.kind) + row.port * ports + q
+        q, active = self.port(row, order, active)
+        channels = row.channels
+        first = read(mi.UInt32, self._matrix_starts, row.kind) + row.channel * channels + q
         n_rho, n_w = self._cells.rho, self._cells.w
         tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
         elements = [mi.Float(0.0)] * 16
         for weight, (a, b, c) in zip(row.weights, itertools.product((0, 1), repeat=3), strict=True):
             node = ((tau + a) * (n_rho + 1) + rho + b) * (n_w + 1) + w + c
-            record = read_record(self._matrices, first + node * ports * ports, 16, active)
+            record = read_record(self._matrices, first + node * channels * channels, 16, active)
             elements = [
                 dr.fma(weight, mi.Float(x), sum_) for x, sum_ in zip(record, elements, strict=True)
             ]
@@ -81,25 +81,23 @@ class PolarisedLobes(SpectralLobes):
     lookup_kind = PolarisedLookup
     lookup: PolarisedLookup
 
-    def spectrum(
-        self, pair: Pair, below: Mask | None, mode: mi.TransportMode, lit: list[Lit]
-    ) -> Spectrum:
+    def spectrum(self, pair: Pair, ctx: Context, lit: list[Lit]) -> Spectrum:
         """See `SpectralLobes.spectrum`."""
         index = self.lookup.index
-        path, y = _Path(pair, below, mode, index), pair.incident.y * (-1.0 / index)
+        path, y = _Path(pair, ctx, index), pair.incident.y * (-1.0 / index)
         total, left = mi.Spectrum(0.0), [light.value for light in lit]
         faces = [mi.Float(0.0) for _ in lit]
         for number in range(len(lit[0].terms)):
             jones = []
             for n, light in enumerate(lit):
                 order, lobe, efficiency = light.terms[number]
-                wave = self.lookup.wave(light.row, order, y, lobe > 0.0, below)
+                wave = self.lookup.wave(light.row, order, y, lobe > 0.0)
                 lobe = lobe * light.peak
                 face = dr.select(order == 0.0, light.row.face, 0.0)
                 power = dr.maximum(efficiency - face, 0.0) * lobe * wave.share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
-                root = dr.sqrt(power)
+                root = dr.sqrt(dr.maximum(power, _DARK))  # has a derivative
                 jones.append(tuple(entry * root for entry in wave.jones))
             total += path.diffracted(jones)
         if self.lookup.coated:
@@ -111,19 +109,14 @@ class PolarisedLobes(SpectralLobes):
 class _Path:
     """Light of a pair of directions, and the axes that Jones matrices are about."""
 
-    def __init__(
-        self, pair: Pair, below: Mask | None, mode: mi.TransportMode, index: float
-    ) -> None:
-        wo = pair.wo
-        if below is not None:
-            wo = mi.Vector3f(wo.x, wo.y, dr.select(below, -wo.z, wo.z))
+    def __init__(self, pair: Pair, ctx: Context, index: float) -> None:
         grooves = pair.frame.from_table(mi.Vector2f(0.0, 1.0))
         self._grooves = mi.Vector3f(grooves.x, grooves.y, 0.0)
-        self._ends = -pair.wi, wo
-        self._reversed = mode == mi.TransportMode.Radiance
+        self._ends = -pair.wi, pair.wo
+        self._reversed = ctx.mode == mi.TransportMode.Radiance
         self._index, self._cosine = index, pair.cos_i
         if index != 1.0:
-            self._faces = self._passage(-pair.wi, True), self._passage(wo, False)
+            self._faces = self._passage(-pair.wi, True), self._passage(pair.wo, False)
 
     def diffracted(self, matrices: list[Jones]) -> Spectrum:
         """Return the Mueller matrices of the grating's Jones matrices, under its coat."""

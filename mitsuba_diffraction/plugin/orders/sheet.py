@@ -59,7 +59,7 @@ class OrdersSheet(DiffractionOrders):
         below = mi.Mask(wo.z < 0.0)
         above = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
         pair = Pair(si, above, self._frame(si, lit), lit)
-        light = self._lobes.reflected(pair, si, below, ctx.mode)
+        light = self._lobes.reflected(pair, si, below, ctx)
         return dr.select(lit, light.value, 0.0), dr.select(lit, light.density, 0.0)
 
     def sample(

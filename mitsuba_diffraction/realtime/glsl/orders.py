@@ -81,28 +81,36 @@ class Solved:
 
         most_bytes : size of the efficiencies at most.
         """
-        packed = pack_efficiencies(self.table, most_bytes)
-        packed |= Packed((), {"sigma": self.bsdf.sigma})
-        return packed | self._daylight() if method == "fast" else packed
+        return pack_orders(method, self.table, self.bsdf.sigma, most_bytes)
 
     def lobes(self) -> Packed:
         """See `Diffracting.lobes`."""
         sigma = self.bsdf.sigma
         return pack_lobes(lambda edges: order_power(self.table, sigma, edges), sigma)
 
-    def _daylight(self) -> Packed:
-        """Pack the sum of lobes over daylight."""
-        weights = daylight_weights(self.bsdf.sigma, self.table.period)
-        smoothed = weights.smoothed.astype(np.float16)
-        order_0 = np.column_stack([weights.order_0[:, :3], 1e-3 * weights.wavelengths])
-        return Packed(
-            (
-                Texture("daylight", smoothed, smooth=True),
-                Texture("order_0", order_0[None].astype(np.float32)),
-            ),
-            {"daylight_waves": weights.waves, "daylight_variances": weights.variances},
-            {"DAYLIGHT": ""},
-        )
+
+def pack_orders(
+    method: str, table: OrderTable, sigma: float, most_bytes: int = MOST_BYTES
+) -> Packed:
+    """Pack a table for a method, `fast` or `exact`.
+
+    sigma : standard deviation of the amplitude window, µm.
+    most_bytes : size of the efficiencies at most.
+    """
+    packed = pack_efficiencies(table, most_bytes) | Packed((), {"sigma": sigma})
+    if method != "fast":
+        return packed
+    weights = daylight_weights(sigma, table.period)
+    smoothed = weights.smoothed.astype(np.float16)
+    order_0 = np.column_stack([weights.order_0[:, :3], 1e-3 * weights.wavelengths])
+    return packed | Packed(
+        (
+            Texture("daylight", smoothed, smooth=True),
+            Texture("order_0", order_0[None].astype(np.float32)),
+        ),
+        {"daylight_waves": weights.waves, "daylight_variances": weights.variances},
+        {"DAYLIGHT": ""},
+    )
 
 
 @functools.lru_cache(maxsize=4)

@@ -60,8 +60,10 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
 
     `exact` does not support coherent tables.
     """
-    packed, loss, width = (_solved if isinstance(surface, Solved) else _modelled)(
-        method, surface, digits
+    packed, loss, width = (
+        _solved(method, surface, digits)
+        if isinstance(surface, Solved)
+        else _modelled(method, surface, digits)
     )
     sections = {}
     for texture in packed.textures:

@@ -15,6 +15,7 @@ import hashlib
 import io
 import json
 import os
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from scipy.io import netcdf_file
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import read_bytes, readable_file
+from ..exr import is_table
 from .table import MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever what the numbers mean changes; files of another version are refused.
@@ -105,16 +107,14 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
         If the file is missing, no table of orders, damaged, or of another version.
     """
     data = read_bytes(path)
-    if not data.startswith(BEGINS):
-        raise DiffractionError(f"'{path}' is no table of orders (NetCDF); {_AGAIN}")
+    if not (data.startswith(BEGINS) and MARK.encode() in data[:_HEAD]):
+        raise DiffractionError(f"'{path}' is no table of orders; {_advice(Path(path))}")
     try:
         with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
-            version = getattr(file, MARK, None)
-            if version is None:
-                raise DiffractionError("it has no mark of a table of orders")
-            if int(version) != FORMAT_VERSION:
+            version = int(getattr(file, MARK))
+            if version != FORMAT_VERSION:
                 raise DiffractionError(
-                    f"its format version is {int(version)}, this program reads {FORMAT_VERSION}"
+                    f"its format version is {version}, this program reads {FORMAT_VERSION}"
                 )
             return _table(file)
     except DiffractionError as error:
@@ -133,6 +133,19 @@ def is_order_table(path: str | os.PathLike[str]) -> bool:
     except (OSError, DiffractionError):
         return False  # whoever reads it says why it cannot be
     return first.startswith(BEGINS) and MARK.encode() in first
+
+
+def _advice(path: Path) -> str:
+    """Return what to do with a file that is no table of orders."""
+    if path.suffix.lower() == ".toml":
+        command = f"mitsuba-diffraction solve {shlex.quote(str(path))}"
+        return f"run '{command}', and give the table (.nc) that it writes"
+    if is_table(path):
+        return "tables of heights (EXR) belong to the BSDF 'diffraction'"
+    return (
+        "make one with 'mitsuba-diffraction solve', which also reads efficiencies of other "
+        "programs (--import)"
+    )
 
 
 def _table(file: Any) -> OrderTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -72,18 +73,11 @@ def polarised_efficiency(
 
 
 def mueller(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    *,
-    from_below: bool = False,
-    transmitted: bool = False,
+    table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike
 ) -> Array:
     """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
 
-    M₀₀ is `efficiency`. Arguments and errors as for `efficiency`.
+    M₀₀ is `efficiency`. Arguments as for `efficiency`.
 
     Raises
     ------
@@ -95,16 +89,12 @@ def mueller(
             "this table has efficiencies alone; solve the profile with --polarised for Mueller "
             "matrices"
         )
-
-    def of_kind(band: Band, kind: int) -> Array:
-        return smooth_elements(table, band, kind)
-
-    elements = _values(table, x, y, wavelength, order, from_below, transmitted, of_kind, np.asarray)
-    power = efficiency(
-        table, x, y, wavelength, order, from_below=from_below, transmitted=transmitted
+    light = (table, x, y, wavelength, order)
+    elements = _values(*light, False, False, functools.partial(smooth_elements, table), np.asarray)
+    factors = np.where(ODD.ravel(), np.asarray(y)[..., None], 1.0)
+    return nearest_pure(
+        (elements * factors).reshape(*elements.shape[:-1], 4, 4), efficiency(*light)
     )
-    matrices = elements.reshape(*elements.shape[:-1], 4, 4)
-    return nearest_pure(matrices * np.where(ODD, np.asarray(y)[..., None, None], 1.0), power)
 
 
 def _values(

@@ -15,7 +15,7 @@ from mitsuba_diffraction.solve.stations import reversed_light
 
 pytest.importorskip("gratinglab")
 
-CONICAL, SHALLOW, DEEP = PUBLISHED
+CONICAL, SHALLOW, DEEP, *TRUNCATED = PUBLISHED
 ALUMINIUM = 0.97 + 6.4j
 
 
@@ -24,7 +24,9 @@ def misses(case, solver):
     return max(abs(solved[key] - printed) for key, printed in case.printed.items())
 
 
-@pytest.mark.parametrize("case", [CONICAL, SHALLOW], ids=["conical", "shallow"])
+@pytest.mark.parametrize(
+    "case", [CONICAL, SHALLOW, TRUNCATED[0]], ids=["conical", "shallow", "deep"]
+)
 def test_the_integral_method_finds_printed_efficiencies(case):
     assert misses(case, IntegralSolver(case.profile, case.points)) < case.tolerance
 
@@ -37,6 +39,12 @@ def test_coupled_waves_find_printed_efficiencies_of_walls_of_metal():
     # TM of 121 harmonics misses the exact value by 1.0e-3 in the table of Lalanne and Hugonin, too
     for case in (SHALLOW, DEEP):
         assert misses(case, CoupledWaves(case.profile, 60)) < 1.2e-3
+
+
+def test_coupled_waves_find_what_another_program_finds_with_as_many_harmonics():
+    # metal in conical mounts
+    for case in TRUNCATED:
+        assert misses(case, CoupledWaves(case.profile, case.harmonics)) < 2e-4
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,8 @@ class Measurements:
         return orders.MOUNTS[: 1 if self.quick else None]
 
     @property
-    def absorption_samples(self) -> int:
-        """Random directions in which absorption is compared."""
+    def diffuse_samples(self) -> int:
+        """Random directions in which tables are compared with their solver."""
         return 4 if self.quick else orders.SAMPLES
 
     @property

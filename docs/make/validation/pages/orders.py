@@ -20,10 +20,12 @@ def write(measured: Measurements) -> str:
         ]
         for case in measured.solved_orders
     ]
-    absorption = [
-        [case.name, *map(percent, case.absorption(measured.absorption_samples))]
+    diffuse = [
+        [case.name, row.light, *map(percent, row[1:])]
         for case in measured.solved_orders
+        for row in case.diffuse(measured.diffuse_samples)
     ]
+    header = ["table", "light", "colours", "absorbed", "bias", "mean", "95 %", "largest"]
     return f"""# Solved orders
 
 The shipped tables of `diffraction_orders` and the default model, beside solutions that did not make
@@ -47,27 +49,27 @@ Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpo
 
 {_side_by_side(measured)}
 
-## Absorption
-
-The share of light that no order has, beside the solver of the table itself, at random directions
-of diffuse light and wavelengths ({measured.absorption_samples} of them). *Bias* is the deviation of
-the mean, as a share of what is absorbed. The other deviations are shares of the incident light.
-
-{table(["table", "absorbed", "bias", "mean", "95 %", "largest"], absorption)}
-
-The largest lie beside surface plasmons, which are narrower than the distance of nodes.
-
 ## Interpolation
 
-What is left is interpolation. The tables' own figures, measured at random directions and
-wavelengths:
+The tables beside their own solver, at random directions of diffuse light and wavelengths
+({measured.diffuse_samples} of them). *Absorbed* is the share of light that no order has, and *bias*
+the deviation of that mean, as a share of it. The last three columns are the deviation of the
+absorbed share, as a share of the incident light.
+
+{table(header, diffuse)}
+
+The largest deviations lie beside surface plasmons, which are narrower than the distance of nodes.
+Light from outside reaches a grating under a layer only at angles within the critical one. Orders
+beyond it are trapped: the face returns them to the grating, where they meet the second row.
+
+The tables' own figures, of colours in all light within the layer:
 
 {table(["table", "profile", "error, mean", "error, 95 %", "reciprocity"], facts)}
 
 ## Published efficiencies
 
-The solvers beside numbers that others printed. Their tolerance is that of the printed numbers:
-their digits, or the error of the method behind them.
+The solvers beside numbers that others printed: s and p across the grooves, u unpolarised. The
+tolerance is that of the printed numbers: their digits, or the error of the method behind them.
 
 {_published(measured.published)}"""
 
@@ -106,5 +108,7 @@ def _published(cases: tuple[Published, ...]) -> str:
             for (m, name), printed in case.printed.items()
         ]
         header = ["order", "printed", *(name for name, _ in solved)]
-        parts.append(f"{case.source}: {case.grating}.\n\n{table(header, rows)}")
+        parts.append(
+            f"{case.source}: {case.grating}; tolerance {case.tolerance:g}.\n\n{table(header, rows)}"
+        )
     return "\n\n".join(parts)

@@ -12,16 +12,20 @@ void main()
 #ifdef PAIRED
     ivec2 column = ivec2(gl_FragCoord.x, 0);
     vec3 wi = texelFetch(directions, column, 0).xyz;
-    begin_pair(wi, texelFetch(directions, column + ivec2(0, 1), 0).xyz, vec2(1.0),
-               vec2(1.0));
+    vec3 wo = texelFetch(directions, column + ivec2(0, 1), 0).xyz;
+#ifndef ORDERS
+    begin_pair(wi, wo, vec2(1.0), vec2(1.0));
+#endif
 #ifdef SECOND_ORDER
     begin_second_order();
 #endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
 #ifdef ORDERS
-    vec3 wo = vec3(place.xy, sqrt(1.0 - dot(place.xy, place.xy)));
-    fragment = vec4(diffraction(vec3(0.0, 0.0, 1.0), wo, vec2(1.0, 0.0), 0), 1.0);
+#ifndef PAIRED
+    vec3 wi = vec3(0.0, 0.0, 1.0), wo = vec3(place.xy, sqrt(1.0 - dot(place.xy, place.xy)));
+#endif
+    fragment = vec4(diffraction(wi, wo, vec2(1.0, 0.0), 0), 1.0);
 #else
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
 #endif

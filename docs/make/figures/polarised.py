@@ -1,0 +1,96 @@
+"""Degree of polarisation of a blazed grating's orders, and the cost of its table: docs/orders.md.
+
+python -m docs.make.figures.polarised
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.tables.orders import OrderTable
+
+from . import pages
+from .pages import exit_code, write_jpeg
+
+#: The command of the page.
+COMMAND = (
+    "solve", "blazed", "--period", "0.8333", "--depth", "0.25", "--tolerance", "0.02",
+    "--wavelength-range", "400,700",
+)  # fmt: skip
+_THETA = 30.0
+_NAME = "polarised"
+
+
+def figure(table: OrderTable) -> Figure:
+    """Draw the efficiency and the degree of polarisation of two orders over the wavelength."""
+    wavelength = np.linspace(*table.wavelengths, 301)
+    x = np.sin(np.radians(_THETA))
+    drawn = Figure(figsize=(8.0, 3.2), layout="constrained")
+    left, right = drawn.subplots(1, 2)
+    for order, colour in ((0, "tab:gray"), (-1, "tab:blue")):
+        matrices = table.mueller(x, 0.0, wavelength, order)
+        power = matrices[:, 0, 0]
+        left.plot(wavelength, power, color=colour, label=f"order {order}")
+        lit = power > 1e-3
+        polarised = np.where(lit, matrices[:, 1, 0] / np.where(lit, power, 1.0), np.nan)
+        right.plot(wavelength, polarised, color=colour)
+    left.set(xlabel="wavelength, nm", ylabel="efficiency", ylim=(0.0, 0.5))
+    left.legend(frameon=False)
+    right.axhline(0.0, color="black", linewidth=0.5)
+    right.set(xlabel="wavelength, nm", ylabel="S₁/S₀", ylim=(-1.0, 1.0))
+    return drawn
+
+
+def costs(files: dict[str, Path]) -> str:
+    """Return the table of sizes and times."""
+    rows = []
+    for name, file in files.items():
+        table = OrderTable.load(file)
+        error = table.header.get("error_polarised", table.header["error_mean"])
+        rows.append(
+            (name, f"{file.stat().st_size / 1e6:.2f} MB",
+             f"{table.header['processor_seconds']:.0f}", f"{error:.1%}")
+        )  # fmt: skip
+    return pages.table(("table", "size", "processor seconds", "error, mean"), rows)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Solve, draw, and write the page's part; return the exit code."""
+    parser = argparse.ArgumentParser(prog="polarised", description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="default: docs")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        picture = args.output / f"images/orders/{_NAME}.jpg"
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            files = {kind: folder / f"{kind}.nc" for kind in ("efficiencies", "Mueller matrices")}
+            for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
+                if program([*COMMAND, *option, "-o", str(file)]):
+                    raise DiffractionError(f"'{file.name}' cannot be solved; see above")
+            table = OrderTable.load(files["Mueller matrices"])
+            figure(table).savefig(folder / "figure.png", dpi=110)
+            write_jpeg(folder / "figure.png", picture)
+            cost = costs(files)
+        caption = (
+            f"Unpolarised light from {_THETA:g}° on this grating, across the grooves. Left: "
+            "efficiency. Right: degree of polarisation of the order, above 0 along the grooves."
+        )
+        text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
+        text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
+        pages.update(args.output / "orders.md", {_NAME: text})
+
+    return exit_code("polarised", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

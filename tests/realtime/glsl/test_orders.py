@@ -1,0 +1,141 @@
+"""Solved orders in the shaders, against the BRDF in NumPy summed over wavelengths."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.realtime.glsl.context import Bindings
+from mitsuba_diffraction.realtime.glsl.export import make_shader
+from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
+from mitsuba_diffraction.realtime.glsl.methods import method_tables
+from mitsuba_diffraction.realtime.glsl.orders import Solved, order_power, pack_orders
+from mitsuba_diffraction.realtime.glsl.packing import pack_responses
+from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from mitsuba_diffraction.tables.orders import OrderTable
+from tests.support.orders import load, thin_grating
+from tests.support.shaders import DAYLIGHT, difference, probed
+
+WIDTH = 65.0  # µm
+_LAM = np.arange(381.0, 780.0, 2.0)  # nm; lobes are at least 4 nm wide
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module", params=[1.0, 1.5], ids=["air", "layer"])
+def table(request: pytest.FixtureRequest) -> OrderTable:
+    return thin_grating(period=0.5, superstrate=request.param)
+
+
+def pairs(table: OrderTable, count: int = 12) -> tuple[Array, Array]:
+    """Directions in lobes of orders −1 to 1."""
+    rng = np.random.default_rng(4)
+    found: list[tuple[Array, list[float]]] = []
+    while len(found) < count:
+        wi = rng.normal(size=3) * [1, 1, 0.5]
+        wi = np.abs(wi) * [np.sign(wi[0]), np.sign(wi[1]), 1] / np.linalg.norm(wi)
+        shift = rng.integers(-1, 2) * rng.uniform(0.45, 0.65) / table.period
+        xy = [shift, 0.0] - wi[:2] + rng.normal(0.0, 0.005, 2)
+        if wi[2] > 0.15 and xy @ xy < 0.97:
+            found.append((wi, [*xy, np.sqrt(1.0 - xy @ xy)]))
+    wi, wo = np.array(found).transpose(1, 0, 2)
+    return wi, wo
+
+
+@pytest.fixture(scope="module")
+def colours(table: OrderTable) -> Array:
+    """f cosθo of the pairs under daylight, (n, 3)."""
+    wi, wo = pairs(table)
+    weights = 2.0 * linear_srgb(response(_LAM))
+    values = md.reference.orders_brdf(
+        table.efficiency, table.period, np.repeat(wi, len(_LAM), 0), np.repeat(wo, len(_LAM), 0),
+        np.tile(_LAM, len(wi)), coherence_width=WIDTH, superstrate=table.superstrate,
+    )  # fmt: skip
+    return wo[:, 2:] * (values.reshape(len(wi), -1) @ weights)
+
+
+def directions(wi: Array, wo: Array) -> Texture:
+    """Both rows of a texture."""
+    return Texture("directions", np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4"))
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+def test_colours_are_the_sum_over_wavelengths(
+    gl: Any, table: OrderTable, colours: Array, method: str
+) -> None:
+    wi, wo = pairs(table)
+    parts = pack_orders(method, table, sigma_of(WIDTH)) | pack_responses(DAYLIGHT)
+    parts |= Packed((directions(wi, wo),), {}, {"PAIRED": ""})
+    drawn = probed(gl, method, parts, np.zeros((len(wi), 4)))
+    # one or two wavelengths stand for a lobe, within which efficiencies change
+    assert difference(drawn, colours) < (0.02 if method == "fast" else 0.01)
+
+
+def test_drawn_directions_hold_all_light() -> None:
+    """The mean of f cosθ over the density of drawn directions is the sum of all efficiencies."""
+    table = thin_grating(period=0.7)
+    sigma, wavelength, wi = sigma_of(WIDTH), 550.0, np.array([0.3, 0.2, np.sqrt(0.87)])
+    packed = pack_lobes(lambda edges: order_power(table, sigma, edges), sigma)
+    textures = {texture.name: texture.data for texture in packed.textures}
+    uv = textures["lobe_places"].reshape(-1, 2).astype(float)
+    rings, azimuths = textures["lobe_densities"].shape[:2]
+    smallest, step = (packed.uniforms[f"lobe_{name}"] for name in ("smallest", "step"))
+    ring = np.floor(np.log(np.maximum(np.hypot(*uv.T), 1e-10) / smallest) / step) + 1
+    turn = np.arctan2(uv[:, 1], uv[:, 0]) / (2 * np.pi) % 1.0
+    cell = np.clip(ring, 0, rings - 1).astype(int), (turn * azimuths).astype(int) % azimuths
+    density = textures["lobe_densities"][..., 0][cell]
+    xy = uv - wi[:2]
+    squared = (xy**2).sum(axis=1)
+    wo = np.column_stack([xy, np.sqrt(np.maximum(1.0 - squared, 1e-6))])
+    near = (squared < 0.999) & (np.abs(uv[:, 1]) < 0.03)
+    f = md.reference.orders_brdf(
+        table.efficiency, table.period, wi, wo[near], wavelength, coherence_width=WIDTH
+    )
+    light = sum(float(table.efficiency(*-wi[:2], wavelength, m)) for m in range(-3, 4))
+    # a lobe of one wavelength holds about a thousand of the directions
+    assert float((f / density[near]).sum()) / len(uv) == pytest.approx(light, rel=0.03)
+
+
+def test_the_exported_shader_has_the_same_colours(
+    gl: Any, table: OrderTable, colours: Array, some_variant: str
+) -> None:
+    wi, wo = pairs(table)
+    shader = make_shader(load(table, coherence_width=WIDTH))
+    main = """
+    uniform sampler2D directions;
+    out vec4 fragment;
+    void main() {
+        ivec2 at = ivec2(int(gl_FragCoord.x) / 2, 0);
+        vec3 wi = texelFetch(directions, at, 0).xyz;
+        vec3 wo = texelFetch(directions, at + ivec2(0, 1), 0).xyz;
+        bool first = int(gl_FragCoord.x) % 2 == 0;
+        fragment = vec4(first ? diffraction(wi, wo) : diffraction_exact(wi, wo), 1.0);
+    }"""
+    vertex = "#version 330\nvoid main() {{ gl_Position = vec4({}); }}".format(
+        "gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0"
+    )
+    program = gl.program(
+        vertex_shader=vertex, fragment_shader=f"#version 330\n{shader.code}\n{main}"
+    )
+    bound = Bindings(gl, Packed((*shader.textures, directions(wi, wo)), shader.uniforms))
+    target = gl.texture((2 * len(wi), 1), 4, dtype="f4")
+    frame = gl.framebuffer([target])
+    frame.use()
+    bound.use(program)
+    gl.vertex_array(program, []).render(vertices=3)
+    drawn = np.frombuffer(target.read(), np.float32).reshape(-1, 2, 4)[..., :3].astype(float)
+    assert difference(drawn[:, 0], colours) < 0.02
+    assert difference(drawn[:, 1], colours) < 0.01
+
+
+def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
+    surface = Solved(load(table))
+    with pytest.raises(DiffractionError, match="solved orders; use method fast or exact"):
+        method_tables("flss", surface)
