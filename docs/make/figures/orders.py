@@ -102,8 +102,8 @@ SCENES = (
     ),
 )  # fmt: skip
 _HOW = (
-    "ΔE2000 is that of blocks of {} pixels on the disc, grating, wall or screen, as a display shows "
-    "them, with the noise of both pictures in it. `python -m docs.make.figures.orders` makes "
+    "ΔE2000 is that of blocks of {} pixels on the disc, grating, wall or screen, as a display "
+    "shows them, with the noise of both pictures in it. `python -m docs.make.figures.orders` makes "
     "pictures and table."
 )
 _HEADER = (
