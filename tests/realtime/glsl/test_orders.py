@@ -37,7 +37,7 @@ def table(request: pytest.FixtureRequest) -> OrderTable:
 def pairs(table: OrderTable, count: int = 12) -> tuple[Array, Array]:
     """Directions in lobes of orders −1 to 1."""
     rng = np.random.default_rng(4)
-    found = []
+    found: list[tuple[Array, list[float]]] = []
     while len(found) < count:
         wi = rng.normal(size=3) * [1, 1, 0.5]
         wi = np.abs(wi) * [np.sign(wi[0]), np.sign(wi[1]), 1] / np.linalg.norm(wi)
