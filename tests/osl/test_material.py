@@ -82,8 +82,8 @@ def test_pictures_agree_with_mitsuba(tmp_path):
         bsdf = exported(source, tmp_path / name, name)
         tangent = "radial-z" if shape == "disk" else "uv"
         cycles = {"folder": str(tmp_path / name), "tangent": tangent, "inputs": inputs}
-        views.append(View(shape, light, Surface(bsdf | beneath, cycles), 24, 16))
-    compared = compare(views, tmp_path, mitsuba_samples=2048, cycles_samples=512)
+        views.append(View(shape, light, Surface(bsdf | beneath, cycles), 20, 14))
+    compared = compare(views, tmp_path, mitsuba_samples=4096, cycles_samples=1024)
     for view, comparison in zip(views, compared, strict=True):
         assert comparison.beyond_noise <= 2.0, view.shape
         # noise that hides no larger difference

@@ -85,7 +85,6 @@ def inputs(material: Any) -> Any:
 def plain(name: str, colour: tuple[float, float, float], roughness: float) -> Any:
     """Return a material of Blender's own."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
     shader = material.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = roughness
@@ -122,7 +121,6 @@ def lights() -> None:
     """Add a small bright lamp, a soft one, and a dim room."""
     world = bpy.data.worlds.new("room")
     bpy.context.scene.world = world
-    world.use_nodes = True
     world.node_tree.nodes["Background"].inputs[0].default_value = (0.1, 0.11, 0.13, 1)
     for name, place, size, power in (
         ("lamp", (-3.5, -6.0, 7.5), 1.0, 900.0),

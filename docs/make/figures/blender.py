@@ -1,6 +1,6 @@
 """Tables and pictures of docs/blender.md: Cycles beside Mitsuba, noise, and the example .blend.
 
-python -m docs.make.figures.blender [-o docs] [--quick]
+python -m docs.make.figures.blender [-o docs] [--quick] [differences] [noise] [showcase]
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from . import pages
 _FOLDER = Path("out/blender")
 _SHOWCASE = Path(__file__).parents[1] / "blender/showcase.py"
 _SPACES = ("Linear Rec.2020", "Linear Rec.709")
+_PARTS = ("differences", "noise", "showcase")
 _MOST = 100_000  # bytes of a picture
 _PIGMENT = [0.1, 0.05, 0.02]
 
@@ -147,31 +148,43 @@ def side_by_side(compared: Sequence[Comparison], target: Path) -> None:
     pages.write_jpeg(file, target, width=1152, most=_MOST)
 
 
+def showcase(target: Path, samples: int) -> None:
+    """Build the example .blend, render it, and print the seconds of the render."""
+    folders = [str(example.folder) for example in (EXAMPLES["disc"], FOIL, EXAMPLES["scale"])]
+    picture, file = _FOLDER / "showcase.png", _FOLDER / "showcase.blend"
+    words = ["--output", str(file), "--picture", str(picture), "--samples", str(samples)]
+    time = seconds(run_in_blender(_SHOWCASE, [*folders, *words]))[0]
+    print(f"{picture}: {time.clock:.0f} s, {time.processor:.0f} s of processor")
+    pages.write_jpeg(picture, target, most=_MOST)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Compare, render, write the pictures and the page, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.blender")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
     parser.add_argument("--quick", action="store_true", help="small and noisy")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(_PARTS)}; all")
     args = parser.parse_args(argv)
+    if unknown := set(args.parts) - set(_PARTS):
+        parser.error(f"unknown part {', '.join(unknown)}; choose from {', '.join(_PARTS)}")
 
     def work() -> None:
         mi.set_variant("llvm_ad_rgb")
-        _FOLDER.mkdir(parents=True, exist_ok=True)
+        images = args.output / "images/blender"
+        for folder in (_FOLDER, images):
+            folder.mkdir(parents=True, exist_ok=True)
         for example in (*EXAMPLES.values(), FOIL):
             example.export()
-        table, compared = differences((512, 64) if args.quick else (8192, 1024), _FOLDER)
-        images = args.output / "images/blender"
-        images.mkdir(parents=True, exist_ok=True)
-        side_by_side(compared, images / "comparison.jpg")
-        pages.update(args.output / "blender.md", {"differences": table, "noise": noise(_FOLDER)})
-        surfaces = [EXAMPLES["disc"], FOIL, EXAMPLES["scale"]]
-        picture = _FOLDER / "showcase.png"
-        words = [*(str(example.folder) for example in surfaces), "--output",
-                 str(_FOLDER / "showcase.blend"), "--picture", str(picture),
-                 "--samples", "16" if args.quick else "256"]  # fmt: skip
-        time = seconds(run_in_blender(_SHOWCASE, words))[0]
-        print(f"{picture}: {time.clock:.0f} s, {time.processor:.0f} s of processor")
-        pages.write_jpeg(picture, images / "showcase.jpg", most=_MOST)
+        parts, page = args.parts or _PARTS, args.output / "blender.md"
+        if "differences" in parts:
+            samples = (512, 64) if args.quick else (4096, 512)
+            table, compared = differences(samples, _FOLDER)
+            pages.update(page, {"differences": table})
+            side_by_side(compared, images / "comparison.jpg")
+        if "noise" in parts:
+            pages.update(page, {"noise": noise(_FOLDER)})
+        if "showcase" in parts:
+            showcase(images / "showcase.jpg", 16 if args.quick else 256)
 
     return pages.exit_code("blender", work)
 
