@@ -1,6 +1,6 @@
 """Tables and pictures of docs/blender.md: Cycles beside Mitsuba, noise, and the example .blend.
 
-python -m docs.make.figures.blender [-o docs] [--quick] [differences] [noise] [showcase]
+python -m docs.make.figures.blender [-o docs] [--quick] [--samples N] [differences] [noise] [showcase]
 """
 
 from __future__ import annotations
@@ -163,6 +163,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.blender")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
     parser.add_argument("--quick", action="store_true", help="small and noisy")
+    parser.add_argument("--samples", type=int, default=256, help="of the example's picture; 256")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(_PARTS)}; all")
     args = parser.parse_args(argv)
     if unknown := set(args.parts) - set(_PARTS):
@@ -184,7 +185,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "noise" in parts:
             pages.update(page, {"noise": noise(_FOLDER)})
         if "showcase" in parts:
-            showcase(images / "showcase.jpg", 16 if args.quick else 256)
+            showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
 
     return pages.exit_code("blender", work)
 
