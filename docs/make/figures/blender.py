@@ -1,6 +1,6 @@
 """Tables and pictures of docs/blender.md: Cycles beside Mitsuba, noise, and the example .blend.
 
-python -m docs.make.figures.blender [-o docs] [--quick] [--samples N] [differences] [noise] [showcase]
+python -m docs.make.figures.blender [-o docs] [--quick] [--samples N] [PART ...]
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import mitsuba as mi
@@ -87,7 +87,8 @@ EXAMPLES = {
 #: Surface of the ball in the middle of the example .blend.
 FOIL = Example("precompute/orders/sinusoidal.nc", "sphere")
 _HEADER = ("surface", "light", "ΔE2000 beyond noise", "in Linear Rec.709", "noise")
-_NOISE = ("surface", "light", "16 samples", "64", "256", "seconds for 480 × 320 at 256")
+_COUNTS = (16, 64, 256)
+_NOISE = ("surface", "light", "16 samples", "64", "256", "seconds, 480 × 320 at 256")
 
 
 def differences(samples: tuple[int, int], folder: Path) -> tuple[str, list[Comparison]]:
@@ -95,9 +96,7 @@ def differences(samples: tuple[int, int], folder: Path) -> tuple[str, list[Compa
 
     samples : of Mitsuba and of Cycles.
     """
-    keys = [(name, light) for name in EXAMPLES for light in LIGHTS]
-    surfaces = {name: example.surface() for name, example in EXAMPLES.items()}
-    views = [View(EXAMPLES[name].shape, light, surfaces[name], 48, 32) for name, light in keys]
+    keys, views = _views()
     by_space = [
         compare(views, folder, mitsuba_samples=samples[0], cycles_samples=samples[1],
                 working_space=space)
@@ -117,20 +116,26 @@ def differences(samples: tuple[int, int], folder: Path) -> tuple[str, list[Compa
 
 
 def noise(folder: Path) -> str:
-    """Return the table of noise over samples, with the time of a picture on one core."""
+    """Return the table of Cycles' noise over samples, and of the time of a larger picture."""
+    keys, views = _views()
+    by_count = [
+        compare(views, folder, mitsuba_samples=64, cycles_samples=count) for count in _COUNTS
+    ]
     rows = []
-    for name, example in EXAMPLES.items():
-        for light in LIGHTS:
-            view = View(example.shape, light, example.surface(), 96, 64)
-            cells, times = [], []
-            for count in (16, 64, 256):
-                small = replace(view, width=48, height=32) if count == 256 else view
-                found = compare([small], folder, mitsuba_samples=256, cycles_samples=count)[0]
-                cells.append(f"{found.noise_of_cycles:.1f}")
-                times.append(found.seconds.processor / (small.width * small.height * count))
-            # without the time to build the scene, which small pictures show most
-            rows.append((name, light, *cells, f"{min(times) * 480 * 320 * 256:.0f}"))
+    for (name, light), *found in zip(keys, *by_count, strict=True):
+        # the difference of two pictures, without the time to build the scene
+        first, last = (comparison.seconds.processor for comparison in (found[0], found[-1]))
+        sample = (last - first) / (views[0].width * views[0].height * (_COUNTS[-1] - _COUNTS[0]))
+        noises = [f"{comparison.noise_of_cycles:.1f}" for comparison in found]
+        rows.append((name, light, *noises, f"{sample * 480 * 320 * 256:.0f}"))
     return pages.table(_NOISE, rows)
+
+
+def _views() -> tuple[list[tuple[str, str]], list[View]]:
+    """Return all surfaces in all lights: their names, and the views."""
+    keys = [(name, light) for name in EXAMPLES for light in LIGHTS]
+    surfaces = {name: example.surface() for name, example in EXAMPLES.items()}
+    return keys, [View(EXAMPLES[name].shape, light, surfaces[name], 48, 32) for name, light in keys]
 
 
 def side_by_side(compared: Sequence[Comparison], target: Path) -> None:
