@@ -17,7 +17,7 @@ pytestmark = [
     pytest.mark.usefixtures("coarse"),
 ]
 
-SOLVED = ("cd", "cd_window", "grating", "grating_window", "orders_on_wall")
+SOLVED = ("cd", "cd_window", "grating", "grating_window", "orders_on_wall", "spectrometer")
 LARGE = ("sphere", "snake", "xenopeltis")
 STUDIO = (
     "hologram",
@@ -26,7 +26,6 @@ STUDIO = (
     "scales",
     "scales_macro",
     "film",
-    "spectrometer",
 )
 
 

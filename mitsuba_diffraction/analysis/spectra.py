@@ -30,6 +30,7 @@ from ..plugin.fresnel import Conductor
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
+from ..tables.table import DiffractionTable
 
 Reals = NDArray[np.float64]
 
@@ -180,21 +181,21 @@ def spectrum(
     material = getattr(getattr(bsdf, "boundary", None), "material", None)
     if isinstance(material, Conductor):
         check_material(material.name, lam)
-    table = getattr(bsdf, "table", None)
-    if table is not None and lam.min() < table.wavelength_range[0]:
+    table, sigma = getattr(bsdf, "table", None), getattr(bsdf, "sigma", None)
+    if isinstance(table, DiffractionTable) and lam.min() < table.wavelength_range[0]:
         raise DiffractionError(
             f"wavelength {lam.min():g} nm is below the table's shortest, "
             f"{table.wavelength_range[0]:g} nm; give longer ones, or build a wider table with "
             "'mitsuba-diffraction precompute --wavelength-range'"
         )
-    signals = _signals(bsdf, table, geometry, lam, progress)
+    signals = _signals(bsdf, sigma, geometry, lam, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)
         # ∫ cosθ/π dω over a cone about a direction at θ: cosθ sin²(half)
         angles = np.radians(geometry.detectors)
         signals = signals / (np.cos(angles) * math.sin(half) ** 2)
     elif relative == "mirror":
-        signals = signals / _of_mirror(table, geometry, lam)
+        signals = signals / _of_mirror(sigma, geometry, lam)
     value, s, p = signals if mi.is_polarized else (signals[0], None, None)
     return Spectra(lam, value, geometry, relative, s, p)
 
@@ -251,9 +252,11 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
     )
 
 
-def _signals(bsdf: Any, table: Any, geometry: Geometry, lam: Reals, progress: Progress) -> Reals:
+def _signals(
+    bsdf: Any, sigma: float | None, geometry: Geometry, lam: Reals, progress: Progress
+) -> Reals:
     """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
-    lobe = _lobe(table, lam)
+    lobe = _lobe(sigma, lam)
     parts = 3 if mi.is_polarized else 1
     result = np.zeros((parts, lam.size, len(geometry.detectors)))
     for n, angle in enumerate(geometry.detectors):
@@ -264,9 +267,9 @@ def _signals(bsdf: Any, table: Any, geometry: Geometry, lam: Reals, progress: Pr
     return result
 
 
-def _lobe(table: Any, lam: Reals) -> float:
+def _lobe(sigma: float | None, lam: Reals) -> float:
     """Return the standard deviation of the narrowest lobe, rad: of exp(−σ²k²Δ²), 1/(√2 σk)."""
-    return 0.05 if table is None else 1.0 / (2**0.5 * table.sigma * float(wavenumber(lam[0])))
+    return 0.05 if sigma is None else 1.0 / (2**0.5 * sigma * float(wavenumber(lam[0])))
 
 
 def _light(geometry: Geometry) -> Reals:
@@ -363,15 +366,15 @@ def _stokes(light: Reals, across: Reals) -> Reals:
     return np.array([1.0, math.cos(double), math.sin(double)])
 
 
-def _of_mirror(table: Any, geometry: Geometry, lam: Reals) -> Reals:
+def _of_mirror(sigma: float | None, geometry: Geometry, lam: Reals) -> Reals:
     """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to.
 
     Its f is Kirchhoff's factor times ⟨|P|²⟩ = 4π²σ⁴ exp(−σ²q²), eq. 3 and 4 of `reference.model`.
     """
-    if table is None:
+    if sigma is None:
         return np.ones((lam.size, 1))
-    directions, solid = _cone(geometry, geometry.light, _lobe(table, lam))
-    light, sigma = _light(geometry), float(table.sigma)
+    directions, solid = _cone(geometry, geometry.light, _lobe(sigma, lam))
+    light = _light(geometry)
     squares = np.square(directions[:, :2] + light[:2]).sum(axis=1)
     weights = 4.0 * np.pi**2 * sigma**4 * solid * directions[:, 2]
     signals = [

@@ -31,6 +31,7 @@ from typing import Any
 from ..errors import DiffractionError, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import number_between
+from ..heights.recipes import SOLVED
 from ..tables.orders.table import WAVELENGTHS
 from .orders import Settings
 from .profiles import GENERATORS, Profile, read_profile
@@ -74,6 +75,11 @@ class SolvedRecipe:
             raise DiffractionError(
                 f"{shown} is not a recipe (TOML): {one_line(str(error))}"
             ) from error
+        if content.get("method") != SOLVED:
+            raise DiffractionError(
+                f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
+                "mitsuba-diffraction precompute"
+            )
         for key in content:
             if key not in _KEYS:
                 near = difflib.get_close_matches(key, _KEYS, 1)
@@ -81,10 +87,6 @@ class SolvedRecipe:
                 raise DiffractionError(
                     f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
                 )
-        if content.get("method") != "solved":
-            raise DiffractionError(
-                f'{shown}: this recipe has no line method = "solved"; build its table by precompute'
-            )
         output, arguments = content.get("output", f"{file.stem}.nc"), content.get("arguments", {})
         try:
             if not (isinstance(output, str) and output.endswith(".nc")):

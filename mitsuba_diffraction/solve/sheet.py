@@ -74,13 +74,20 @@ def _efficiencies(amplitudes: Complex, station: Station, index: float, y: float)
 def _structured(amplitudes: Complex, channels: int) -> Complex:
     """Return the products (4 ports out, 4 ports in) of the structured side.
 
-    Light from within adds up over many reflections: its sums are scaled to 1, so that it neither
-    grows nor fades by the solver's error.
+    Light from within adds up over many reflections. It must neither grow nor fade by the solver's
+    error, which is largest where it stays within: R becomes the nearest matrix that conserves
+    energy with U, W √(1 − U†U) with a unitary W (Higham 2008, "Functions of matrices", section 8).
     """
-    power = (np.abs(amplitudes) ** 2).sum(axis=(2, 3))
-    power[:channels] = 1.0
-    scale = 1.0 / np.sqrt(np.where(power > 0.0, power, 1.0))
-    jones = (amplitudes * scale[:, :, None, None]).transpose(2, 3, 0, 1)
+    ports, n = len(amplitudes), 2 * channels
+    matrix = amplitudes.transpose(2, 3, 0, 1).reshape(2 * ports, 2 * ports).copy()
+    lit = n + np.flatnonzero(np.abs(matrix[n:, n:]).any(axis=0))
+    inner = np.ix_(lit, lit)
+    up = matrix[:n, lit]
+    squares, vectors = np.linalg.eigh(np.eye(len(lit)) - up.conj().T @ up)
+    root = (vectors * np.sqrt(np.maximum(squares, 0.0))) @ vectors.conj().T
+    left, _, right = np.linalg.svd(matrix[inner] @ root)
+    matrix[inner] = left @ right @ root
+    jones = matrix.reshape(ports, 2, ports, 2)
     products = np.einsum("qajc,qbjd->qabjcd", jones, jones.conj(), optimize=True)
     return np.asarray(products.reshape(4 * jones.shape[0], -1))
 

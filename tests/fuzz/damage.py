@@ -196,7 +196,7 @@ def check_scene(rng: np.random.Generator) -> None:
         try:
             loaded = load_scene(scene, {})
         except md.DiffractionError as error:
-            _check_line(error)
+            check_line(error)
             return
         for shape in loaded.shapes():
             if shape.bsdf() is not None and "Diffraction[" in str(shape.bsdf()):
@@ -211,10 +211,11 @@ def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], obj
         try:
             use(path)
         except md.DiffractionError as error:
-            _check_line(error)
+            check_line(error)
 
 
-def _check_line(error: md.DiffractionError) -> None:
+def check_line(error: md.DiffractionError) -> None:
+    """An error is one line, and no long one."""
     assert len(str(error)) <= _MOST, "too long a message"
     assert "\n" not in str(error), "more than one line"
 

@@ -93,7 +93,10 @@ SMALLER = {
         "spp=512": "spp=64",
         "spp=128": "spp=16",
     },
-    "solved_orders": {"spp=256": "spp=8"},
+    "solved_orders": {
+        "spp=256": "spp=8",
+        "wavelengths=(480.0, 640.0), tolerance=0.02": "wavelengths=(560.0, 640.0), tolerance=0.2",
+    },
     "speed_and_accuracy": {
         "pixels=240": "pixels=128",
         "PAIRS = 80": "PAIRS = 40",

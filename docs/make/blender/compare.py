@@ -49,16 +49,22 @@ class Comparison:
 
 
 def compare(
-    views: Sequence[View], folder: Path, *, mitsuba_samples: int, cycles_samples: int
+    views: Sequence[View],
+    folder: Path,
+    *,
+    mitsuba_samples: int,
+    cycles_samples: int,
+    working_space: str = "Linear Rec.2020",
 ) -> list[Comparison]:
-    """Render views with both renderers and compare them; a spectral variant must be set.
+    """Render views with both renderers and compare them; a variant with colours must be set.
 
     Parameters
     ----------
     folder : for the files of Blender.
     mitsuba_samples, cycles_samples : per pixel.
+    working_space : of Blender, by its name there.
     """
-    halves, times = _cycles(views, folder, cycles_samples // 2)
+    halves, times = _cycles(views, folder, cycles_samples // 2, working_space)
     found = []
     for view, cycles, time in zip(views, halves, times, strict=True):
         scene = mi.load_dict(view.for_mitsuba())
@@ -84,7 +90,7 @@ def _mean_delta_e(
 
 
 def _cycles(
-    views: Sequence[View], folder: Path, samples: int
+    views: Sequence[View], folder: Path, samples: int, working_space: str
 ) -> tuple[list[tuple[Picture, Picture]], list[Seconds]]:
     """Render all views twice, in one process."""
     jobs = [
@@ -93,6 +99,7 @@ def _cycles(
             "output": str(folder / f"cycles_{number}_{seed}.exr"),
             "samples": samples,
             "seed": seed,
+            "working_space": working_space,
         }
         for number, view in enumerate(views)
         for seed in (0, 1)

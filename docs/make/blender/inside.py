@@ -2,9 +2,9 @@
 
     python inside.py jobs.json
 
-jobs.json is a list of views with the picture to write, the samples and the seed. Pictures are
-linear sRGB. Filters, clamps, denoising and adaptive samples are off, so that pixels are means of
-radiance, as Mitsuba's. Imports nothing of the package: bpy alone.
+jobs.json is a list of views with the picture to write, the samples, the seed and the working
+space. Pictures are linear sRGB. Filters, clamps, denoising and adaptive samples are off, so that
+pixels are means of radiance, as Mitsuba's. Imports nothing of the package: bpy alone.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import time
 from typing import Any
 
 import bpy
-from mathutils import Vector
+from mathutils import Color, Vector
 
 #: Largest number of reflections, as of the path tracer's depth of 3.
 _BOUNCES = 2
@@ -31,6 +31,7 @@ def main() -> None:
     for job in jobs:
         view = job["view"]
         bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.set_working_color_space(working_space=job["working_space"])
         scene = settings(job["samples"], job["seed"], *view["size"])
         target = shape(view["shape"])
         target.data.materials.append(material(view["surface"]))
@@ -38,6 +39,8 @@ def main() -> None:
         scene.camera = camera(**view["camera"])
         scene.render.image_settings.file_format = "OPEN_EXR"
         scene.render.image_settings.color_depth = "32"
+        scene.render.image_settings.color_management = "OVERRIDE"
+        scene.render.image_settings.linear_colorspace_settings.name = "Linear Rec.709"
         scene.render.filepath = job["output"]
         clock, processor = time.perf_counter(), time.process_time()
         bpy.ops.render.render(write_still=True)
@@ -82,6 +85,8 @@ def material(surface: dict[str, Any]) -> Any:
         made = module.add_material(surface["folder"], tangent=surface["tangent"])
         group = next(node for node in made.node_tree.nodes if node.type == "GROUP")
         for name, value in surface["inputs"].items():
+            if isinstance(value, list):  # a colour, which nodes have in the working space
+                value = [*Color(value).from_rec709_linear_to_scene_linear(), 1]
             group.inputs[name].default_value = value
         return made
     made = bpy.data.materials.new("plain")
@@ -114,7 +119,7 @@ def lights(scene: Any, light: dict[str, Any]) -> None:
         node.image.colorspace_settings.name = "Linear Rec.709"
         world.node_tree.links.new(node.outputs[0], background.inputs[0])
         return
-    background.inputs[0].default_value = (0, 0, 0, 1)
+    background.inputs[0].default_value = (*[light["room"]] * 3, 1)
     lamp = bpy.data.lights.new("lamp", "AREA")
     lamp.shape, lamp.size = "DISK", 2 * light["radius"]
     # a lamp of power P and area A has the radiance P / (π A)

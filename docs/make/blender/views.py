@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 SHAPES = ("disk", "rectangle", "sphere")
 LIGHTS = ("lamp", "sky")
 
-#: Lamp: position, radius and radiance of a disk that faces the origin.
-_LAMP = {"position": (1.0, 1.5, 3.5), "radius": 0.25, "radiance": 20.0}
+#: Lamp: position, radius and radiance of a disk that faces the origin, in a dim room.
+_LAMP = {"position": (1.0, 1.5, 3.5), "radius": 0.8, "radiance": 2.0}
+_ROOM = 0.05
 #: Camera: position, target, and the horizontal angle of view in degrees.
 _CAMERA = {"position": (0.0, -4.0, 3.5), "target": (0.0, 0.0, 0.0), "angle": 30.0}
 #: Height of the environment map in pixels; its width is twice that.
@@ -60,7 +61,7 @@ class View:
     height: int = 107
 
     def for_mitsuba(self) -> dict[str, Any]:
-        """Return the scene for `mi.load_dict`; a spectral variant must be set."""
+        """Return the scene for `mi.load_dict`."""
         camera = mi.ScalarTransform4f().look_at(
             origin=_CAMERA["position"], target=_CAMERA["target"], up=[0, 0, 1]
         )
@@ -83,12 +84,12 @@ class View:
                 "film": film,
             },
             "shape": {"type": self.shape, "bsdf": dict(self.surface.mitsuba)},
-            "light": _lamp() if self.light == "lamp" else _sky(),
+            **(_lamp() if self.light == "lamp" else _sky()),
         }
 
     def for_cycles(self, folder: Path) -> dict[str, Any]:
         """Return the scene for `inside.py`; writes the environment map to the folder."""
-        light: dict[str, Any] = dict(_LAMP)
+        light: dict[str, Any] = {**_LAMP, "room": _ROOM}
         if self.light == "sky":
             sky = folder / "sky.exr"
             mi.Bitmap(sky_radiance()).write(str(sky))
@@ -119,14 +120,20 @@ def sky_radiance() -> NDArray[np.float32]:
 
 def _lamp() -> dict[str, Any]:
     place = mi.ScalarTransform4f().look_at(origin=_LAMP["position"], target=[0, 0, 0], up=[0, 0, 1])
-    return {
+    lamp = {
         "type": "disk",
         "to_world": place @ mi.ScalarTransform4f().scale(_LAMP["radius"]),
-        "emitter": {"type": "area", "radiance": {"type": "d65", "scale": _LAMP["radiance"]}},
+        "emitter": {"type": "area", "radiance": _grey(_LAMP["radiance"])},
     }
+    return {"lamp": lamp, "room": {"type": "constant", "radiance": _grey(_ROOM)}}
+
+
+def _grey(radiance: float) -> dict[str, Any]:
+    return {"type": "rgb", "value": radiance}
 
 
 def _sky() -> dict[str, Any]:
     # from Mitsuba's map, whose y is up and whose columns begin at −z
     upright = mi.ScalarTransform4f().rotate([0, 0, 1], 90).rotate([1, 0, 0], 90)
-    return {"type": "envmap", "bitmap": mi.Bitmap(sky_radiance()), "to_world": upright}
+    sky = {"type": "envmap", "bitmap": mi.Bitmap(sky_radiance()), "to_world": upright}
+    return {"sky": sky}

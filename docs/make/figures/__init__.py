@@ -8,6 +8,7 @@ tables                  tables of what `bench`, `tradeoff`, `plan` and `info --e
 realtime                tables of what `compare` measured
 evaluation, thesis      pages about the thesis' methods: the grating equation; a table, and sweeps
 cluster, wide           a film on workers; a scan of 16,384² points, whole and by windows
+sheets                  transmitted orders of thin sheets, model and solution
 parameters              the reference of the plugin's parameters, from its own docstring
 polarised               degree of polarisation of a grating's orders
 notebooks               notebooks, run anew

@@ -133,7 +133,8 @@ PICTURES = (
     ),
     _scene(
         "spectrometer", "A grating spectrometer",
-        "Lamp light through a slit and a clear grating onto a screen, traced from the lamp.",
+        "Lamp light through a slit and a clear grating onto a screen, traced from the lamp. The "
+        "grating has [solved orders](orders.md#thin-sheets).",
     ),
     _scene(
         "material_ball", "A ball of any material",

@@ -39,6 +39,7 @@ class Figure:
 
 
 _ROUGH, _DEFAULT = "× roughconductor", "diffraction, the defaults"
+_SOLVED = "solved orders"
 _EFFICIENCY, _DELTA = "variance × time, ratio", "mean ΔE2000"
 FIGURES = (
     Figure("build", "1332²", "table of 1332² pixels", "s", "{:.1f} s", 0),
@@ -59,6 +60,12 @@ FIGURES = (
     Figure("noise", "0°", "noise of one sample, light from 0°", "most", "{:.2f}", 0),
     Figure("noise", "45°", "from 45°", "most", "{:.2f}", 0),
     Figure("noise", "75°", "from 75°", "most", "{:.2f}", 0),
+    Figure(_SOLVED, "eval CD", "a CD's solved orders, `eval` / `roughconductor`", _ROUGH, "{:.1f}",
+           0),
+    Figure(_SOLVED, "sample CD", "their `sample` / `roughconductor`", _ROUGH, "{:.1f}", 0),
+    Figure(f"noise of {_SOLVED}", "CD, 0°", "their noise, light from 0°", "most", "{:.2f}", 0),
+    Figure(f"noise of {_SOLVED}", "CD, 45°", "from 45°", "most", "{:.2f}", 0),
+    Figure(f"noise of {_SOLVED}", "CD, 75°", "from 75°", "most", "{:.2f}", 0),
     Figure("efficiency", "white", "variance × time in a white furnace, cosine sampling's / ours",
            _EFFICIENCY, "{:.0f}", 0),
     Figure("efficiency", "snake", "the same, snake under a window", _EFFICIENCY, "{:.0f}", 0),

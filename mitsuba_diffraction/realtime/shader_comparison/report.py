@@ -15,14 +15,16 @@ from .measures import Difference, Image
 
 _WORST = 8.0  # ΔE2000 at the end of the scale
 
+# times are ratios: those of one machine, and of a busy one, say little; compare.json has them in ms
 _HEAD = (
-    "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | fragment, ns "
-    "| × `flss` | look-up, ns | textures, MB |\n|---|---|---|---|---|---|---|---|---|---|"
+    "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, × `{first}` "
+    "| fragment, × `{first}` | × `flss` | look-up in a fragment | textures, MB |\n"
+    "|---|---|---|---|---|---|---|---|---|---|"
 )
 
 _WHOLE = (
     "| method | ΔE2000 mean | 99 % | noise | FLIP | relative RMSE | ΔE2000 to full light "
-    "| frame, ms | × without shadows |\n|---|---|---|---|---|---|---|---|---|"
+    "| frame, × `{first}` | × without shadows |\n|---|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -92,19 +94,23 @@ def markdown(document: dict[str, Any]) -> str:
     ----------
     document : content of compare.json.
     """
-    slow = document["methods"].get("flss", {}).get("fragment_ns")
-    rows = [_row(method, entry, slow) for method, entry in document["methods"].items()]
-    whole = [_whole_row(m, entry) for m, entry in document["methods"].items() if "whole" in entry]
-    share = next(iter(document["methods"].values()))["diffracting"]["share"]
+    methods = document["methods"]
+    first = next(iter(methods))
+    slow = methods.get("flss", {}).get("fragment_ns")
+    rows = [_row(method, entry, methods[first], slow) for method, entry in methods.items()]
+    lit = {method: entry for method, entry in methods.items() if "whole" in entry}
+    whole = [_whole_row(m, entry, next(iter(lit.values()))) for m, entry in lit.items()]
+    share = methods[first]["diffracting"]["share"]
     width, height = document["size"]
+    head = _WHOLE.format(first=next(iter(lit), first))
     return "\n".join(
         [
-            *([_WHOLE, *whole, ""] if whole else []),
+            *([head, *whole, ""] if whole else []),
             f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
             f"{_samples(document)} samples a pixel, against {document['spp']} of the path tracer; "
             f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
             "",
-            _HEAD,
+            _HEAD.format(first=first),
             *rows,
             "",
             f"Lights without extent, no shadows: {100 * share:.0f} % of the pixels, those that "
@@ -120,25 +126,29 @@ def _samples(document: dict[str, Any]) -> int:
     return int(max(samples, default=0) / document["frames"])
 
 
-def _whole_row(method: str, entry: dict[str, Any]) -> str:
-    """Return the row of a method in progressive light, over all pixels."""
+def _whole_row(method: str, entry: dict[str, Any], first: dict[str, Any]) -> str:
+    """Return the row of a method in progressive light, over all pixels; first : for times."""
     whole = entry["whole"]
     direct, full = whole["direct"], whole["full"]
     return _line(
         method, direct["delta_e_mean"], direct["delta_e_percentiles"]["99"],
         whole["noise"]["delta_e_mean"], direct["flip"], direct["relative_rmse"],
-        full and full["delta_e_mean"], whole["frame_ms"],
+        full and full["delta_e_mean"], whole["frame_ms"] / first["whole"]["frame_ms"],
         whole["frame_ms"] / whole["plain_frame_ms"],
     )  # fmt: skip
 
 
-def _row(method: str, entry: dict[str, Any], slow: float | None) -> str:
-    """Return the row of a method under points and directions, over diffracting pixels."""
+def _row(method: str, entry: dict[str, Any], first: dict[str, Any], slow: float | None) -> str:
+    """Return the row of a method under points and directions, over diffracting pixels.
+
+    first : method whose times are 1.
+    slow : time of a fragment of `flss`, ns, or None.
+    """
     errors = entry["diffracting"]
     return _line(
         method, errors["delta_e_mean"], errors["delta_e_percentiles"].get("99"), errors["flip"],
-        errors["relative_rmse"], entry["frame_ms"], entry["fragment_ns"],
-        slow / entry["fragment_ns"] if slow else None, entry["look_up_ns"],
+        errors["relative_rmse"], *(entry[n] / first[n] for n in ("frame_ms", "fragment_ns")),
+        slow / entry["fragment_ns"] if slow else None, entry["look_up_ns"] / entry["fragment_ns"],
         entry["texture_bytes"] / 1e6,
     )  # fmt: skip
 

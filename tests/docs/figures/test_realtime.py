@@ -53,7 +53,7 @@ def page(tmp_path):
 def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
-    assert "| `fast` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
+    assert "| `fast` | 0.46 | 3.21 | 0.021 |  | 1.00 | 1.00 | 1000 | 0.35 | 21.0 |" in text
     fast, exact = "0.46 | 3.21 | 0.28 | 1.50", "0.32 | 3.21 | 0.28 | 1.50"
     assert f"| [plate](../scenes/plate.xml) | {fast} | {exact} | 0.28 | 1.50 |" in text
     assert "All 64 × 40 pixels" in text

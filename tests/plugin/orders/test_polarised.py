@@ -117,3 +117,14 @@ def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
     si = interaction(WI, np.tile(LAM, (len(WI), 1)))
     value = np.array(load(table).eval(mi.BSDFContext(), si, mi.Vector3f(wo.T)), float).T
     assert polarised_light == pytest.approx(value, rel=1e-5)  # single precision
+
+
+def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
+    spectra = md.spectrum(
+        load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",
+        wavelengths=LAM,
+    )  # fmt: skip
+    r_s, r_p = amplitudes(np.cos(np.radians(56.0)), INDEX)
+    # interpolation, and the mirror's lobe over the cone
+    assert spectra.s == pytest.approx(np.full((4, 1), abs(r_s) ** 2), abs=5e-3)
+    assert spectra.p == pytest.approx(np.full((4, 1), abs(r_p) ** 2), abs=5e-3)

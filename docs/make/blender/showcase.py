@@ -1,0 +1,150 @@
+"""Build the example .blend, a disc, a foil and a snake's scale on plinths, in Blender's Python.
+
+    python showcase.py DISC FOIL SCALE --output showcase.blend [--picture FILE] [--samples N]
+
+DISC, FOIL and SCALE are folders of `mitsuba-diffraction export-osl`. Prints the seconds of the
+render. Imports nothing of the package: bpy and the exported blender_material.py alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import math
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy
+from mathutils import Vector
+
+#: Distance between the plinths.
+_STEP = 2.6
+
+
+def main() -> None:
+    """Build, save and render as the command line says."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folders", type=Path, nargs=3)
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--picture", type=Path)
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--size", type=int, nargs=2, default=(480, 320))
+    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    options = parser.parse_args(words)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.set_working_color_space(working_space="Linear Rec.2020")
+    disc, foil, scale = (
+        exported(folder, tangent)
+        for folder, tangent in zip(options.folders, ("radial-z", "uv", "uv"), strict=True)
+    )
+    inputs(disc)["Rotation (°)"].default_value = -90.0
+    inputs(scale)["Pigment"].default_value = (0.03, 0.015, 0.008, 1)
+    room()
+    bpy.ops.mesh.primitive_cylinder_add(vertices=256, radius=1.15, depth=0.02)
+    tilted = bpy.context.object
+    tilted.location, tilted.rotation_euler = (-_STEP, 0.25, 1.3), (math.radians(50), 0, 0.25)
+    tilted.data.materials.append(disc)
+    hole(tilted)
+    for x, material in ((0.0, foil), (_STEP, scale)):
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, location=(x, 0, 1.4))
+        bpy.ops.object.shade_smooth()
+        bpy.context.object.rotation_euler = (0, math.radians(90), 0)
+        bpy.context.object.data.materials.append(material)
+    lights()
+    scene = bpy.context.scene
+    scene.cycles.samples = options.samples
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.render.resolution_x, scene.render.resolution_y = options.size
+    scene.camera = camera()
+    if options.picture:
+        scene.render.filepath = str(options.picture.resolve())
+        clock, processor = time.perf_counter(), time.process_time()
+        bpy.ops.render.render(write_still=True)
+        clock, processor = time.perf_counter() - clock, time.process_time() - processor
+        print(f"seconds {clock:.2f} processor {processor:.2f}", flush=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(options.output.resolve()), compress=True)
+
+
+def exported(folder: Path, tangent: str) -> Any:
+    """Return the material of an exported folder, by the script that lies in it."""
+    spec = importlib.util.spec_from_file_location("material", folder / "blender_material.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.add_material(folder, tangent=tangent)
+
+
+def inputs(material: Any) -> Any:
+    """Return the inputs of a material's node group."""
+    return next(node for node in material.node_tree.nodes if node.type == "GROUP").inputs
+
+
+def plain(name: str, colour: tuple[float, float, float], roughness: float) -> Any:
+    """Return a material of Blender's own."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Roughness"].default_value = roughness
+    return material
+
+
+def room() -> None:
+    """Add a floor that rises behind, and three plinths."""
+    floor = plain("floor", (0.11, 0.11, 0.12), 0.5)
+    bpy.ops.mesh.primitive_plane_add(size=60)
+    bpy.context.object.data.materials.append(floor)
+    plinth = plain("plinth", (0.02, 0.02, 0.022), 0.35)
+    for x in (-_STEP, 0.0, _STEP):
+        bpy.ops.mesh.primitive_cylinder_add(
+            vertices=96, radius=0.85, depth=0.4, location=(x, 0, 0.2)
+        )
+        bpy.context.object.data.materials.append(plinth)
+
+
+def hole(disc: Any) -> None:
+    """Add the clear hub of a disc: a dark ring on both faces."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=96, radius=0.4, depth=0.024)
+    hub = bpy.context.object
+    hub.location, hub.rotation_euler = disc.location, disc.rotation_euler
+    hub.data.materials.append(plain("hub", (0.2, 0.2, 0.21), 0.25))
+    bpy.ops.mesh.primitive_cylinder_add(vertices=96, radius=0.14, depth=0.028)
+    centre = bpy.context.object
+    centre.location, centre.rotation_euler = disc.location, disc.rotation_euler
+    centre.data.materials.append(plain("centre", (0.01, 0.01, 0.01), 0.6))
+
+
+def lights() -> None:
+    """Add a small bright lamp, a soft one, and a dim room."""
+    world = bpy.data.worlds.new("room")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs[0].default_value = (0.12, 0.13, 0.15, 1)
+    for name, place, size, power in (
+        ("lamp", (-1.5, -2.5, 6.5), 0.7, 420.0),
+        ("soft", (6.0, 1.0, 4.0), 2.5, 260.0),
+    ):
+        lamp = bpy.data.lights.new(name, "AREA")
+        lamp.shape, lamp.size, lamp.energy = "DISK", size, power
+        aim(bpy.data.objects.new(name, lamp), place, (0, 0, 1))
+
+
+def camera() -> Any:
+    """Return the camera."""
+    lens = bpy.data.cameras.new("camera")
+    lens.angle = math.radians(36)
+    return aim(bpy.data.objects.new("camera", lens), (0, -12.5, 4.6), (0, 0, 1.15))
+
+
+def aim(thing: Any, place: tuple[float, float, float], target: tuple[float, float, float]) -> Any:
+    """Add an object to the scene, with its −z axis towards a target."""
+    thing.location = place
+    towards = Vector(target) - Vector(place)
+    thing.rotation_euler = towards.to_track_quat("-Z", "Y").to_euler()
+    bpy.context.collection.objects.link(thing)
+    return thing
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""Transmitted orders of thin sheets, model and solution: docs/orders.md.
+
+python -m docs.make.figures.sheets
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.profiles import Profile, sinusoidal
+from mitsuba_diffraction.solve.sheet import sheet_efficiencies
+from mitsuba_diffraction.solve.stations import Grating
+from mitsuba_diffraction.tables.orders import cells
+
+from . import pages
+from .pages import exit_code
+
+_INDEX, _WIDTH, _RANGE = 1.58, 65.0, (380.0, 730.0)
+_WAVELENGTHS, _THETAS, _PHIS = (460.0, 610.0), (0.0, 30.0, 60.0), (0.0, 60.0)
+
+
+class Case(NamedTuple):
+    """Sheet, and the points of its solution, which 1.4 times as many change by 0.1 % at most."""
+
+    title: str
+    profile: Profile
+    points: int
+
+
+CASES = (
+    Case("250 lines/mm, 0.22 µm (`film.xml`)", sinusoidal(4.0, 0.22), 200),
+    Case("600 lines/mm, 0.09 µm (`spectrometer.xml`)", sinusoidal(1.6667, 0.09), 120),
+    Case("1000 lines/mm, 0.3 µm", sinusoidal(1.0, 0.3), 120),
+)
+
+
+def row(case: Case) -> tuple[str, ...]:
+    """Return the cells of a case: mean misplaced share of the transmitted orders, by angle."""
+    cells_of = []
+    for theta in _THETAS:
+        missed = [
+            _missed(case, theta, phi, lam)
+            for phi in (_PHIS if theta else (0.0,))
+            for lam in _WAVELENGTHS
+        ]
+        cells_of.append(f"{np.mean(missed):.0%}")
+    return (case.title, *cells_of)
+
+
+def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
+    """Return Σ|model − solution| over Σ solution, of the transmitted orders but 0."""
+    turn, tilt = np.radians(phi), np.radians(theta)
+    wi = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
+    period = case.profile.period
+    cell = cells.to_cell(-wi[0], -wi[1], wavelength, period)
+    w = cells.w_of(cell.k_continuous, wavelength, _RANGE, period)
+    grating = Grating(case.profile, material_of(_INDEX, _RANGE), 1.0, _RANGE, thin=True)
+    station = grating.station(
+        int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), float(w)
+    )
+    amplitudes = IntegralSolver(case.profile, case.points).amplitudes(station)
+    powers = sheet_efficiencies(amplitudes, station)[0, int(cell.channel)]
+    solved = powers[:, station.channels :].mean(axis=0).sum(axis=-1)
+    orders = int(cell.channel) - np.arange(station.channels)
+    x = orders * wavelength / (1e3 * period) - wi[0]
+    y = np.full(len(x), -wi[1])
+    wo = np.stack([x, y, -np.sqrt(1.0 - x**2 - y**2)], axis=-1)
+    # the power of a lobe from the value at its centre
+    width = sigma_of(_WIDTH) * 2e3 * np.pi / wavelength
+    values = reference.btdf(
+        _heights(case.profile), np.tile(wi, (len(wo), 1)), wo, wavelength,
+        eta=_INDEX, thin=True, coherence_width=_WIDTH,
+    )  # fmt: skip
+    others = orders != 0
+    return float(np.abs(values * np.pi / width**2 - solved)[others].sum() / solved[others].sum())
+
+
+def _heights(profile: Profile) -> HeightField:
+    x, z = profile.closed
+    step = profile.period / 64
+    heights = np.interp((np.arange(64) + 0.5) * step, x, z)
+    return HeightField(np.tile(heights, (4, 1)), step, periodic=True)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the table of the page, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.sheets")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        header = ("sinusoidal sheet of index 1.58", *(f"{theta:g}°" for theta in _THETAS))
+        text = pages.table(header, [row(case) for case in CASES])
+        text += "\n\n`python -m docs.make.figures.sheets` makes this table."
+        pages.update(args.output / "orders.md", {"sheets": text})
+
+    return exit_code("sheets", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
