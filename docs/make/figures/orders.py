@@ -100,6 +100,12 @@ SCENES = (
         "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=512"),
         "Transmitted orders of a shallow sheet, which the model misses by 4 %: no viewer sees it.",
     ),
+    Scene(
+        "spectrometer", "sheet of 600 lines/mm, index 1.58, in a spectrometer", "rulings", "screen",
+        _RECIPE.format("sinusoidal") + "period = 1.6667\ndepth = 0.09\npixels_per_period = 64\n",
+        "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=256"),
+        "Shallow waves of a clear material are what the model is made for.",
+    ),
 )  # fmt: skip
 _HOW = (
     "ΔE2000 is that of blocks of {} pixels on the disc, grating, wall or screen, as a display "
