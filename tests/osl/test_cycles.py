@@ -40,9 +40,8 @@ def exported(table, folder, **parameters):
     return md.osl.export(mi.load_dict(md.bsdf_dict(table, **parameters)), folder)
 
 
-@pytest.mark.parametrize("superstrate", [1.0, 1.5])
-def test_white_mirror_is_white(tmp_path, superstrate):
-    mirror = OrderTable.mirror(PERIOD, superstrate=superstrate)
+def test_white_mirror_under_a_layer_is_white(tmp_path):
+    mirror = OrderTable.mirror(PERIOD, superstrate=1.5)
     seen = plane_seen(exported(mirror, tmp_path), [0, 60])
     assert seen.mean == pytest.approx(1.0, abs=0.02)
 
@@ -85,7 +84,7 @@ def test_lobe_is_as_wide_as_the_window_has_it(tmp_path, axis):
     centre = np.sin(np.radians(theta)) if axis == 0 else 0.0
     squared = (1.0 - axis, axis, 0.0, centre, 2)  # the mirror direction is at −x
     mirror = exported(OrderTable.mirror(PERIOD), tmp_path, coherence_width=width)
-    seen = plane_seen(mirror, [theta], sky=squared, samples=512)
+    seen = plane_seen(mirror, [theta], sky=squared, samples=256)
     variance = (1e-3 * np.array(RGB_WAVELENGTHS) / (0.5 * np.pi * width)) ** 2 / 2
     # mean of λ² over a channel is up to 1 % above the square of its mean; and noise
     assert seen.mean[0] == pytest.approx(variance, rel=0.04)
