@@ -97,7 +97,7 @@ SCENES = (
     Scene(
         "spectrometer", "clear grating, 600 lines/mm", "rulings", "screen",
         _RECIPE.format("sinusoidal") + "period = 1.6667\ndepth = 0.09\npixels_per_period = 24\n",
-        "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=512"),
+        "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=160"),
         "Transmitted orders of a shallow sheet, which the model misses by 4 %: no viewer sees it.",
     ),
 )  # fmt: skip
