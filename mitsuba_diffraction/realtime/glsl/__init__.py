@@ -6,11 +6,14 @@ Renderer       draw a Mitsuba scene by shaders, without a window (in `renderer`)
 export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
 materials      BSDFs, and the gloss of plain ones
+modelled       surfaces of `diffraction`: constants, energy conservation, tables
+orders         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
+lobes          directions drawn from lobes, and their densities
 maps           textures of materials
 lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows
-surroundings   environments, flat lights and obstacles, which lobes look up; densities of lobes
+surroundings   environments, flat lights and obstacles, which lobes look up
 progressive    accumulation of frames, each with one light or with looked-up surroundings
 camera         sensors as cameras; moving the camera and the light by hand
 packing        tables as textures

@@ -37,11 +37,11 @@ Image = NDArray[np.float32]
 class Renderer:
     """Renderer of one Mitsuba scene by shaders.
 
-    Supported are meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF;
-    diffuse BSDFs, plastic and metal, smooth or rough; and bump maps. `render` and `draw` have
-    directional and point lights and a smooth sky, without shadows. `progressive` has all emitters,
-    shadows and the lens. Light between surfaces is left out. Unsupported parts of the scene are
-    listed in a warning, and in `scene.omissions`.
+    Supported are meshes, rectangles, spheres, disks and cylinders; diffraction and solved orders
+    over a diffuse BSDF; diffuse BSDFs, plastic and metal, smooth or rough; and bump maps. `render`
+    and `draw` have directional and point lights and a smooth sky, without shadows. `progressive`
+    has all emitters, shadows and the lens. Light between surfaces is left out. Unsupported parts of
+    the scene are listed in a warning, and in `scene.omissions`.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.realtime.glsl.context import Bindings
 from mitsuba_diffraction.realtime.glsl.export import make_shader
@@ -112,11 +112,12 @@ def test_the_exported_shader_has_the_same_colours(
     uniform sampler2D directions;
     out vec4 fragment;
     void main() {
-        ivec2 at = ivec2(int(gl_FragCoord.x) / 2, 0);
+        ivec2 at = ivec2(int(gl_FragCoord.x) / 3, 0);
         vec3 wi = texelFetch(directions, at, 0).xyz;
         vec3 wo = texelFetch(directions, at + ivec2(0, 1), 0).xyz;
-        bool first = int(gl_FragCoord.x) % 2 == 0;
-        fragment = vec4(first ? diffraction(wi, wo) : diffraction_exact(wi, wo), 1.0);
+        int which = int(gl_FragCoord.x) % 3;
+        fragment.rgb = which == 0 ? diffraction(wi, wo) : which == 1 ? diffraction_exact(wi, wo)
+            : diffraction_transmission(wi, wo);
     }"""
     vertex = "#version 330\nvoid main() {{ gl_Position = vec4({}); }}".format(
         "gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0"
@@ -125,14 +126,27 @@ def test_the_exported_shader_has_the_same_colours(
         vertex_shader=vertex, fragment_shader=f"#version 330\n{shader.code}\n{main}"
     )
     bound = Bindings(gl, Packed((*shader.textures, directions(wi, wo)), shader.uniforms))
-    target = gl.texture((2 * len(wi), 1), 4, dtype="f4")
+    target = gl.texture((3 * len(wi), 1), 4, dtype="f4")
     frame = gl.framebuffer([target])
     frame.use()
     bound.use(program)
     gl.vertex_array(program, []).render(vertices=3)
-    drawn = np.frombuffer(target.read(), np.float32).reshape(-1, 2, 4)[..., :3].astype(float)
+    drawn = np.frombuffer(target.read(), np.float32).reshape(-1, 3, 4)[..., :3].astype(float)
     assert difference(drawn[:, 0], colours) < 0.02
     assert difference(drawn[:, 1], colours) < 0.01
+    if table.superstrate == 1.0:
+        reflected = [
+            sum(table.efficiency(-w[:, :1], -w[:, 1:2], RGB_WAVELENGTHS, m) for m in range(-3, 4))
+            for w in (wi, wo)
+        ]
+        beneath = (1.0 - reflected[0]) * (1.0 - reflected[1])
+        np.testing.assert_allclose(drawn[:, 2], beneath, atol=2e-3)  # half floats, linear cells
+
+
+def test_sheets_are_refused_in_one_line(some_variant: str) -> None:
+    sheet = load(thin_grating(period=0.5, reflectance=0.3, thin=True))
+    with pytest.raises(DiffractionError, match="light that goes through, which the shaders do not"):
+        make_shader(sheet)
 
 
 def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
