@@ -177,18 +177,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     def work() -> None:
         mi.set_variant("llvm_ad_rgb")
         images = args.output / "images/blender"
-        for folder in (_FOLDER, images):
+        work_folders = [_FOLDER / part for part in _PARTS]
+        for folder in (*work_folders, images):
             folder.mkdir(parents=True, exist_ok=True)
         for example in (*EXAMPLES.values(), FOIL):
             example.export()
         parts, page = args.parts or _PARTS, args.output / "blender.md"
         if "differences" in parts:
             samples = (512, 64) if args.quick else (4096, 512)
-            table, compared = differences(samples, _FOLDER)
+            table, compared = differences(samples, work_folders[0])
             pages.update(page, {"differences": table})
             side_by_side(compared, images / "comparison.jpg")
         if "noise" in parts:
-            pages.update(page, {"noise": noise(_FOLDER)})
+            pages.update(page, {"noise": noise(work_folders[1])})
         if "showcase" in parts:
             showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
 
