@@ -177,7 +177,7 @@ def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
     return Rendered(pixels, output.with_suffix(".png"), seconds)
 
 
-def _show(model: Rendered, solved: Rendered, difference: NDArray[np.float32], target: Path) -> None:
+def _show(model: Rendered, solved: Rendered, difference: NDArray[np.float64], target: Path) -> None:
     """Write both pictures and a map of their difference side by side."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(model.display) as picture:
