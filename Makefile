@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks site validation energy realtime lint clean help
+.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures site validation energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -85,6 +85,16 @@ parameters: setup  ## make docs/parameters.md from the plugin's docstring
 
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks
+
+# an environment of its own: bpy needs NumPy below 2, and the Python that its version names
+blender: .venv/blender/bin/python  ## install Blender as a Python module into .venv/blender (0.4 GB)
+	@:
+
+.venv/blender/bin/python: .ci/setup
+	@.ci/setup blender
+
+blender-figures: setup blender  ## compare Cycles with Mitsuba: docs/blender.md
+	@$(PYTHON3) -m docs.make.figures.blender -o docs
 
 # mkdocs loads the hooks of docs/make/site from here
 site: setup  ## build the pages with an API reference: out/site/index.html

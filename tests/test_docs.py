@@ -23,6 +23,9 @@ pytestmark = pytest.mark.usefixtures("coarse")
 
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+BLENDER_OPTIONS = {"--", "--python"} | set(
+    re.findall(r'"(--[a-z]+)"', (PACKAGE / "osl/blender_material.py").read_text(encoding="utf-8"))
+)
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 _COMMAND = re.compile(r"(\.venv/bin/)?(mitsuba-diffraction|python -m|make) ")
@@ -51,6 +54,8 @@ def test_a_documented_command_is_one(words):
             assert importlib.util.find_spec(module) is not None
         case "make", _:
             assert {word for word in rest if "=" not in word} <= TARGETS
+        case "blender" | "python", [*_] if "cd-osl/blender_material.py" in rest:
+            assert {word for word in rest if word.startswith("--")} <= BLENDER_OPTIONS
         case "pip", ["install", what]:
             extras = re.search(r"\[(.*)\]", what)
             assert what.startswith(".")

@@ -27,8 +27,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "current folder",
     )  # fmt: skip
     parser.add_argument(
-        "--name", metavar="NAME", help="name of the shader and its files; default: SOURCE's name"
-    )
+        "--name", metavar="NAME",
+        help="name of the shader and its files; default: diffraction_ and SOURCE's name",
+    )  # fmt: skip
     options.add_mode(parser)
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)

@@ -100,7 +100,8 @@ def run(args: argparse.Namespace) -> int:
             recipe, comment = recipe_of(table, str(args.scene))
             recipe.save(file, comment)
         names = " ".join(map(str, files))
-        print(f"{names}: for mitsuba-diffraction render {args.scene} --plan {names}")
+        surfaces = "".join(f" --material {name}={text}" for name, text in args.materials)
+        print(f"{names}: for mitsuba-diffraction render {args.scene}{surfaces} --plan {names}")
     return 0
 
 

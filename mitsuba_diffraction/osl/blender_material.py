@@ -59,8 +59,6 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
     scene.cycles.shading_system = True
     group = _group(exported, name)
     material = bpy.data.materials.get(name) or bpy.data.materials.new(name)
-    if bpy.app.version < (6, 0):  # later versions have nodes always
-        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     surface = _node(nodes, "ShaderNodeGroup", (0, 0))

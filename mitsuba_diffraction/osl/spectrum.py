@@ -36,7 +36,9 @@ class Spectrum(NamedTuple):
 def drawn_spectrum() -> Spectrum:
     """Tabulate wavelengths and weights under daylight."""
     lam = np.arange(ENDS[0] + 0.5 * _STEP, ENDS[1], _STEP)
-    exact = {space: linear_in(space, response(lam)) for space in WORKING_SPACES}
+    exact = {
+        space: np.asarray(linear_in(space, response(lam)), np.float64) for space in WORKING_SPACES
+    }
     density = np.mean([np.abs(colours) @ _IMPORTANCE for colours in exact.values()], axis=0)
     density = np.maximum(density, 1e-3 * density.max())  # keeps the map invertible at the ends
     cumulative = np.append(0.0, np.cumsum(density))

@@ -218,7 +218,8 @@ def _kinds(names: list[str], shown: str, what: str) -> tuple[str, ...]:
         kinds = (*REFLECTED, *TRANSMITTED)
     if missing := [name for name in kinds if name not in names]:
         raise DiffractionError(
-            f"{shown} has no {what} {missing[0]}; unpolarised efficiencies are those of s and of p"
+            f"{shown} has no {what} {missing[0]}, the share of light of {missing[0][-1]} "
+            f"polarisation (s is TE in light across the grooves); list unpolarised shares as both"
         )
     return kinds
 

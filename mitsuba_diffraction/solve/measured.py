@@ -20,6 +20,8 @@ from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
 COUNTS = Counts(12, 8, 4)
+#: Nodes of the table of one direction: a curve over wavelength, for each order.
+OF_ONE_DIRECTION = Counts(2, 32, 1)
 #: Distance from grazing, in p, within which rounding decides whether an order propagates.
 _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
@@ -103,6 +105,8 @@ def read_orders(
             "efficiencies, which is exact for perfect conductors alone"
         )
     counts = Counts(*COUNTS[:2], 1 if in_plane or len(grid.wavelengths) == 1 else COUNTS.w)
+    if len(np.unique(samples.s)) == 1:
+        counts = OF_ONE_DIRECTION
     bands = tuple(_band(k, counts, samples) for k in range(last + 1))
     header: dict[str, Any] = {
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",

@@ -17,7 +17,7 @@ from scipy.fft import dct
 from ..tables.orders import cells
 
 #: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most.
-MOST = (24, 16, 8)
+MOST = (36, 24, 8)
 FEWEST = (4, 3, 2)
 #: Where a band's lines cross (τ, ρ, w): away from its middle, where symmetry would hide odd terms.
 _CROSSINGS = ((0.31, 0.38, 0.35), (0.69, 0.72, 0.7))

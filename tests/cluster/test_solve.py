@@ -23,7 +23,7 @@ from mitsuba_diffraction.tables.orders import OrderTable  # noqa: E402
 from tests.support import ROOT  # noqa: E402
 from tests.support.orders import digest_in_file  # noqa: E402
 
-# a perfect conductor has no third variable: 300 solutions of some milliseconds
+# a perfect conductor has no third variable: some hundred solutions of milliseconds
 PROFILE = sinusoidal(0.5, 0.05)
 SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, resolution=48)
 WORDS = [

@@ -45,11 +45,12 @@ def test_draws_have_the_probabilities_that_weigh_them():
         {"coat_ior": 1.4}, {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
         {"shadowing": "vcavity"},
         {"pigment": {"type": "diffuse"}},
-        {"plugin": "diffraction_dielectric", "energy_conserving": False},
+        {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
     ],
     ids=lambda value: next(iter(value)),
 )  # fmt: skip
 def test_surfaces_that_the_shader_lacks_are_refused(tmp_path, some_variant, parameters):
+    parameters = {"energy_conserving": False, "second_order": False, **parameters}
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, **parameters))
     with pytest.raises(DiffractionError) as refused:
         md.osl.export(bsdf, tmp_path / "out")

@@ -98,7 +98,7 @@ def plane_seen(
     exported: Exported,
     tilts: list[float],
     sky: tuple[float, float, float, float, int] = WHITE,
-    samples: int = 256,
+    samples: int = 96,
     pixels: int = 12,
     **values: object,
 ) -> Seen:

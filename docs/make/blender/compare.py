@@ -33,6 +33,7 @@ class Comparison:
     mitsuba, cycles : linear sRGB (height, width, 3), means of two halves of the samples.
     difference : mean ΔE2000 of the two pictures.
     noise : mean ΔE2000 that two such pictures of the same light would have.
+    noise_of_cycles : the part of Cycles' picture in it.
     seconds : of Cycles, for all samples.
     """
 
@@ -40,6 +41,7 @@ class Comparison:
     cycles: Picture
     difference: float
     noise: float
+    noise_of_cycles: float
     seconds: Seconds
 
     @property
@@ -79,7 +81,7 @@ def compare(
             0.5 * _mean_delta_e(*pair, white, covered) for pair in (mitsuba, cycles)
         ]  # the mean of two halves has half the noise of their difference
         difference = _mean_delta_e(means[0], means[1], white, covered)
-        found.append(Comparison(means[0], means[1], difference, math.hypot(*noise), time))
+        found.append(Comparison(means[0], means[1], difference, math.hypot(*noise), noise[1], time))
     return found
 
 

@@ -90,7 +90,6 @@ def material(surface: dict[str, Any]) -> Any:
             group.inputs[name].default_value = value
         return made
     made = bpy.data.materials.new("plain")
-    made.use_nodes = True
     nodes = made.node_tree.nodes
     nodes.clear()
     if "grey" in surface:
@@ -109,7 +108,6 @@ def lights(scene: Any, light: dict[str, Any]) -> None:
     """Add a lamp, or an environment map."""
     world = bpy.data.worlds.new("world")
     scene.world = world
-    world.use_nodes = True
     background = world.node_tree.nodes["Background"]
     if "file" in light:
         # as many rows as the map has; the default searches for minutes in a picture's first sample

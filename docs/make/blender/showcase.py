@@ -40,11 +40,13 @@ def main() -> None:
         for folder, tangent in zip(options.folders, ("radial-z", "uv", "uv"), strict=True)
     )
     inputs(disc)["Rotation (°)"].default_value = -90.0
-    inputs(scale)["Pigment"].default_value = (0.03, 0.015, 0.008, 1)
+    inputs(scale)["Pigment"].default_value = (0.05, 0.03, 0.02, 1)
+    for material in (disc, foil, scale):  # wide lobes, with less noise than those of sunlight
+        inputs(material)["Coherence Width (µm)"].default_value = 20.0
     room()
     bpy.ops.mesh.primitive_cylinder_add(vertices=256, radius=1.15, depth=0.02)
     tilted = bpy.context.object
-    tilted.location, tilted.rotation_euler = (-_STEP, 0.25, 1.3), (math.radians(50), 0, 0.25)
+    tilted.location, tilted.rotation_euler = (-_STEP, 0.2, 1.28), (math.radians(62), 0, 0.2)
     tilted.data.materials.append(disc)
     hole(tilted)
     for x, material in ((0.0, foil), (_STEP, scale)):
@@ -83,7 +85,6 @@ def inputs(material: Any) -> Any:
 def plain(name: str, colour: tuple[float, float, float], roughness: float) -> Any:
     """Return a material of Blender's own."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
     shader = material.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = roughness
@@ -91,10 +92,11 @@ def plain(name: str, colour: tuple[float, float, float], roughness: float) -> An
 
 
 def room() -> None:
-    """Add a floor that rises behind, and three plinths."""
+    """Add a floor, a wall behind, and three plinths."""
     floor = plain("floor", (0.11, 0.11, 0.12), 0.5)
-    bpy.ops.mesh.primitive_plane_add(size=60)
-    bpy.context.object.data.materials.append(floor)
+    for place, turn in (((0, 0, 0), 0.0), ((0, 9, 0), math.radians(90))):
+        bpy.ops.mesh.primitive_plane_add(size=60, location=place, rotation=(turn, 0, 0))
+        bpy.context.object.data.materials.append(floor)
     plinth = plain("plinth", (0.02, 0.02, 0.022), 0.35)
     for x in (-_STEP, 0.0, _STEP):
         bpy.ops.mesh.primitive_cylinder_add(
@@ -119,11 +121,10 @@ def lights() -> None:
     """Add a small bright lamp, a soft one, and a dim room."""
     world = bpy.data.worlds.new("room")
     bpy.context.scene.world = world
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs[0].default_value = (0.12, 0.13, 0.15, 1)
+    world.node_tree.nodes["Background"].inputs[0].default_value = (0.1, 0.11, 0.13, 1)
     for name, place, size, power in (
-        ("lamp", (-1.5, -2.5, 6.5), 0.7, 420.0),
-        ("soft", (6.0, 1.0, 4.0), 2.5, 260.0),
+        ("lamp", (-3.5, -6.0, 7.5), 1.0, 900.0),
+        ("soft", (5.0, 2.0, 5.5), 3.5, 900.0),
     ):
         lamp = bpy.data.lights.new(name, "AREA")
         lamp.shape, lamp.size, lamp.energy = "DISK", size, power

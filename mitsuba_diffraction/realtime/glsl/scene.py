@@ -195,7 +195,7 @@ class RealtimeScene:
 
     @property
     def diffracting(self) -> tuple[Diffracting, ...]:
-        """What diffracts of all surfaces."""
+        """Materials that diffract, of all surfaces."""
         all_surfaces = (surface.material.diffraction for surface in self.surfaces)
         return tuple(surface for surface in all_surfaces if surface is not None)
 

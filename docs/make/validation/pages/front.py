@@ -47,6 +47,7 @@ statistics. `make validation` computes every number on it.
   {percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in light up to
   {STEEPEST_LIGHT:g}° from the normal. The package warns beyond both slopes.
 - Vertical walls are less accurate at any depth, most of all on metals and in oblique light.
+  [Solved orders](validation/orders.md) have no such error, on grooves that repeat along a line.
 - The default, `model="small_slope"`, is better than `model="kirchhoff"`, most of all in oblique
   light and in polarised light.
 - `second_order=true` removes most of the error of dielectric discs in oblique light, and a tenth of
@@ -214,6 +215,7 @@ def _tables() -> str:
         ["[second order](validation/second_order.md)", "exact and as a factor"],
         ["[coats and films](validation/layers.md)", "with bounces in the coat, thick films"],
         ["[transmission](validation/transmission.md)", "interfaces and thin sheets; R + T"],
+        ["[solved orders](validation/orders.md)", "beside other solvers, print and measurement"],
         ["[perfect conductor](validation/conductor.md)", "Kirchhoff's model alone"],
         ["[numerics](validation/numerics.md)", "closed forms, random surfaces"],
         ["[rigorous solutions](validation/solutions.md)", "solvers, convergence, agreement"],

@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .. import cells, coated, filmed, models, orders, published, statistics, transmitted
+from .. import (
+    cells,
+    coated,
+    filmed,
+    littrow,
+    models,
+    orders,
+    published,
+    statistics,
+    transmitted,
+)
 from ..cases import FEW_WAVELENGTHS, Grating
 from ..compare import Comparison, compare
 from ..goals import Sides
@@ -46,6 +56,11 @@ class Measurements:
     def published(self) -> tuple[published.Published, ...]:
         """Efficiencies printed by others."""
         return published.PUBLISHED[1 if self.quick else 0 :][: 1 if self.quick else None]
+
+    @cached_property
+    def littrow(self) -> littrow.Littrow:
+        """Measured efficiencies of a spectrograph's grating."""
+        return littrow.compare(littrow.ANGLES[: 1 if self.quick else None])
 
     @cached_property
     def perfect(self) -> Comparison:

@@ -1,0 +1,90 @@
+"""Exported materials in .blend files, and pictures of Cycles beside Mitsuba's. Needs Blender."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import pytest
+
+import mitsuba_diffraction as md
+from docs.make.blender.compare import compare
+from docs.make.blender.views import Surface, View
+from tests.support.blender import blender, result_of, run_in_blender
+from tests.support.orders import thin_grating
+
+pytestmark = pytest.mark.thorough
+
+WIDTH = 12.0  # µm: wide lobes, which need few samples
+_ADDED = """
+import bpy
+bpy.ops.wm.open_mainfile(filepath=file)
+scene, material = bpy.context.scene, bpy.data.materials["grating"]
+group = next(n for n in material.node_tree.nodes if n.type == "GROUP")
+script = next(n for n in group.node_tree.nodes if n.type == "SCRIPT")
+tips = {s.name: s.description for s in group.node_tree.interface.items_tree if s.in_out == "INPUT"}
+result = {
+    "engine": scene.render.engine,
+    "osl": scene.cycles.shading_system,
+    "users": [o.name for o in bpy.data.objects if o.type == "MESH" and material.name in
+              [slot.name for slot in o.material_slots]],
+    "inputs": {s.name: list(s.default_value) if s.type in ("RGBA", "VECTOR") else s.default_value
+               for s in group.inputs},
+    "tips": tips,
+    "linked": [link.to_socket.name for link in material.node_tree.links],
+    "files": [s.default_value for s in script.inputs if "Texture" in s.name],
+}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _blender(some_variant):
+    blender()
+
+
+def exported(source, folder, name, **parameters):
+    bsdf = md.bsdf_dict(source, coherence_width=WIDTH, **parameters)
+    md.osl.export(mi.load_dict(bsdf), folder, name)
+    return bsdf
+
+
+def test_script_adds_a_material_with_labelled_inputs(tmp_path):
+    folder, file = tmp_path / "exported", tmp_path / "made.blend"
+    exported(thin_grating(), folder, "grating")
+    script = folder / "blender_material.py"
+    done = run_in_blender(script, "--object", "Cube", "--output", file)
+    assert done.returncode == 0, done.stderr
+    added = result_of(_ADDED, tmp_path, file=str(file))
+    assert (added["engine"], added["osl"], added["users"]) == ("CYCLES", True, ["Cube"])
+    assert added["inputs"]["Coherence Width (µm)"] == WIDTH
+    assert added["inputs"]["Rotation (°)"] == 0.0
+    assert all(added["tips"][name] for name in added["inputs"])
+    assert sorted(added["linked"]) == ["Surface", "Tangent"]
+    assert added["files"] == [str(path.resolve()) for path in folder.glob("*.exr")]
+
+
+def test_unknown_object_is_one_line(tmp_path):
+    exported(thin_grating(), tmp_path, "grating")
+    done = run_in_blender(tmp_path / "blender_material.py", "--object", "Ring")
+    assert done.returncode != 0
+    assert "no mesh object 'Ring'; the file has Cube" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_pictures_agree_with_mitsuba(tmp_path):
+    """A disc, a grating and a scale differ by a mean ΔE2000 of at most 2 beyond noise."""
+    views = []
+    pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.1, 0.05, 0.02]}}
+    scale = md.gratings.elaphe_like(extent=16.0, pixels=128)
+    for name, shape, light, source, inputs, beneath in (
+        ("disc", "disk", "lamp", thin_grating(superstrate=1.5), {"Rotation (°)": -90.0}, {}),
+        ("grating", "rectangle", "sky", thin_grating(), {}, {}),
+        ("scale", "sphere", "sky", scale, {"Pigment": [0.1, 0.05, 0.02]}, {"nested": pigment}),
+    ):
+        bsdf = exported(source, tmp_path / name, name)
+        tangent = "radial-z" if shape == "disk" else "uv"
+        cycles = {"folder": str(tmp_path / name), "tangent": tangent, "inputs": inputs}
+        views.append(View(shape, light, Surface(bsdf | beneath, cycles), 20, 14))
+    compared = compare(views, tmp_path, mitsuba_samples=4096, cycles_samples=1024)
+    for view, comparison in zip(views, compared, strict=True):
+        assert comparison.beyond_noise <= 2.0, view.shape
+        # noise that hides no larger difference
+        assert comparison.noise <= 4.0, view.shape
