@@ -8,6 +8,7 @@ serves all channels. Slopes of metal converge slowly in TM: use the integral met
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -207,7 +208,8 @@ def _amplitudes(total: _Scattering, rows: NDArray[np.int64], sides: tuple[_Side,
     return np.asarray(result * phase[:, None])
 
 
-class _Side(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Side:
     """Channels on a side of the profile.
 
     Attributes

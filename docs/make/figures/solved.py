@@ -33,7 +33,7 @@ def row(file: Path) -> tuple[str, ...]:
         f"{facts['processor_seconds'] / 60:.1f}" if "processor_seconds" in facts else "",
         f"{facts['error_mean']:.2%}",
         f"{facts['error_worst']:.1%}",
-        f"{facts['reciprocity_error']:.1%}",
+        f"{facts['reciprocity_error']:.2%}",
     )
 
 
