@@ -153,8 +153,7 @@ def solve_orders(
     }
     if thin:
         header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
-    sides = grating.sides
-    made = tuple(_band(band, counts[band], solved, how.polarised, sides) for band in bands)
+    made = tuple(_band(k, counts[k], solved, how.polarised, grating.sides) for k in bands)
     table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
     error = measured_error(table, problem, work)
     mean = max(error.mean, error.polarised or 0.0)
@@ -164,11 +163,8 @@ def solve_orders(
             f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
             "tolerance, or fewer wavelengths"
         )
-    header |= {
-        "error_mean": error.mean,
-        "error_worst": error.most,
-        "processor_seconds": round(work.processor_seconds, 1),
-    }
+    header |= {"error_mean": error.mean, "error_worst": error.most}
+    header["processor_seconds"] = round(work.processor_seconds, 1)
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
     return OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
