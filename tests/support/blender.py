@@ -10,24 +10,19 @@ from typing import Any
 
 import pytest
 
-from tests.support import ROOT
+from docs.make.blender.program import blender_command
+from mitsuba_diffraction import DiffractionError
 
-#: Names the program; else the environment that `make blender` creates is used.
-VARIABLE = "MITSUBA_DIFFRACTION_BLENDER"
 #: Seconds after which a program counts as stuck.
 TIMEOUT = 300.0
 
 
 def blender() -> list[str]:
     """Command that runs a script in Blender, without the script's name; skips without Blender."""
-    name = os.environ.get(VARIABLE)
-    program = Path(name) if name else ROOT / ".venv" / "blender" / "bin" / "python"
-    if not program.exists():
-        pytest.skip(f"no Blender: run `make blender`, or name one in {VARIABLE}")
-    if program.stem.lower().startswith("blender"):
-        return [str(program), "--background", "--factory-startup", "--python-exit-code", "1",
-                "--python"]  # fmt: skip
-    return [str(program)]
+    try:
+        return blender_command()
+    except DiffractionError as error:
+        pytest.skip(str(error))
 
 
 def run_in_blender(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import re
 import subprocess
@@ -25,23 +24,25 @@ class Seconds(NamedTuple):
     processor: float
 
 
-@functools.cache
-def find_blender() -> Path:
-    """Return a Python with bpy, or a `blender` executable.
+def blender_command() -> list[str]:
+    """Return the command that runs a script in Blender, without the script's name.
 
     Raises
     ------
     DiffractionError
-        If there is none, or if it does not start.
+        If there is no Blender.
     """
     named = os.environ.get(VARIABLE)
-    file = Path(named) if named else DEFAULT
-    if not file.exists():
+    program = Path(named) if named else DEFAULT
+    if not program.exists():
         raise DiffractionError(
-            f"no Blender at '{file}': run 'make blender', or name a Python with bpy, or a blender "
-            f"executable, in {VARIABLE}"
+            f"no Blender at '{program}': run 'make blender', or name a Python with bpy, or a "
+            f"blender executable, in {VARIABLE}"
         )
-    return file
+    if program.stem.lower().startswith("blender"):
+        return [str(program), "--background", "--factory-startup", "--python-exit-code", "1",
+                "--python"]  # fmt: skip
+    return [str(program), "-W", "ignore"]
 
 
 def run_in_blender(script: Path, words: Sequence[str | Path]) -> str:
@@ -52,15 +53,14 @@ def run_in_blender(script: Path, words: Sequence[str | Path]) -> str:
     DiffractionError
         If it fails, with the last line of its output.
     """
-    blender = find_blender()
-    if blender.name.startswith("blender"):
-        command = [blender, "--background", "--python-exit-code", "1", "--python", script, "--"]
-    else:
-        command = [blender, "-W", "ignore", script]
-    finished = subprocess.run([*command, *words], capture_output=True, text=True, check=False)
+    command = blender_command()
+    between = ["--"] if "--python" in command else []
+    finished = subprocess.run(
+        [*command, script, *between, *words], capture_output=True, text=True, check=False
+    )
     if finished.returncode != 0:
         said = (finished.stderr.strip() or finished.stdout.strip() or "no output").splitlines()
-        raise DiffractionError(f"'{script.name}' failed in Blender ({blender}): {said[-1]}")
+        raise DiffractionError(f"'{script.name}' failed in Blender ({command[0]}): {said[-1]}")
     return finished.stdout
 
 
