@@ -110,8 +110,8 @@ def common_sockets(orientation: float) -> list[Socket]:
         ),
         Socket(
             "WorkingSpace", "Working Space", "string", "Linear Rec.709",
-            "Working space of the file, Blender's name. Linear Rec.2020 holds spectral colours "
-            "better than Linear Rec.709",
+            "Working space of the file, Blender's name; Linear Rec.2020 has less noise than Linear "
+            "Rec.709",
         ),
         Socket("Normal", "Normal", "normal", "N", "Normal of the surface"),
         Socket(

@@ -21,6 +21,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,7 +147,7 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
 
 def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
     """Put lines on the grid that they form: (n, 4) coordinates, (n, 2) or (n, 4) efficiencies."""
-    _check_axes(*lights.T, shown)
+    _check_axes(list(lights.T), shown)
     axes, places = zip(
         *(np.unique(column, return_inverse=True) for column in lights.T), strict=True
     )
@@ -166,7 +167,7 @@ def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
     flat = values.reshape(-1, powers.shape[1])
     place = light * shape[3] + places[3]
     numbers, counts = np.unique(place, return_counts=True)
-    grid = Efficiencies(*axes[:3], axes[3].astype(np.int64), values)
+    grid = Efficiencies(axes[0], axes[1], axes[2], axes[3].astype(np.int64), values)
     if (counts > 1).any():
         twice = int(numbers[counts > 1][0])
         raise DiffractionError(
@@ -207,13 +208,14 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
             raise DiffractionError(f"{shown}: all {axis} must be different, finite numbers")
         values = values.take(np.argsort(along), axis=n)
         axes[axis] = np.sort(along)
-    _check_axes(*(axes[axis] for axis in AXES), shown)
-    return Efficiencies(*(axes[a] for a in AXES[:3]), axes["order"].astype(np.int64), values)
+    _check_axes([axes[axis] for axis in AXES], shown)
+    wavelengths, theta, phi, orders = (axes[axis] for axis in AXES)
+    return Efficiencies(wavelengths, theta, phi, orders.astype(np.int64), values)
 
 
 def _kinds(names: list[str], shown: str, what: str) -> tuple[str, ...]:
     """Return the efficiencies that a file has: reflected, or reflected and transmitted."""
-    kinds = REFLECTED
+    kinds: tuple[str, ...] = REFLECTED
     if any(name in names for name in TRANSMITTED):
         kinds = (*REFLECTED, *TRANSMITTED)
     if missing := [name for name in kinds if name not in names]:
@@ -277,8 +279,9 @@ def _variable(dimensions: Any, values: Any, attributes: Any) -> Variable:
     return Variable(tuple(map(str, dimensions)), numbers * scale + offset, text)
 
 
-def _check_axes(wavelengths: Real, theta: Real, phi: Real, orders: Real, shown: str) -> None:
-    """Refuse numbers that are no wavelengths in nm, angles in degrees, or orders."""
+def _check_axes(axes: Sequence[Real], shown: str) -> None:
+    """Refuse numbers that are no wavelengths in nm, angles in degrees, or orders; as `AXES`."""
+    wavelengths, theta, phi, orders = axes
     low, high = WAVELENGTHS
     for name, numbers, allowed, hint in (
         ("wavelength", wavelengths, (wavelengths >= low) & (wavelengths <= high),

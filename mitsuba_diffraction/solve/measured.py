@@ -131,37 +131,49 @@ def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
     values = grid.values.reshape(len(lam), len(grid.orders), -1)
     # order m lies at p − m, which 0 to K hold
     step, room = lam / (1e3 * optical_period), np.sqrt(1.0 - y**2)
-    highest, lowest = ((end - x) / step for end in (room, -room))
-    known = ~np.isnan(values).any(axis=-1)
-    lit = np.nan_to_num(values).max(axis=-1) > ROUNDING
-    for n in np.flatnonzero((lit & ~_between(grid.orders, lowest, highest, _EDGE)).any(axis=1)):
-        order = grid.orders[lit[n] & ~_between(grid.orders, lowest, highest, _EDGE)[n]][0]
-        raise DiffractionError(
-            f"{shown}, {grid.light(n)}: order {order} does not propagate; check the period, "
-            "and the signs of the orders and of theta"
-        )
-    propagating = np.floor(highest - _EDGE) - np.ceil(lowest + _EDGE) + 1
-    known &= _between(grid.orders, lowest, highest, -_EDGE)
-    for n in np.flatnonzero(known.sum(axis=1) < propagating):
-        listed = set(grid.orders[known[n]].tolist())
-        first = int(np.ceil(lowest[n] + _EDGE))
-        order = next(m for m in range(first, first + len(listed) + 1) if m not in listed)
-        raise DiffractionError(
-            f"{shown}, {grid.light(n)}: order {order} propagates, and has no efficiencies; list "
-            "it, with 0 if it has no light"
-        )
+    _check_orders(grid, values, (-room - x) / step, (room - x) / step, shown)
     powers = np.maximum(np.nan_to_num(values), 0.0)
     total = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2))
     if total.max() > LARGEST_SUM:
-        n = int(total.max(axis=1).argmax())
+        brightest = int(total.max(axis=1).argmax())
         raise DiffractionError(
-            f"{shown}, {grid.light(n)}: the orders sum to {total[n].max():.4g}, above {LARGEST_SUM}"
+            f"{shown}, {grid.light(brightest)}: the orders sum to {total.max():.4g}, above "
+            f"{LARGEST_SUM}"
         )
     cell = cells.to_cell(x, y, lam, optical_period)
     ends = float(lam.min()), float(lam.max())
     w = cells.w_of(cell.k_continuous, lam, ends, optical_period)
     s = np.round(x / room, _DIGITS)
     return _Samples(x, y, lam, cell, w, s, grid.orders, powers)
+
+
+def _check_orders(
+    grid: Efficiencies, values: Real, lowest: Real, highest: Real, shown: str
+) -> None:
+    """Refuse orders that do not propagate, but have light, and those that do, but are missing.
+
+    values : (n, m, 2) or (n, m, 4) of all light and orders; lowest, highest : (n,) orders between
+        which all propagate.
+    """
+    lit = np.nan_to_num(values).max(axis=-1) > ROUNDING
+    extra = np.argwhere(lit & ~_between(grid.orders, lowest, highest, _EDGE))
+    if len(extra):
+        light, place = map(int, extra[0])
+        raise DiffractionError(
+            f"{shown}, {grid.light(light)}: order {grid.orders[place]} does not propagate; check "
+            "the period, and the signs of the orders and of theta"
+        )
+    known = ~np.isnan(values).any(axis=-1) & _between(grid.orders, lowest, highest, -_EDGE)
+    first, last = np.ceil(lowest + _EDGE), np.floor(highest - _EDGE)
+    lacking = np.flatnonzero(known.sum(axis=1) < last - first + 1)
+    if len(lacking):
+        light = int(lacking[0])
+        listed = set(grid.orders[known[light]].tolist())
+        order = next(m for m in range(int(first[light]), int(last[light]) + 1) if m not in listed)
+        raise DiffractionError(
+            f"{shown}, {grid.light(light)}: order {order} propagates, and has no efficiencies; "
+            "list it, with 0 if it has no light"
+        )
 
 
 def _between(

@@ -26,6 +26,7 @@ from .resolution import (
     reciprocity_error,
     resolution_error,
 )
+from .sheet import check_clear
 from .stations import Complex, Grating, Real, reversed_light
 
 #: Wavelengths of a table, nm: the visible.
@@ -37,8 +38,6 @@ WORST = 4.0
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
-#: Least index of a thin sheet: orders of light that goes through depend on n − 1.
-LEAST_INDEX = 1.01
 #: Random directions and wavelengths at which the error is measured.
 SAMPLES = 128
 
@@ -130,7 +129,11 @@ def solve_orders(
     check_outline(profile.period, how.wavelengths, superstrate, thin)
     substance = material_of(material, how.wavelengths)
     if thin:
-        _check_sheet(substance, how)
+        check_clear(substance, how.wavelengths)
+    if thin and how.polarised:
+        raise DiffractionError(
+            "polarised: tables of thin sheets have efficiencies alone; leave out polarised, or thin"
+        )
     grating = Grating(profile, substance, superstrate, how.wavelengths, thin)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
@@ -153,8 +156,7 @@ def solve_orders(
     }
     if thin:
         header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
-    sides = grating.sides
-    made = tuple(_band(band, counts[band], solved, how.polarised, sides) for band in bands)
+    made = tuple(_band(k, counts[k], solved, how.polarised, grating.sides) for k in bands)
     table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
     error = measured_error(table, problem, work)
     mean = max(error.mean, error.polarised or 0.0)
@@ -164,28 +166,11 @@ def solve_orders(
             f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
             "tolerance, or fewer wavelengths"
         )
-    header |= {
-        "error_mean": error.mean,
-        "error_worst": error.most,
-        "processor_seconds": round(work.processor_seconds, 1),
-    }
+    header |= {"error_mean": error.mean, "error_worst": error.most}
+    header["processor_seconds"] = round(work.processor_seconds, 1)
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
     return OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
-
-
-def _check_sheet(material: Material, settings: Settings) -> None:
-    """Refuse materials that absorb, and what sheets do not have."""
-    index = material.index(settings.wavelengths)
-    if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:
-        raise DiffractionError(
-            f"material {material.name}: light goes through a thin sheet of a clear material only; "
-            f"give its index, a real number of {LEAST_INDEX:g} to 100, such as 1.58"
-        )
-    if settings.polarised:
-        raise DiffractionError(
-            "polarised: tables of thin sheets have efficiencies alone; leave out polarised, or thin"
-        )
 
 
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:

@@ -18,14 +18,36 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import DiffractionError
 from ..optics.fresnel import amplitudes as fresnel
+from .materials import Material
 from .stations import Complex, Real, Station
 
+#: Least index of a thin sheet: orders of light that goes through depend on n − 1.
+LEAST_INDEX = 1.01
 #: Share of the light that a totally reflecting side sends back: where a channel has no way out, as
 #: in a flat sheet, the sum would not end.
 _KEPT = 1.0 - 1e-7
 #: Square of the sine below which light is taken as that along the normal.
 _LEVEL = 1e-12
+
+
+def check_clear(material: Material, wavelengths: tuple[float, float]) -> None:
+    """Refuse materials that light does not go through.
+
+    wavelengths : shortest and longest, in vacuum, nm.
+
+    Raises
+    ------
+    DiffractionError
+        If the material absorbs, or has an index below `LEAST_INDEX`.
+    """
+    index = material.index(wavelengths)
+    if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:
+        raise DiffractionError(
+            f"material {material.name}: light goes through a thin sheet of a clear material only; "
+            f"give its index, a real number of {LEAST_INDEX:g} to 100, such as 1.58"
+        )
 
 
 def sheet_efficiencies(amplitudes: Complex, station: Station) -> Real:

@@ -102,8 +102,8 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
 
     Parameters
     ----------
-    bsdf : BSDF of the plugin `diffraction`, from `mi.load_dict`; the base beneath it and its
-        orientation are left to the program that draws.
+    bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`; the base
+        beneath it and its orientation are left to the program that draws.
     methods : methods of `EXPORTED`, each at most once.
 
     Raises

@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 #: fewer where a table would need more memory than this.
 CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 15), 48 << 20
 
-# efficiency within a layer at most: where more is trapped, its face sends nearly nothing out
-_MOST_WITHIN = 8.0
+#: Efficiency within a layer at most: where more light is trapped, the face lets nearly none out.
+MOST_WITHIN = 8.0
 
 # lobes: directions and wavelengths of the mean efficiencies
 _DIRECTIONS, _WAVELENGTHS = 32, 24
@@ -128,7 +128,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
         for kind in (cells.A, cells.B)[: len(band.kinds)]:
             values = rows(table, band, kind, counts)
             whole = values.through.sum(axis=-1, keepdims=True)
-            within = np.minimum(values.within, _MOST_WITHIN)
+            within = np.minimum(values.within, MOST_WITHIN)
             row = np.concatenate([within, whole], axis=-1).astype(np.float16)
             groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
             # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)

@@ -20,7 +20,7 @@ from ...tables.powers import power_series
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.materials import Diffracting
-from ..glsl.orders import Solved, cells_within
+from ..glsl.orders import MOST_WITHIN, Solved, cells_within
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array, packed_series
@@ -134,7 +134,7 @@ def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.f
     step = max(1, len(table.bands) // _BANDS)
     for band in table.bands[::step]:
         fine = rows(table, band, cells.A, Counts(*(2 * n for n in counts)))
-        nodes = np.minimum(fine.within, 8.0)[::2, ::2, ::2]
+        nodes = np.minimum(fine.within, MOST_WITHIN)[::2, ::2, ::2]
         lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
         for axis in range(3):
             lower, upper = (

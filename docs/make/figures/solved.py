@@ -1,0 +1,52 @@
+"""Table of the shipped tables of orders, from their headers: docs/orders.md.
+
+python -m docs.make.figures.solved
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from mitsuba_diffraction import OrderTable
+
+from . import pages
+from .pages import exit_code
+
+_FOLDER = Path("precompute/orders")
+_HEADER = (
+    "table", "solver", "MB", "processor minutes", "error, mean", "in 95 %", "reciprocity",
+)  # fmt: skip
+_HOW = (
+    "Processor time is that of all solutions, those for the choice of nodes included. "
+    "`python -m docs.make.figures.solved` makes the table, from the headers."
+)
+
+
+def row(file: Path) -> tuple[str, ...]:
+    """Return the facts of a table."""
+    facts = OrderTable.load(file).header
+    return (
+        f"`{file.name}`",
+        facts["solver"],
+        f"{file.stat().st_size / 1e6:.2f}",
+        f"{facts['processor_seconds'] / 60:.1f}" if "processor_seconds" in facts else "",
+        f"{facts['error_mean']:.2%}",
+        f"{facts['error_worst']:.1%}",
+        f"{facts['reciprocity_error']:.2%}",
+    )
+
+
+def text() -> str:
+    """Return the part of the page."""
+    rows = [row(file) for file in sorted(_FOLDER.glob("*.nc"))]
+    return f"{pages.table(_HEADER, rows)}\n\n{_HOW}"
+
+
+def main() -> int:
+    """Write the table and return the exit code."""
+    return exit_code("solved", lambda: pages.update("docs/orders.md", {"solved": text()}))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
