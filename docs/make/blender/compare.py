@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -57,6 +58,7 @@ def compare(
     mitsuba_samples: int,
     cycles_samples: int,
     working_space: str = "Linear Rec.2020",
+    block: int = 1,
 ) -> list[Comparison]:
     """Render views with both renderers and compare them; a variant with colours must be set.
 
@@ -65,6 +67,7 @@ def compare(
     folder : for the files of Blender.
     mitsuba_samples, cycles_samples : per pixel.
     working_space : of Blender, by its name there.
+    block : side of the blocks of pixels, whose means are compared: they have less noise.
     """
     halves, times = _cycles(views, folder, cycles_samples // 2, working_space)
     found = []
@@ -74,15 +77,24 @@ def compare(
             np.array(mi.render(scene, spp=mitsuba_samples // 2, seed=seed)) for seed in (0, 1)
         )
         depth = mi.render(scene, integrator=mi.load_dict({"type": "depth"}), spp=16)
-        covered = np.array(depth)[..., 0] > 0.0
+        covered = _blocks(np.array(depth)[..., :1] > 0.0, block)[..., 0] == 1.0
         means = [np.mean(pair, axis=0) for pair in (mitsuba, cycles)]
-        white = 1.0 / float(np.percentile(means[0][covered].mean(axis=-1), 95.0))
+        halves_of_blocks = [[_blocks(half, block) for half in pair] for pair in (mitsuba, cycles)]
+        reference, other = (np.mean(pair, axis=0) for pair in halves_of_blocks)
+        white = 1.0 / float(np.percentile(reference[covered].mean(axis=-1), 95.0))
         noise = [
-            0.5 * _mean_delta_e(*pair, white, covered) for pair in (mitsuba, cycles)
+            0.5 * _mean_delta_e(*pair, white, covered) for pair in halves_of_blocks
         ]  # the mean of two halves has half the noise of their difference
-        difference = _mean_delta_e(means[0], means[1], white, covered)
+        difference = _mean_delta_e(reference, other, white, covered)
         found.append(Comparison(means[0], means[1], difference, math.hypot(*noise), noise[1], time))
     return found
+
+
+def _blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
+    """Return the means over blocks of pixels; the rest at the right and below is left out."""
+    rows, columns = (size // side for size in picture.shape[:2])
+    cut = picture[: rows * side, : columns * side].astype(np.float64)
+    return cut.reshape(rows, side, columns, side, -1).mean(axis=(1, 3))
 
 
 def _mean_delta_e(

@@ -27,7 +27,6 @@ from . import pages
 #: Folder of exported surfaces, kept for the next run.
 _FOLDER = Path("out/blender")
 _SHOWCASE = Path(__file__).parents[1] / "blender/showcase.py"
-_SPACES = ("Linear Rec.2020", "Linear Rec.709")
 _PARTS = ("differences", "noise", "showcase")
 _MOST = 100_000  # bytes of a picture
 _PIGMENT = [0.1, 0.05, 0.02]
@@ -86,33 +85,26 @@ EXAMPLES = {
 }
 #: Surface of the ball in the middle of the example .blend.
 FOIL = Example("precompute/orders/sinusoidal.nc", "sphere")
-_HEADER = ("surface", "light", "ΔE2000 beyond noise", "in Linear Rec.709", "noise")
+_HEADER = ("surface", "light", "ΔE2000 beyond noise", "noise")
 _COUNTS = (16, 64, 256)
 _NOISE = ("surface", "light", "16 samples", "64", "256", "seconds, 480 × 320 at 256")
 
 
 def differences(samples: tuple[int, int], folder: Path) -> tuple[str, list[Comparison]]:
-    """Return the table of differences, and the comparisons in the first working space.
+    """Return the table of differences, and the comparisons.
 
     samples : of Mitsuba and of Cycles.
     """
     keys, views = _views()
-    by_space = [
-        compare(views, folder, mitsuba_samples=samples[0], cycles_samples=samples[1],
-                working_space=space)
-        for space in _SPACES
-    ]  # fmt: skip
+    compared = compare(
+        views, folder, mitsuba_samples=samples[0], cycles_samples=samples[1],
+        working_space="Linear Rec.709", block=2,
+    )  # fmt: skip
     rows = [
-        (
-            name,
-            light,
-            f"{first.beyond_noise:.1f}",
-            f"{second.beyond_noise:.1f}",
-            f"{first.noise:.1f}",
-        )
-        for (name, light), first, second in zip(keys, *by_space, strict=True)
+        (name, light, f"{found.beyond_noise:.1f}", f"{found.noise:.1f}")
+        for (name, light), found in zip(keys, compared, strict=True)
     ]
-    return pages.table(_HEADER, rows), by_space[0]
+    return pages.table(_HEADER, rows), compared
 
 
 def noise(folder: Path) -> str:
@@ -177,18 +169,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     def work() -> None:
         mi.set_variant("llvm_ad_rgb")
         images = args.output / "images/blender"
-        for folder in (_FOLDER, images):
+        work_folders = [_FOLDER / part for part in _PARTS]
+        for folder in (*work_folders, images):
             folder.mkdir(parents=True, exist_ok=True)
         for example in (*EXAMPLES.values(), FOIL):
             example.export()
         parts, page = args.parts or _PARTS, args.output / "blender.md"
         if "differences" in parts:
-            samples = (512, 64) if args.quick else (4096, 512)
-            table, compared = differences(samples, _FOLDER)
+            samples = (512, 64) if args.quick else (8192, 768)
+            table, compared = differences(samples, work_folders[0])
             pages.update(page, {"differences": table})
             side_by_side(compared, images / "comparison.jpg")
         if "noise" in parts:
-            pages.update(page, {"noise": noise(_FOLDER)})
+            pages.update(page, {"noise": noise(work_folders[1])})
         if "showcase" in parts:
             showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
 
