@@ -51,7 +51,7 @@ def connect(
         If Dask is not installed, or nobody answers at the address.
     """
     distributed = optional("distributed")
-    for name in ("distributed", "tornado"):
+    for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # ours are the words
     if count is not None:
         import dask
