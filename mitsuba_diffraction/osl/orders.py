@@ -19,7 +19,7 @@ _CELLS, _UNDER_LAYER = Counts(16, 12, 6), Counts(12, 8, 10)
 _MOST_PIXELS = 4 << 20
 #: Lobes of a sample: Cycles has at most 64 closures, a lobe takes two, and the pigment takes one.
 _LOBES = 31
-_MOST_SAMPLES = 4
+_MOST_SAMPLES = 2
 #: Transmittance of the layer's face below which light counts as trapped.
 _TRAPPED = 2e-3
 

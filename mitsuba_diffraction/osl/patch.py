@@ -20,7 +20,7 @@ NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
 #: off by 0.003.
 _PHASE = 2.0
 #: Orders drawn in a sample, each of a wavelength.
-DRAWS = 8
+DRAWS = 2
 #: Bands of κ, each with a density to draw from, up to 3/4 of the largest as in `tables.sampling`.
 BANDS, BANDED = 4, 0.75
 #: Part of the density that is the mean over all κ, so that no order with power has none.

@@ -88,7 +88,7 @@ def test_pictures_agree_with_mitsuba(tmp_path, grating):
         tangent = "radial-z" if shape == "disk" else "uv"
         cycles = {"folder": str(tmp_path / name), "tangent": tangent, "inputs": inputs}
         views.append(View(shape, light, Surface(bsdf | beneath, cycles), 12, 8))
-    compared = compare(views, tmp_path, mitsuba_samples=8192, cycles_samples=2048)
+    compared = compare(views, tmp_path, mitsuba_samples=8192, cycles_samples=4096)
     for view, comparison in zip(views, compared, strict=True):
         assert comparison.beyond_noise <= 2.0, view.shape
         # noise that hides no larger difference

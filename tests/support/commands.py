@@ -71,7 +71,8 @@ def run(words: list[str]) -> None:
         return
     _, command, *rest = words
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
-    rest = [*without_size(rest), *SMALL.get(command, [])]
+    small = [] if "--import" in rest else SMALL.get(command, [])
+    rest = [*without_size(rest), *small]
     rest = [word for word in rest if word != "--denoise"]  # needs an extra, has tests of its own
     if "--workers" in rest:  # tests/cluster starts processes
         at = rest.index("--workers")

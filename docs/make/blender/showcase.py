@@ -58,6 +58,7 @@ def main() -> None:
     scene = bpy.context.scene
     scene.cycles.samples = options.samples
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 3, 1
     scene.render.resolution_x, scene.render.resolution_y = options.size
     scene.camera = camera()
     if options.picture:
@@ -82,22 +83,23 @@ def inputs(material: Any) -> Any:
     return next(node for node in material.node_tree.nodes if node.type == "GROUP").inputs
 
 
-def plain(name: str, colour: tuple[float, float, float], roughness: float) -> Any:
-    """Return a material of Blender's own."""
+def plain(name: str, colour: tuple[float, float, float]) -> Any:
+    """Return a diffuse material."""
     material = bpy.data.materials.new(name)
-    shader = material.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Base Color"].default_value = (*colour, 1)
-    shader.inputs["Roughness"].default_value = roughness
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.remove(nodes["Principled BSDF"])
+    shader = nodes.new("ShaderNodeBsdfDiffuse")
+    shader.inputs["Color"].default_value = (*colour, 1)
+    links.new(shader.outputs[0], nodes["Material Output"].inputs["Surface"])
     return material
 
 
 def room() -> None:
-    """Add a floor, a wall behind, and three plinths."""
-    floor = plain("floor", (0.11, 0.11, 0.12), 0.5)
-    for place, turn in (((0, 0, 0), 0.0), ((0, 9, 0), math.radians(90))):
-        bpy.ops.mesh.primitive_plane_add(size=60, location=place, rotation=(turn, 0, 0))
-        bpy.context.object.data.materials.append(floor)
-    plinth = plain("plinth", (0.02, 0.02, 0.022), 0.35)
+    """Add a floor and three plinths."""
+    floor = plain("floor", (0.11, 0.11, 0.12))
+    bpy.ops.mesh.primitive_plane_add(size=60)
+    bpy.context.object.data.materials.append(floor)
+    plinth = plain("plinth", (0.02, 0.02, 0.022))
     for x in (-_STEP, 0.0, _STEP):
         bpy.ops.mesh.primitive_cylinder_add(
             vertices=96, radius=0.85, depth=0.4, location=(x, 0, 0.2)
@@ -110,11 +112,11 @@ def hole(disc: Any) -> None:
     bpy.ops.mesh.primitive_cylinder_add(vertices=96, radius=0.4, depth=0.024)
     hub = bpy.context.object
     hub.location, hub.rotation_euler = disc.location, disc.rotation_euler
-    hub.data.materials.append(plain("hub", (0.2, 0.2, 0.21), 0.25))
+    hub.data.materials.append(plain("hub", (0.2, 0.2, 0.21)))
     bpy.ops.mesh.primitive_cylinder_add(vertices=96, radius=0.14, depth=0.028)
     centre = bpy.context.object
     centre.location, centre.rotation_euler = disc.location, disc.rotation_euler
-    centre.data.materials.append(plain("centre", (0.01, 0.01, 0.01), 0.6))
+    centre.data.materials.append(plain("centre", (0.01, 0.01, 0.01)))
 
 
 def lights() -> None:
