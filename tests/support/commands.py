@@ -73,8 +73,8 @@ def run(words: list[str]) -> None:
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
     rest = [*without_size(rest), *_smaller(command, rest)]
     rest = [word for word in rest if word != "--denoise"]  # needs an extra, has tests of its own
-    if "--workers" in rest:  # tests/cluster starts processes
-        at = rest.index("--workers")
+    for option in {"--workers", "--jobs"} & set(rest):  # tests/cluster starts processes
+        at = rest.index(option)
         del rest[at : at + 2]
     if command == "render" and "--patch" in rest:  # on the package's own stage
         rest += ["-D", "resx=24", "-D", "resy=20"]
