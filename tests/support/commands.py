@@ -21,12 +21,13 @@ from tests.support.pages import blocks, spans, typed
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
 # one wavelength stands for all, and few points do
 _PERFECT = ["--material", "none"]
+_NARROW = ["--wavelength-range", "590,610"]
 # as small as commands may be asked to be; the last option of a name counts
 SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
-    "solve": ["--resolution", "80", "--tolerance", "0.2", "--wavelength-range", "590,610"],
+    "solve": ["--period", "0.6", "--resolution", "80", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-viewer": ["--method", "exact"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
