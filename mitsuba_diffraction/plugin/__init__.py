@@ -9,6 +9,7 @@ surface         `DiffractingSurface`, the part that both plugins share
 description     what a surface is: the record that shaders, OSL, maps and plans read
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
 nesting         methods of a BSDF over a nested one
+arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
