@@ -4,7 +4,9 @@ Contents
 --------
 arithmetic  the arithmetic that formulas are written in: NumPy, plain numbers, registered kinds
 symbols    numbers that record a formula's expressions
-programs   formulas written as functions of GLSL and OSL (dialects, printer)
+programs   formulas written as functions of a shading language
+printer    text of such a function
+dialects   words of GLSL and OSL
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff

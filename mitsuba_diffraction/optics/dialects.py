@@ -17,6 +17,7 @@ class Dialect:
     components : of a vector and of a complex number, by "xyz", "real" and "imag".
     complex : by operation, with places for the operands: see `printer`.
     prelude : functions of complex numbers that `complex` calls.
+    functions : names of functions that differ from those of `symbols`.
     reserved : names that no variable may have.
     """
 
@@ -25,6 +26,7 @@ class Dialect:
     components: Mapping[str, str]
     complex: Mapping[str, str]
     prelude: str
+    functions: Mapping[str, str]
     reserved: frozenset[str]
 
 
@@ -48,6 +50,7 @@ vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
 """,
+    functions={"asin": "arcsine"},
     reserved=frozenset(
         (
             f"{_FUNCTIONS} in out inout uniform varying attribute layout flat smooth "
@@ -86,6 +89,7 @@ md_number md_inverse(md_number a)
     return md_of(a.re / squared, -a.im / squared);
 }
 """,
+    functions={},
     reserved=frozenset(
         (
             f"{_FUNCTIONS} P N I Ng dPdu dPdv u v time dtime color point vector normal "

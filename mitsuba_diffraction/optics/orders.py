@@ -111,12 +111,12 @@ def wavenumber_step(u: Number, v: Number, period: Number) -> Number:
     """Return k_1 = 2π|u|/(d(u² + v²)): order m is brightest along a direction at k = m k_1."""
     xp = of(u, v)
     square = xp.maximum(u * u + v * v, 1e-8)
-    return xp.maximum(xp.absolute(u), 1e-8) * (2.0 * math.pi) * xp.reciprocal(square * period)
+    return xp.maximum(xp.absolute(u), 1e-8) * (2.0 * math.pi / period) * xp.reciprocal(square)
 
 
 @formula
 def lobe_falloff(u: Number, v: Number, sigma: Number, period: Number) -> Number:
     """Return σ² q_1² v²/(u² + v²): exp(−m² of it) is the largest lobe of order m in a direction."""
     xp = of(u, v)
-    away = sigma * (2.0 * math.pi) * xp.reciprocal(period) * v
+    away = sigma * (2.0 * math.pi) / period * v
     return away * away * xp.reciprocal(xp.maximum(u * u + v * v, 1e-8))

@@ -128,8 +128,7 @@ class Printer:
     def text(self, value: Any, precedence: int = 0) -> str:
         """Print an expression; precedence : of the operator around it."""
         if not isinstance(value, Symbol):
-            text = number(float(value))
-            return f"({text})" if precedence and text.startswith("-") else text
+            return number(float(value))
         if id(value) in self._variables:
             return self._variables[id(value)]
         text, own = self._expression(value)
@@ -151,7 +150,8 @@ class Printer:
             return f"{parts[0]}({', '.join(map(self.text, parts[1:]))})", _ATOM
         own = _PRECEDENCE.get(operation)
         if own is None:
-            return f"{operation}({', '.join(map(self.text, parts))})", _ATOM
+            function = self._dialect.functions.get(operation, operation)
+            return f"{function}({', '.join(map(self.text, parts))})", _ATOM
         if operation == "?":
             condition, one, other = (self.text(part, own + 1) for part in parts)
             return f"{condition} ? {one} : {other}", own

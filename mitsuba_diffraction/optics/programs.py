@@ -22,7 +22,6 @@ from . import arithmetic
 from .dialects import Dialect
 from .printer import Function, Printer
 from .symbols import (
-    OWN_FILES,
     Symbol,
     components_of,
     current,
@@ -199,8 +198,8 @@ def _local_names(scope: Scope) -> Iterator[None]:
     def on_return(frame: FrameType, event: str, _: Any) -> None:
         if event != "return" or scopes[-1:] != [scope]:
             return
-        if frame.f_code.co_filename not in {*OWN_FILES, __file__}:
-            own = frame.f_code is scope.formula.__code__
+        own = frame.f_code is scope.formula.__code__
+        if own or frame.f_code.co_filename == scope.formula.__code__.co_filename:
             for name, value in frame.f_locals.items():
                 _name(scope, name, value, own)
 

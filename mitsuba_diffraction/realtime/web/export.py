@@ -307,7 +307,7 @@ def _add_programs(
     header["vertex"] = vertex_source("web")
     header["shadow"] = plain_source("position.frag", dialect="web")
     whole = plain_source(
-        "shown.frag", ("library.glsl", "display.glsl"), display_definitions(view), "web"
+        "shown.frag", ("library.glsl", "formulas"), display_definitions(view), "web"
     )
     header["shown"] = {"vertex": vertex_source("web", "whole.vert"), "fragment": whole}
 
