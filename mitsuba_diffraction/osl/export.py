@@ -136,9 +136,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     DiffractionError
         If the surface has features that the shader lacks, or the folder cannot be written.
     """
-    described = OSL.described(bsdf)
-    orders = described.orders
-    shader = _patch(described) if orders is None else _orders(described, orders)
+    shader = shader_of(OSL.described(bsdf))
     check_name(name, shader)
     path = Path(folder)
     try:
@@ -194,6 +192,12 @@ def check_name(name: str, shader: Shader) -> None:
             f"name='{name}' is a word of the Open Shading Language or of the shader's source; "
             f"choose another of {allowed}, for example 'my_{name}'"
         )
+
+
+def shader_of(described: Surface) -> Shader:
+    """Return the shader of a surface that `OSL` shows."""
+    orders = described.orders
+    return _patch(described) if orders is None else _orders(described, orders)
 
 
 def _orders(described: Surface, table: OrderTable) -> Shader:
