@@ -284,4 +284,9 @@ def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
         raise DiffractionError(
             f"{shown}: output: expected a path that ends in .exr, got {output!r}"
         )
-    return file.parent / output
+    path, folder = file.parent / output, file.parent.resolve()
+    if not path.resolve().is_relative_to(folder):  # absolute, "..", or a link that leads away
+        raise DiffractionError(
+            f"{shown}: output: {output!r} is outside the recipe's folder; name a path in it"
+        )
+    return path

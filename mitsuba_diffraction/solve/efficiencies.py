@@ -125,7 +125,10 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
             f"{shown} has no column {missing[0]}; the first line must name "
             f"{', '.join((*_COLUMNS, *kinds))}"
         )
-    columns = [names.index(name) for name in (*axes, *kinds)]
+    wanted = (*axes, *kinds)
+    if twice := [name for name in wanted if names.count(name) > 1]:
+        raise DiffractionError(f"{shown} has several columns {twice[0]}; keep one")
+    columns = [names.index(name) for name in wanted]
     try:
         next(reader)
         rows = [

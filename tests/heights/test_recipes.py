@@ -75,7 +75,7 @@ pixel_size = 0.1
 coherence_width = 30
 coherence = "patch"
 wavelength_range = [400, 700]
-output = "../out/x.exr"
+output = "out/x.exr"
 """
     recipe = Recipe.load(write(folder, text))
     assert recipe.table == {
@@ -83,7 +83,7 @@ output = "../out/x.exr"
         "coherence": "patch",
         "wavelength_range": (400, 700),
     }
-    assert recipe.output == folder / "../out/x.exr"
+    assert recipe.output == folder / "out/x.exr"
     plain = Recipe.load(write(folder, 'source = "a.npy"'))
     assert plain.table == {}
     assert plain.output == Path("patch.exr")  # in the current folder

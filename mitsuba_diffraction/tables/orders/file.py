@@ -153,6 +153,8 @@ def _table(file: Any) -> OrderTable:
     period, superstrate = float(file.period), float(file.superstrate)
     low, high = (float(number) for number in file.wavelengths)
     header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
+    if not isinstance(content := json.loads(header), dict):
+        raise ValueError("its header is no JSON object")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     for name, variable in file.variables.items():
         first, kind, k = name.split("_")
@@ -169,7 +171,7 @@ def _table(file: Any) -> OrderTable:
         for key, numbers in packed.items()
     }
     bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
-    return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin)
+    return OrderTable(period, (low, high), bands, superstrate, content, thin)
 
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
