@@ -25,9 +25,7 @@ def _refuse(text: str) -> None:
     os._exit(1)
 
 
-def _explain(
-    kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
+def _explain(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Print an exception of the package's import in one line, and exit."""
     # Dr.Jit raises NameError while it handles the error of a missing library of the system
     cause = error.__context__ if isinstance(error, NameError) else error

@@ -42,7 +42,7 @@ def own_program() -> Iterator[None]:
     global _programs
     _programs += 1
     try:
-        with contextlib.redirect_stdout(_Printable(sys.stdout)):  # type: ignore[type-var]
+        with contextlib.redirect_stdout(_Printable(sys.stdout)):
             yield
     finally:
         _programs -= 1
