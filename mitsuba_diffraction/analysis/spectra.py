@@ -26,17 +26,22 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..plugin.conductors import tabulated_range
-from ..plugin.fresnel import Conductor
+from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
-from ..tables.table import DiffractionTable
 
 Reals = NDArray[np.float64]
 
 #: What spectra are relative to: a white standard, a perfect mirror at its own angle, or the light
 #: that falls on the surface.
 RELATIVE = ("white", "mirror", "none")
+#: Spectra are of one place.
+SPECTRA = Consumer(
+    "a spectrum of one place",
+    frozenset(Feature) - VARYING,
+    "give a surface with a number in its place, or one part of a mix",
+)
 #: Default wavelengths: first, last and step, nm.
 FIRST, LAST, STEP = 300.0, 830.0, 5.0
 #: Steepest direction of a lamp or of the edge of a detector's cone, degrees.
@@ -178,16 +183,19 @@ def spectrum(
     lam = check_wavelengths(
         np.arange(360.0, LAST + 1.0, STEP) if wavelengths is None else wavelengths
     )
-    material = getattr(getattr(bsdf, "boundary", None), "material", None)
-    if isinstance(material, Conductor):
-        check_material(material.name, lam)
-    table, sigma = getattr(bsdf, "table", None), getattr(bsdf, "sigma", None)
-    if isinstance(table, DiffractionTable) and lam.min() < table.wavelength_range[0]:
-        raise DiffractionError(
-            f"wavelength {lam.min():g} nm is below the table's shortest, "
-            f"{table.wavelength_range[0]:g} nm; give longer ones, or build a wider table with "
-            "'mitsuba-diffraction precompute --wavelength-range'"
-        )
+    sigma = None
+    if (described := describe(bsdf)) is not None:
+        SPECTRA.check(described)
+    if isinstance(described, Surface):
+        sigma = described.sigma
+        if described.material is not None:
+            check_material(described.material.name, lam)
+        if lam.min() < (shortest := described.shortest_wavelength):
+            raise DiffractionError(
+                f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
+                "longer ones, or build a wider table with 'mitsuba-diffraction precompute "
+                "--wavelength-range'"
+            )
     signals = _signals(bsdf, sigma, geometry, lam, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)

@@ -308,18 +308,19 @@ def _is_number(text: str) -> bool:
 
 def _surface(bsdf: Any) -> str:
     """Describe the reflecting surface in a line."""
-    from ..tables.orders import OrderTable
+    from ..plugin.description import Surface
 
-    table, turn = bsdf.table, bsdf.orientation.degrees[0]
+    described: Surface = bsdf.describe()
+    turn, scale = described.orientation.number, described.height_scale.number
     turned = [f"turned by {turn:g}°"] if turn != 0.0 else []
-    if isinstance(table, OrderTable):
-        parts = [str(table), f"coherence width {bsdf.coherence_width:g} µm", *turned]
-        return "; ".join(parts)
-    scale = bsdf.height_scale[0]
+    if described.orders is not None:
+        width = f"coherence width {described.coherence_width:g} µm"
+        return "; ".join([described.text, width, *turned])
+    model = f"{described.model}, second order" if described.second_order else described.model
     return "; ".join(
         [
-            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.model}",
-            f"{table.coherence}, coherence width {table.width_text}",
+            "R = 1" if described.text == "none" else f"{described.text}, {model}",
+            f"{described.coherence}, coherence width {described.patch.width_text}",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *turned,
         ]

@@ -1,7 +1,8 @@
-"""Optics in double precision (NumPy; no files, no Dr.Jit).
+"""Optics (no files, no Dr.Jit).
 
 Contents
 --------
+arithmetic  the arithmetic that formulas are written in: NumPy, plain numbers, registered kinds
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff

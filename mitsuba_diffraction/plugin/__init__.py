@@ -6,8 +6,10 @@ bsdf            `Diffraction`, the plugin that reflects; its docstring is docs/p
 transmission    the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, the part that both plugins share
+description     what a surface is: the record that shaders, OSL, maps and plans read
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
 nesting         methods of a BSDF over a nested one
+arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives

@@ -202,6 +202,7 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -211,9 +212,10 @@ from numpy.typing import NDArray
 from ..tables.directional import DirectionalTable
 from . import nesting
 from .boundary import Kirchhoff
+from .description import Energy, Nested, SecondOrder, Surface
 from .directions import Pair, vcavity
 from .energy import EnergyModel
-from .layers import CoatedPair, Transmission, UnderFilm
+from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
 from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
@@ -249,7 +251,6 @@ class Diffraction(DiffractingSurface):
         self.mirror = None if self.coat is None else Kirchhoff(self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
-        self.not_in_shaders = read.not_in_shaders
         self._second_order = read.second_order
         self._energy = None
         if read.scales_energy:
@@ -423,27 +424,38 @@ class Diffraction(DiffractingSurface):
         """Name of the boundary model, for people."""
         return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
 
-    @property
-    def second_order_index(self) -> float | None:
-        """Index that the second order's coefficients are for; None without it."""
-        return None if self._second_order is None else self._second_order.index
+    def describe(self) -> Surface:
+        """See `DiffractingSurface.describe`."""
+        energy, nested, second_order = None, None, None
+        if self._second_order is not None and (ratios := self.table.slope_ratios) is not None:
+            second_order = SecondOrder(self._second_order.index, ratios)
+        if self._energy is not None and self._energy.conserving | self._light_beneath:
+            energy = Energy(self._energy_scale, self._reflected_ratio)
+        if self.nested is not None:
+            blend = self.layering
+            nested = Nested(self.nested, blend.weight if isinstance(blend, Blend) else None)
+        return replace(
+            super().describe(),
+            coat=None if self.coat is None else plain(self.coat.eta),
+            second_order=second_order,
+            energy=energy,
+            nested=nested,
+            shadowing=self.vcavity,
+        )
 
     @property
     def energy_conserving(self) -> bool:
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
         return self._energy is not None and self._energy.conserving
 
-    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
-        """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
-
-        (polar + 1, azimuthal) on `tables.directional.FINE`.
-        """
+    def _energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """See `description.Energy.scale`."""
         if self._energy is None or not self._energy.conserving:
             return None
         return self._energy.brightness(height_scale)
 
-    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Return albedo over flat reflectance, by which light goes on to a nested BSDF."""
+    def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
+        """See `description.Energy.reflected`."""
         if not self._light_beneath or self._energy is None:
             return None
         return self._energy.ratio(height_scale)

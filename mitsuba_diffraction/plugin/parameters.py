@@ -45,7 +45,6 @@ class Parameters:
     layering : how diffraction and the nested BSDF share the light.
     nested : the BSDF beneath, or None.
     second_order : the second order of small slope, or None.
-    not_in_shaders : choice that shaders do not support, or None.
     """
 
     surface: SurfaceParameters
@@ -57,7 +56,6 @@ class Parameters:
     layering: Layering
     nested: BSDF | None
     second_order: SecondOrder | None
-    not_in_shaders: str | None
 
 
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
@@ -93,7 +91,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         ratios = ratios_of_second_order(props, surface.table)
         if ratios is not None and isinstance(boundary, SmallSlope):
             second_order = SecondOrder(material, boundary, ratios)
-    undrawn = [choice.choice for choice in choices if not choice.shaders]
     return Parameters(
         surface=surface,
         reflectance=flat,
@@ -104,7 +101,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         layering=_layering(props, layering, flat, nested is not None),
         nested=nested,
         second_order=second_order,
-        not_in_shaders=undrawn[0] if undrawn else None,
     )
 
 
@@ -150,8 +146,6 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.THESIS
     if coherence_of(props) != COHERENCES[0]:
         yield support.PLACED if coherence_of(props) == SURFACE else support.PATCH
-    if isinstance(dict(props.objects()).get("height_scale"), mi.Texture):
-        yield support.VARYING
     if mi.is_rgb:
         yield support.COLOURS
 

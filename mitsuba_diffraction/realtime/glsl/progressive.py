@@ -113,7 +113,7 @@ class Stage:
         for surface in self._scene.surfaces:
             parts = [*around]
             if (diffraction := surface.material.diffraction) is not None:
-                key = id(diffraction.table)
+                key = id(diffraction.described.table)
                 if key not in lobes:
                     lobes[key] = self._bound(diffraction.lobes())
                 parts.append(lobes[key])
