@@ -37,7 +37,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )
     group.add_argument(
         "--theta", metavar="DEG", type=_values, default=(0.0,),
-        help="angles of the light from the normal, -90 to 90; e.g. --theta 30 or --theta=-85:85:5; default: 0",
+        help="angles of the light from the normal, -90 to 90; e.g. 30, or --theta=-85:85:5; "
+        "default: 0",
     )  # fmt: skip
     group.add_argument(
         "--phi", metavar="DEG", type=_values, default=(0.0,),
