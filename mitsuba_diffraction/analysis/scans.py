@@ -20,6 +20,7 @@ from ..progress import Progress, silent
 from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
+from ..tables.orders import OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
@@ -65,8 +66,8 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
         return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
-def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
-    """Return the BSDF `diffraction` of a table in the variant that is set.
+def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
+    """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
 
@@ -75,9 +76,11 @@ def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
     import mitsuba as mi
 
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "table.exr"
+        solved = isinstance(table, OrderTable)
+        file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
+        kind = "diffraction_orders" if solved else "diffraction"
         try:
-            return mi.load_dict({"type": "diffraction", "table": str(file), **parameters})
+            return mi.load_dict({"type": kind, "table": str(file), **parameters})
         except RuntimeError as error:
             raise error_of("cannot make its BSDF", error) from error
