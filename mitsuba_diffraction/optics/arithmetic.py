@@ -17,9 +17,10 @@ Vectors are tuples of numbers. A branch on a value is `where`; a branch on a num
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
-from typing import Any, Protocol, TypeAlias
+from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -28,6 +29,10 @@ Number: TypeAlias = Any
 
 Mask: TypeAlias = Any
 """The result of a comparison of numbers."""
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
 
 
 class Arithmetic(Protocol):
@@ -39,6 +44,9 @@ class Arithmetic(Protocol):
     log2: Callable[[Number], Number]
     sin: Callable[[Number], Number]
     cos: Callable[[Number], Number]
+    arcsin: Callable[[Number], Number]
+    #: x to the power of y, x ≥ 0.
+    power: Callable[[Number, Number], Number]
     floor: Callable[[Number], Number]
     absolute: Callable[[Number], Number]
     minimum: Callable[[Number, Number], Number]
@@ -62,6 +70,7 @@ class _Arrays:
 
     sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
     floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
+    arcsin, power = np.arcsin, np.power
     where, clip, is_complex = np.where, np.clip, staticmethod(np.iscomplexobj)
 
     @staticmethod
@@ -82,6 +91,7 @@ class _Plain:
 
     sqrt, exp, log2, sin, cos = math.sqrt, math.exp, math.log2, math.sin, math.cos
     floor, absolute, minimum, maximum = math.floor, abs, min, max
+    arcsin, power = math.asin, pow
     reciprocal, fma = _Arrays.reciprocal, _Arrays.fma
     complex = complex
 
@@ -138,3 +148,20 @@ def is_complex(x: Number) -> bool:
 def squared(z: Number) -> Number:
     """Return |z|² of a real or a complex number."""
     return z.real * z.real + z.imag * z.imag if is_complex(z) else z * z
+
+
+#: Writes a call of a formula while `programs.Program` writes another; None otherwise.
+emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
+
+
+def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Make a formula a function of its own in shaders, rather than a part of those that call it."""
+
+    @functools.wraps(function)
+    def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        if emission is None or kwargs:
+            return function(*args, **kwargs)
+        written: Result = emission(function, args)
+        return written
+
+    return call

@@ -21,7 +21,7 @@ from .maps import Map
 from .materials import GLSL, Diffracting, Material, pack_conservation, pack_surface, packed_by
 from .methods import CONSUMERS
 from .packing import pack_responses
-from .source import global_names, method_files, pruned, renamed, resolved, shader_file
+from .source import global_names, method_files, part, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that can be exported, and the names of their functions.
@@ -194,8 +194,10 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
     second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
     look_up = "orders.glsl" if "ORDERS" in definitions else "pair.glsl"
-    files = ["library.glsl", "boundary.glsl", "layers.glsl", *second_order, look_up]
-    shared = "".join(constants) + resolved("\n".join(map(shader_file, files)), definitions)
+    files = ["library.glsl", "formulas", "boundary.glsl", "layers.glsl", *second_order, look_up]
+    shared = "".join(constants) + resolved(
+        "\n".join(part(name, definitions) for name in files), definitions
+    )
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)

@@ -213,7 +213,7 @@ class ProgressiveLight:
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
         self._mean = compile_plain(
-            context, "whole.vert", "mean.frag", ("library.glsl", "display.glsl"),
+            context, "whole.vert", "mean.frag", ("library.glsl", "formulas"),
             display_definitions(renderer.view),
         )  # fmt: skip
         self._whole = context.vertex_array(self._mean, [])

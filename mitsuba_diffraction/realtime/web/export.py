@@ -337,7 +337,7 @@ def _common(surface: Surface) -> Packed:
 
 def _display(view: str) -> dict[str, str]:
     """Return the sources that show the picture under a view."""
-    files, definitions = ("library.glsl", "display.glsl"), display_definitions(view)
+    files, definitions = ("library.glsl", "formulas"), display_definitions(view)
     fragment = plain_source("shown.frag", files, definitions, "web")
     return {"vertex": vertex_source("web", "whole.vert"), "fragment": fragment}
 
