@@ -17,7 +17,6 @@ from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
 from ..heights.recipes import Recipe
 from ..progress import Progress, silent
-from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.orders import OrderTable
@@ -75,12 +74,14 @@ def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
     """
     import mitsuba as mi
 
+    from ..plugin.bsdf import Diffraction
+    from ..plugin.orders.sheet import diffraction_orders
+
     with tempfile.TemporaryDirectory() as folder:
         solved = isinstance(table, OrderTable)
         file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
-        kind = "diffraction_orders" if solved else "diffraction"
-        try:
-            return mi.load_dict({"type": kind, "table": str(file), **parameters})
-        except RuntimeError as error:
-            raise error_of("cannot make its BSDF", error) from error
+        props = mi.Properties("diffraction_orders" if solved else "diffraction")
+        for name, value in {"table": str(file), **parameters}.items():
+            props[name] = value
+        return diffraction_orders(props) if solved else Diffraction(props)
