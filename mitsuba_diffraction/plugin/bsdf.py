@@ -165,6 +165,10 @@ Variants
 wavelength : float [550]
     Wavelength of mono variants, nm.
 
+Derivatives pass through renderings backward and forward, for all parameters marked ∂. A function
+that `dr.freeze` records must give `mi.render` a seed of type `mi.UInt32`: a plain number becomes
+part of the recording.
+
 The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999), looked
 up in a table of the patch, times a factor of the material:
 
