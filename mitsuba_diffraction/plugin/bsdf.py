@@ -254,7 +254,7 @@ class Diffraction(DiffractingSurface):
         self._energy = None
         if read.scales_energy:
             mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving)
+            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
         if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
         components = nesting.components_of(self.nested)
@@ -333,20 +333,21 @@ class Diffraction(DiffractingSurface):
             others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, k)
             power = power + others * mi.UnpolarizedSpectrum(added)
-        power = factor * power
-        if self._energy is not None and self._energy.active_factors:
-            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
-            power *= self._energy.factor(pair, k, scale)
+        if not mi.is_rgb:
+            power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, si, pair, self.boundary, power, active)
+        value = self.lobe(ctx, si, pair, self.boundary, factor * power, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
+        if self._energy is not None and self._energy.active_factors:
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
+            value *= mi.Spectrum(self._energy.factor(pair, k, scale))
         return value
 
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """See `Nesting.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._energy is not None and isinstance(self.layering, Transmission):
+        if self._energy is not None and self._light_beneath:
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
@@ -414,7 +415,8 @@ class Diffraction(DiffractingSurface):
     @property
     def _light_beneath(self) -> bool:
         """Whether light that is not reflected goes on to a nested BSDF, by the albedo."""
-        return self.nested is not None and isinstance(self.layering, Transmission)
+        beneath = self.nested is not None and isinstance(self.layering, Transmission)
+        return beneath and self.coat is None
 
     # ------------------------------------------------------------------ for people and shaders
 
@@ -438,7 +440,7 @@ class Diffraction(DiffractingSurface):
 
         (polar + 1, azimuthal) on `tables.directional.FINE`.
         """
-        if self._energy is None or not self._energy.conserving:
+        if self._energy is None or not self._energy.conserving or self.coat is not None:
             return None
         return self._energy.brightness(height_scale)
 

@@ -47,7 +47,7 @@ MIRROR = Support(
 )  # fmt: skip
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
-COAT = Support("coat_ior", energy=False, film=False, thesis=False)
+COAT = Support("coat_ior", film=False, thesis=False)
 FILM = Support(
     "a thin film (film_ior)", second_order=False, coat=False, thesis=False, shaders=False
 )
