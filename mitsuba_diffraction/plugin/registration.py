@@ -11,6 +11,8 @@ import sys
 
 import mitsuba as mi
 
+from . import arithmetic
+
 # Base classes first: the plugins inherit from `surface`
 _MODULES = (
     "surface", "bsdf", "transmission.bsdf", "orders.bsdf", "orders.sheet", "blended_patches",
@@ -30,6 +32,7 @@ def register(old: str | None, new: str | None) -> None:
 
 def register_in_all() -> None:
     """Register the plugins in the current variant, and in every one that is set later."""
+    arithmetic.register()
     mi.detail.add_variant_callback(register)
     if mi.variant() is not None:
         register(None, mi.variant())

@@ -64,6 +64,7 @@ import mitsuba as mi
 from ...errors import warn
 from ...optics.geometry import sigma_of
 from .. import nesting
+from ..description import Nested, Surface
 from ..directions import Pair, PatchFrame
 from ..parameter_changes import (
     Changeable,
@@ -102,9 +103,6 @@ class DiffractionOrders(mi.BSDF):
     parameters : everything that `traverse` exposes.
     mix : the mix that the surface is part of, as a weak reference, or None.
     """
-
-    #: Feature that shaders do not support.
-    not_in_shaders: str | None = None
 
     def __init__(self, props: Properties, read: Parameters) -> None:
         super().__init__(props)
@@ -220,6 +218,18 @@ class DiffractionOrders(mi.BSDF):
         """Collect what `dr.freeze` must know."""
         held = arrays_within(self._lobes, self.orientation)
         self._for_freezing = held + marks(self.table, self.coherence_width)
+
+    def describe(self) -> Surface:
+        """Return the description of the surface (`description.describe`)."""
+        return Surface(
+            table=self.table,
+            text=str(self.table),
+            coherence_width=float(self.coherence_width),
+            orientation=self.orientation.quantity,
+            frame=lambda si: (*self.orientation.rotation(si, mi.Mask(True)), 1.0),
+            nested=None if self.nested is None else Nested(self.nested),
+            transmits=self.table.thin,
+        )
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""

@@ -59,12 +59,14 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 
 from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
+from ..description import Surface
 from ..directions import Pair, PatchFrame, TablePoint
 from ..fresnel import Inside, squared
 from ..layers import CoatedPair, transmittances
@@ -116,9 +118,6 @@ class DiffractionDielectric(DiffractingSurface):
     boundary, inner_boundary : models of light that is reflected above and below the surface.
     thin : whether the side below is beyond the flat side of a sheet.
     """
-
-    #: Feature that shaders do not support.
-    not_in_shaders = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
@@ -422,6 +421,10 @@ class DiffractionDielectric(DiffractingSurface):
             self._energy is not None and self._energy.scales_order_0,
             self._energy is not None and self._energy.attenuates,
         )
+
+    def describe(self) -> Surface:
+        """See `DiffractingSurface.describe`."""
+        return replace(super().describe(), transmits=True)
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""

@@ -46,24 +46,19 @@ void find_row(float wavelength)
     row_wavelength = wavelength;
     wavelength = max(wavelength, solved_range.x);
     vec2 mirror = vec2(-row_incident.x, row_incident.y) / superstrate;
-    float c = sqrt(max(1.0 - mirror.y * mirror.y, 1e-7));
-    float inverse = superstrate * period / wavelength;
-    float orders = 2.0 * c * inverse;  // K of the table's cells
-    float p = clamp((c - mirror.x) * inverse, 0.0, orders);
-    float band = clamp(floor(orders), 0.0, last_band);
-    row_channel = clamp(floor(p), 0.0, band);
-    float r = clamp(orders - band, 0.0, 1.0), f = p - row_channel;
-    bool kind_a = f < r || row_channel >= band;
-    float t = kind_a ? f / max(r, 1e-7) : (f - r) / max(1.0 - r, 1e-7);
+    float optical_period = superstrate * period, c, orders, band, t, r, shortest, longest;
+    bool kind_a;
+    order_cell(mirror.x, mirror.y, optical_period / wavelength, last_band, 1e-7, c, orders, band,
+               row_channel, kind_a, t, r);
     row_channels = band + (kind_a ? 1.0 : 0.0);
     int k = int(band);
     int first = k * (k + 1) * (2 * k + 1) / 3 + (kind_a ? 0 : (k + 1) * (k + 2));
     row_tile = first + int(row_channel) * int(row_channels + 1.0);
-    row_place.xy = elevations(vec3(sqrt(clamp(vec2(t, r), 0.0, 1.0)), 0.0)).xy;  // 2/π asin
-    float longest = wavelength * 2.0 * inverse / max(orders, 1e-7);
-    float shortest = longest * sqrt(1.0 - 1.0 / (superstrate * superstrate));
-    vec2 ends = clamp(solved_range, shortest, longest);
-    row_place.z = clamp((wavelength - ends.x) / max(ends.y - ends.x, 1e-6), 0.0, 1.0);
+    float least_c = sqrt(1.0 - 1.0 / (superstrate * superstrate));
+    cell_wavelengths(orders, optical_period, solved_range.x, solved_range.y, least_c, shortest,
+                     longest);
+    row_place = vec3(smooth_coordinate(t), smooth_coordinate(r),
+                     wavelength_coordinate(wavelength, shortest, longest, 1e-6));
 }
 
 // Interpolate the row's efficiency towards channel q; the sum of all is beyond the last one.

@@ -1,0 +1,167 @@
+"""Arithmetic that a formula is written in: NumPy arrays, plain numbers, or any registered kind.
+
+A formula takes the operators + − * / & | and comparisons from its numbers, and everything else from
+the arithmetic of their kind:
+
+    def decaying_root(square):
+        xp = of(square)
+        if not is_complex(square):
+            return xp.sqrt(xp.maximum(square, 0.0))
+        ...
+
+Then the formula works for NumPy and plain numbers (here), for Dr.Jit (`plugin.arithmetic`) and for
+symbols that print as a shader. Functions take real numbers, except `reciprocal`, `fma` and `where`.
+Vectors are tuples of numbers. A branch on a value is `where`; a branch on a number's kind
+(`is_complex`) is a branch.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar
+
+import numpy as np
+
+Number: TypeAlias = Any
+"""A number of any kind: real or complex; an array, a lane's number, or a symbol."""
+
+Mask: TypeAlias = Any
+"""The result of a comparison of numbers."""
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+class Arithmetic(Protocol):
+    """Functions of one kind of numbers."""
+
+    sqrt: Callable[[Number], Number]
+    exp: Callable[[Number], Number]
+    exp2: Callable[[Number], Number]
+    log2: Callable[[Number], Number]
+    sin: Callable[[Number], Number]
+    cos: Callable[[Number], Number]
+    arcsin: Callable[[Number], Number]
+    #: x to the power of y, x ≥ 0.
+    power: Callable[[Number, Number], Number]
+    floor: Callable[[Number], Number]
+    absolute: Callable[[Number], Number]
+    minimum: Callable[[Number, Number], Number]
+    maximum: Callable[[Number, Number], Number]
+    #: 1/x of a real or a complex number.
+    reciprocal: Callable[[Number], Number]
+    #: x clipped to [low, high].
+    clip: Callable[[Number, Number, Number], Number]
+    #: a b + c, rounded once where the kind can.
+    fma: Callable[[Number, Number, Number], Number]
+    #: Numbers of the first where a mask holds, else of the second.
+    where: Callable[[Mask, Number, Number], Number]
+    #: Complex number of its real and its imaginary part.
+    complex: Callable[[Number, Number], Number]
+    #: Whether a number is complex by its type.
+    is_complex: Callable[[Number], bool]
+
+
+class _Arrays:
+    """Arithmetic of NumPy arrays."""
+
+    sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
+    floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
+    arcsin, power = np.arcsin, np.power
+    where, clip, is_complex = np.where, np.clip, staticmethod(np.iscomplexobj)
+
+    @staticmethod
+    def reciprocal(x: Number) -> Number:
+        return 1.0 / x
+
+    @staticmethod
+    def fma(a: Number, b: Number, c: Number) -> Number:
+        return a * b + c
+
+    @staticmethod
+    def complex(real: Number, imag: Number) -> Number:
+        return real + 1j * np.asarray(imag)
+
+
+class _Plain:
+    """Arithmetic of Python's numbers."""
+
+    sqrt, exp, log2, sin, cos = math.sqrt, math.exp, math.log2, math.sin, math.cos
+    floor, absolute, minimum, maximum = math.floor, abs, min, max
+    arcsin, power = math.asin, pow
+    reciprocal, fma = _Arrays.reciprocal, _Arrays.fma
+    complex = complex
+
+    @staticmethod
+    def exp2(x: float) -> float:
+        return 2.0**x
+
+    @staticmethod
+    def clip(x: float, low: float, high: float) -> float:
+        return min(max(x, low), high)
+
+    @staticmethod
+    def where(mask: bool, there: Number, elsewhere: Number) -> Number:
+        return there if mask else elsewhere
+
+    @staticmethod
+    def is_complex(x: Number) -> bool:
+        return isinstance(x, complex)
+
+
+#: Kinds of numbers, tried in this order: a test of one number, and its arithmetic.
+_KINDS: list[tuple[Callable[[Any], bool], Any]] = [
+    (lambda x: isinstance(x, (np.ndarray, np.generic)), _Arrays),
+]
+
+
+def register(is_kind: Callable[[Any], bool], arithmetic: Any) -> None:
+    """Add an `Arithmetic` of another kind of numbers.
+
+    Parameters
+    ----------
+    is_kind : whether a number is of this kind.
+    """
+    _KINDS.append((is_kind, arithmetic))
+
+
+def of(*values: Number) -> Any:
+    """Return the `Arithmetic` of values: of the first that is not a plain number, if any is not."""
+    for value in values:
+        if isinstance(value, (int, float, complex)) and not isinstance(value, np.generic):
+            continue
+        for is_kind, arithmetic in _KINDS:
+            if is_kind(value):
+                return arithmetic
+        raise TypeError(f"no arithmetic of {type(value).__name__}")
+    return _Plain
+
+
+def is_complex(x: Number) -> bool:
+    """Whether a number is complex by its type, whatever its value."""
+    return bool(of(x).is_complex(x))
+
+
+def squared(z: Number) -> Number:
+    """Return |z|² of a real or a complex number."""
+    return z.real * z.real + z.imag * z.imag if is_complex(z) else z * z
+
+
+#: Writes a call of a formula while `programs.Program` writes another; None otherwise.
+emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
+
+
+def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Make a formula a function of its own in shaders, rather than a part of those that call it."""
+
+    @functools.wraps(function)
+    def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        if emission is None or kwargs:
+            return function(*args, **kwargs)
+        written: Result = emission(function, args)
+        return written
+
+    return call
