@@ -108,14 +108,14 @@ coat_ior : float or string [none]
     a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
     own face is a mirror of the same coherence width. Light that the face sends back is summed as
     between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md), so that a coated surface never gains energy and is not scaled. The index
-    over that of the medium above is the differentiable parameter `coat_eta`.
+    (docs/validation.md). Energy is conserved as without a coat. The index over that of the medium
+    above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
     above it. The index over that of the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
-    costs a second or two at loading, is cached, and follows the film in steps of 5 nm and 0.01.
+    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01.
 film_thickness : float ∂ [none]
     Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
     coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.

@@ -288,7 +288,8 @@ def _rounded_indices(
         return None
     if isinstance(exact, fresnel.Filmed):
         index, film, depth = exact.parts
-        fine = min(step, FILM_PHASE / max(float(np.max(depth)), 1e-9))
+        phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)
+        fine = min(step, 10.0 ** math.floor(math.log10(phase)))  # of decimal numbers as given
         return fresnel.Filmed(_rounded_index(index, step), _rounded_index(film, fine), depth)
     return _rounded_index(exact, step)
 
