@@ -74,7 +74,7 @@ class Orders:
         self.nodes = _directions(rings, steps)
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
-        nodes = self.mixture.kappa_step * np.arange(count)
+        nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
         # none is left where it is among the weak ones, and less in dark speckle
         left = self.mixture.central / np.maximum(order_0_power(table, nodes * scale), 1e-12)
         powers = order_0_power(table, self._kappas * scale)
@@ -168,8 +168,8 @@ class Transport:
         across, weights = _ACROSS if width > _WIDE else (np.zeros(1), np.ones(1))
         turn = across * width / np.sqrt(np.maximum(sin_o * sine, 1e-9))[..., None]
         cos_turn = -np.cos(np.minimum(turn, np.pi))
-        ends = (x[..., None] + 0.0 * turn for x in (cos_i, cos_o, power))
-        gain = self._gain.order_0(*ends, cos_turn)
+        cos_in, cos_out, share = (x[..., None] + 0.0 * turn for x in (cos_i, cos_o, power))
+        gain = self._gain.order_0(cos_in, cos_out, share, cos_turn)
         parts *= gain @ (weights / weights.sum())
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
