@@ -132,7 +132,8 @@ class Path:
             return [through.matrices(name, above, below, self._real, self.thin) for name in names]
         if self.thin:  # the flat side lies over the structure as the face of a coat does
             n = self.came.at_structure
-            assert self.index is not None and not isinstance(self.index, Filmed)  # no coat on it
+            assert self.index is not None
+            assert not isinstance(self.index, Filmed)  # no coat lies on it
             return [coat.matrices(boundary.MODELS[name], wi, wo, n, self.index) for name in names]
         assert self.index is not None
         return [boundary.matrices_of(name)(wi, wo, self.index) for name in names]
