@@ -62,8 +62,8 @@ def chosen_resolution(
         f"--solver {problem.method} does not converge on {problem.grating.profile.name}: at "
         f"resolution {coarse.resolution} the last step changed {error:.2%} of the light, sums over "
         f"orders are above 1 by {max(excess, 0.0):.2%}, and reversed light differs by "
-        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another --solver, or set the "
-        "resolution"
+        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another --solver, or set "
+        "the resolution"
     )
 
 
