@@ -13,8 +13,10 @@ of angle θ to, and at −θ on the lamp's side.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -106,8 +108,10 @@ class Geometry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the detectors' columns, e.g. light30_detector0."""
-        return tuple(f"light{self.light:g}_detector{angle:g}" for angle in self.detectors)
+        """Names of the detectors' columns that R keeps: light30_detectorm10 at −10°."""
+        return tuple(
+            f"light{self.light:g}_detector{angle:g}".replace("-", "m") for angle in self.detectors
+        )
 
 
 @dataclass(frozen=True)
@@ -120,6 +124,7 @@ class Spectra:
     value : (n, detectors), for unpolarised light; 1 is all of what `relative` names.
     s, p : the same for light polarised across and in the plane of incidence, or None.
     error : standard errors of `value` where it is a mean over several surfaces, or None.
+    band : least and largest values over treatments of the heights, or None.
     geometry : angles.
     relative : one of `RELATIVE`.
     """
@@ -131,13 +136,19 @@ class Spectra:
     s: Reals | None = None
     p: Reals | None = None
     error: Reals | None = None
+    band: tuple[Reals, Reals] | None = None
 
-    def columns(self) -> dict[str, Reals]:
+    def names(self, group: str = "") -> list[str]:
+        """Return names of the detectors' columns, with that of a group before them."""
+        words = re.sub(r"[^\w.]", "_", group)
+        return [f"{words}_{name}" if words else name for name in self.geometry.names]
+
+    def columns(self, group: str = "") -> dict[str, Reals]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""
         columns: dict[str, Reals] = {}
         for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
             if values is not None:
-                names = (f"{name}{suffix}" for name in self.geometry.names)
+                names = (f"{name}{suffix}" for name in self.names(group))
                 columns |= dict(zip(names, values.T, strict=True))
         return columns
 
@@ -257,6 +268,23 @@ def check_material(material: str | None, wavelengths: Reals, pigment: str | None
                 f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
                 "(--wavelength-range)"
             )
+
+
+def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
+    """Return the spectra at the wavelengths that all of them have."""
+    every = [each for members in groups.values() for each in members]
+    common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
+    if not common.size:
+        raise DiffractionError("the tables have no wavelength in common; build them anew")
+
+    def cut(each: Spectra) -> Spectra:
+        kept = np.isin(each.wavelength, common)
+        s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
+        band = each.band and (each.band[0][kept], each.band[1][kept])
+        value = each.value[kept]
+        return replace(each, wavelength=common, value=value, s=s, p=p, error=error, band=band)
+
+    return {name: [cut(each) for each in members] for name, members in groups.items()}
 
 
 def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
