@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..heights.load import load_heights
-from ..heights.read import LoadOptions, is_recipe, treated_by_default
+from ..heights.read import LoadOptions, treated_by_default
 
 #: Fewest pixels of a crop along a side.
 FEWEST_PIXELS = 32
@@ -25,7 +26,7 @@ def crops_of(path: Path, options: LoadOptions, count: int) -> list[HeightField]:
     DiffractionError
         If the file is a recipe, or the crops have fewer than `FEWEST_PIXELS` a side.
     """
-    if is_recipe(path):
+    if kind_of(path) is FileKind.RECIPE:
         raise DiffractionError(f"'{path}' is a recipe; --crops is for files of heights")
     raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
     whole = load_heights(path, raw)

@@ -13,10 +13,9 @@ of angle θ to, and at −θ on the lamp's side.
 
 from __future__ import annotations
 
-import functools
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,13 +26,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import kirchhoff_factor, wavenumber
-from ..optics.materials import PERFECT, material_named
-from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
-from ..plugin.pigment import pigment_range
 from ..progress import Progress, silent
+from .known_wavelengths import check_material
 
 Reals = NDArray[np.float64]
 
@@ -237,54 +234,6 @@ def check_wavelengths(wavelengths: ArrayLike) -> Reals:
     if lam[0] <= 0.0 or not np.all(np.diff(lam) > 0.0):
         raise DiffractionError("wavelengths must be above 0 nm and increase, e.g. 400, 405, 410")
     return lam
-
-
-def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
-    """Return the wavelengths, nm, between which a material and a pigment beneath it are known.
-
-    Raises a DiffractionError if there is no such material, or the pigment cannot be read.
-    """
-    name = PERFECT if material is None else material_named(material)
-    limits = None
-    if isinstance(name, str) and name != PERFECT:
-        limits = tabulated_range(name)
-        if limits is None:
-            raise DiffractionError(unknown_conductor(name))
-    first, last = limits or (0.0, math.inf)
-    least, most = pigment_range(pigment)
-    return max(first, least), min(last, most)
-
-
-def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
-    """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
-    for name, limits in (
-        ("material", known_range(material)),
-        ("pigment", known_range(None, pigment)),
-    ):
-        if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
-            value = material if name == "material" else pigment
-            raise DiffractionError(
-                f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
-                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
-                "(--wavelength-range)"
-            )
-
-
-def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
-    """Return the spectra at the wavelengths that all of them have."""
-    every = [each for members in groups.values() for each in members]
-    common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
-    if not common.size:
-        raise DiffractionError("the tables have no wavelength in common; build them anew")
-
-    def cut(each: Spectra) -> Spectra:
-        kept = np.isin(each.wavelength, common)
-        s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
-        band = each.band and (each.band[0][kept], each.band[1][kept])
-        value = each.value[kept]
-        return replace(each, wavelength=common, value=value, s=s, p=p, error=error, band=band)
-
-    return {name: [cut(each) for each in members] for name, members in groups.items()}
 
 
 def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
+import functools
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..atomic import atomic_path
+from ..errors import DiffractionError
 from ..optics.colour import encode_srgb, linear_srgb, response
 from .spectra import Reals, Spectra
 from .spectral_variables import colours_of
@@ -31,6 +34,23 @@ _STYLES = ("-", "--", "-.", ":")
 
 #: Spectra by the name of their group; "" without groups.
 Groups = Mapping[str, Spectra]
+
+
+def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
+    """Return the spectra at the wavelengths that all of them have."""
+    every = [each for members in groups.values() for each in members]
+    common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
+    if not common.size:
+        raise DiffractionError("the tables have no wavelength in common; build them anew")
+
+    def cut(each: Spectra) -> Spectra:
+        kept = np.isin(each.wavelength, common)
+        s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
+        band = each.band and (each.band[0][kept], each.band[1][kept])
+        value = each.value[kept]
+        return replace(each, wavelength=common, value=value, s=s, p=p, error=error, band=band)
+
+    return {name: [cut(each) for each in members] for name, members in groups.items()}
 
 
 def save_csv(groups: Groups, path: str | os.PathLike[str]) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
 from ..scene.load import set_variant
 from ..settings import TableSettings
 from . import options
@@ -23,6 +24,7 @@ from .report import check_outputs, save_report
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
     from ..heights.field import HeightField
+    from ..tables.orders import OrderTable
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -70,7 +72,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
         f"their mean, and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
-    options.add_files(parser, "tables, recipes or heights of any format", needed=False)
+    options.add_files(parser, "tables, also of orders, recipes or heights", needed=False)
     parser.add_argument(
         "--group", metavar="NAME=PATTERN", type=group, action="append", default=[], dest="groups",
         help="scans of one species, in place of FILE, e.g. --group corn='corn/*.spm'; may be given "
@@ -145,8 +147,14 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, mean_spectra, on_common_wavelengths
-    from ..analysis.spectra_files import save_colours, save_csv, save_errors, spectra_figure
+    from ..analysis.spectra import Geometry, mean_spectra
+    from ..analysis.spectra_files import (
+        on_common_wavelengths,
+        save_colours,
+        save_csv,
+        save_errors,
+        spectra_figure,
+    )  # fmt: skip
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
@@ -255,7 +263,7 @@ def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
 
     Raises a DiffractionError if --wavelength-range names others, or there is no such material.
     """
-    from ..analysis.spectra import check_material, known_range
+    from ..analysis.known_wavelengths import check_material, known_range
 
     if args.wavelength_range is None:
         first, last = known_range(args.material, args.pigment)
@@ -271,10 +279,13 @@ def _measured(
     args: argparse.Namespace, file: Path, geometry: Any, lam: Any, bar: Bar
 ) -> list[Spectra]:
     """Measure the spectra of one file, or of its crops."""
-    from ..tables.exr import is_table
+    from ..tables.orders import OrderTable
     from ..tables.store import loaded_table
 
-    if is_table(file):
+    kind = kind_of(file)
+    if kind is FileKind.ORDERS:
+        return [_of_table(args, OrderTable.load(file), file, geometry, lam, bar)]
+    if kind is FileKind.TABLE:
         return [_of_table(args, loaded_table(file), file, geometry, lam, bar)]
     how = options.load_options(args)
     if args.crops is not None:
@@ -328,7 +339,9 @@ def _of_table(
         raise DiffractionError(
             f"'{file}' is a table, without heights to find gratings in; give --azimuth in degrees"
         )
-    if args.wavelength_range is None:
+    if kind_of(file) is FileKind.ORDERS:
+        lam = _within(table, lam, file)
+    elif args.wavelength_range is None:
         lam = lam[lam >= table.wavelength_range[0]]
     return _spectrum(args, table, geometry, lam, bar)
 
@@ -342,14 +355,15 @@ def _of_heights(
     from ..heights.load import notes_line
     from ..heights.spectra import dominant_periods
     from ..optics.colour import LONGEST, SHORTEST
+    from ..tables.build.checks import warnings_of
 
     # Mitsuba loads no table that begins later than the light that it renders
     span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
     asked = options.table_options(args) | {"wavelength_range": span}
     bar(0, 0, f"tabulating {file.name}")
-    settings = read_scan(file, how, asked).settings
-    table = table_of(Scan(list(patches), settings), bar)
-    line = notes_line(table.source["warnings"], file, how, TableSettings(**asked))
+    scan = Scan(list(patches), read_scan(file, how, asked).settings)
+    table = table_of(scan, bar)
+    line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
     if line and not quiet and args.crops is None:
         say(line)
     if args.light_azimuth == "auto":
@@ -371,3 +385,20 @@ def _spectrum(args: argparse.Namespace, table: Any, geometry: Any, lam: Any, bar
         geometry.light, geometry.detectors, light_azimuth=geometry.azimuth,
         acceptance=geometry.acceptance, relative=args.relative, wavelengths=lam, progress=bar,
     )  # fmt: skip
+
+
+def _within(table: OrderTable, lam: Any, file: Path) -> Any:
+    """Return the wavelengths that a table of orders has.
+
+    Raises a DiffractionError if it has none of them.
+    """
+    low, high = table.wavelengths
+    inside = lam[(lam >= low) & (lam <= high)]
+    if not len(inside):
+        raise DiffractionError(
+            f"'{file}' has orders of {low:g} to {high:g} nm, and none of {lam[0]:g} to "
+            f"{lam[-1]:g} nm; choose others by --wavelength-range"
+        )
+    if len(inside) < len(lam):
+        say(f"'{file}' has orders of {low:g} to {high:g} nm: other wavelengths are left out")
+    return inside

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files import FileKind, kind_of
 from .field import HeightField
 from .load import load_heights
-from .read import LoadOptions, is_recipe
+from .read import LoadOptions
 
 #: Ratio of the steps between medians of neighbouring rows to those of columns, from which on scan
 #: lines jump. Isotropic surfaces stay within 1.5; ridges along x have correlated rows.
@@ -21,7 +22,11 @@ def treatment_warning(path: Path, options: LoadOptions, field: HeightField) -> s
 
     path, options : the scan, and how `field` was read.
     """
-    if is_recipe(path) or options.periodic in ("none", "exact") or not field.rms_height > 0.0:
+    if (
+        kind_of(path) is FileKind.RECIPE
+        or options.periodic in ("none", "exact")
+        or not field.rms_height > 0.0
+    ):
         return ""
     if not any("periodic by" in line or "tapered" in line for line in field.history):
         return ""
