@@ -14,8 +14,8 @@ import mitsuba as mi
 
 from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
+from .device_table import device_table
 from .directions import Pair, TablePoint
-from .lookup import device_table
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .transmission.crossing import Crossing
