@@ -28,6 +28,7 @@ surface exceed 1 on their own, all light is scaled by s(ωi) s(ωo) with s at mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from functools import partial
@@ -45,10 +46,13 @@ from ..table import DiffractionTable
 from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
-from .transport import Light, Orders, Transport
+from .transport import Orders, ScatteredLight, Transport
 
 #: Where order 0 has less of the light, it is not scaled.
-FAINT = 1e-4
+MIN_ORDER_0 = 1e-4
+#: Polar angles beyond the grid of directions. Towards the horizon an albedo that gains there rises
+#: as 1/cosθ or faster, and the plugin attenuates what is scaled.
+GRAZING = np.radians([89.8, 89.9])
 
 
 @dataclass(frozen=True)
@@ -78,9 +82,12 @@ class Surface:
         material: Reflector | Dielectric,
         height_scale: float = 1.0,
     ) -> None:
-        self.material, self.orders = material, Orders(table, height_scale, material.densest)
+        self.material, finer = material, 1
         self._settings = settings = energy_settings()
         self._both_sides = isinstance(material, Dielectric)
+        if isinstance(material, Reflector):
+            finer += material.thick(table.wavelength_range[0])
+        self.orders = Orders(table, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
@@ -91,9 +98,12 @@ class Surface:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings, grid = self._settings, self._grid
         albedo = None if self._both_sides else self._albedo(wavelength_range)
-        if albedo is not None and albedo.values.max() <= self._limit:
+        if albedo is not None and self._conserves(albedo):
             return Conservation(albedo)
-        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        count = settings.side_wavelengths
+        if isinstance(self.material, Reflector):
+            fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+            count = max(settings.wavelengths, min(fringes, settings.fringes))
         nodes = spread(wavelength_range, count)
         lights = self._lights(nodes, grid.theta, grid.phi)
         solved = parallel(lambda light: self._solved(light()), lights)
@@ -112,9 +122,11 @@ class Surface:
             parallel(lower, range(first, len(between), 2))
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
-            missing = side >= scale.shape[1] or np.all(scale == 1.0)
+            missing = side >= scale.shape[1] or (self._both_sides and np.all(scale == 1.0))
             return None if missing else DirectionalTable(nodes, scale[:, side])
 
+        if not self._both_sides:
+            return Conservation(albedo, table(s, 0))
         return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
     def albedos(
@@ -136,20 +148,30 @@ class Surface:
         s = page(conservation.scale, conservation.scale_below)
         return light.sent(self._ones, self._ones), light.sent(c, s)
 
-    def _lights(self, wavelengths: Real, theta: Real, phi: Real) -> list[Callable[[], Light]]:
+    def _lights(
+        self, wavelengths: Real, theta: Real, phi: Real
+    ) -> list[Callable[[], ScatteredLight]]:
         """Makers of the light of wavelengths (nm) from polar angles (t,) and azimuths (p,), rad.
 
         Light is made when it is needed: it takes up to 100 MB.
         """
         here = self._grid.interpolation(theta[:, None], phi)
 
-        def make(paths: list[Path], wavelength: float) -> Light:
+        def make(paths: list[Path], wavelength: float) -> ScatteredLight:
             directions = theta, phi, self._grid
             sent = [Transport(self.orders, path, wavelength, *directions) for path in paths]
-            return Light(sent, here)
+            return ScatteredLight(sent, here)
 
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
+
+    def _conserves(self, albedo: DirectionalTable) -> bool:
+        """Whether a reflector gains no light, up to the horizon."""
+        if albedo.values.max() > self._limit:
+            return False
+        lights = self._lights(albedo.wavelengths, GRAZING, albedo.grid.phi)
+        largest = max(light().sent(self._ones, self._ones).max() for light in lights)
+        return bool(largest <= self._limit)
 
     def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
         """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
@@ -159,13 +181,13 @@ class Surface:
         albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
         return DirectionalTable(wavelengths, np.stack(albedos))
 
-    def _solved(self, light: Light) -> tuple[Array, Array]:
+    def _solved(self, light: ScatteredLight) -> tuple[Array, Array]:
         """Find c and s at the grid's directions."""
         if self._both_sides:
             return self._balanced(light), self._ones
         return self._ones, self._limited(light)
 
-    def _limited(self, light: Light) -> Array:
+    def _limited(self, light: ScatteredLight) -> Array:
         """Find s of a reflector at the grid's directions."""
         settings = self._settings
         # part of a lobe is below the horizon there, and would ask for any s
@@ -174,7 +196,7 @@ class Surface:
         aim = np.minimum(kernel(self._ones), np.float32(settings.target))
         return scaled(kernel, aim, largest[:, None], settings.sweeps)
 
-    def _balanced(self, light: Light) -> Array:
+    def _balanced(self, light: ScatteredLight) -> Array:
         """Find c at the grid's directions, such that R + T is 1."""
         settings, most = self._settings, self._settings.largest**2
         others, zeroth = light.others(self._ones), light.order_0(self._ones)
@@ -182,11 +204,11 @@ class Surface:
             return self._ones
         aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
         c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
-        c = np.where(zeroth > FAINT, c, np.float32(1.0))
+        c = np.where(zeroth > MIN_ORDER_0, c, np.float32(1.0))
         # what lies within one row, as a lobe at the critical angle, is left to itself
         return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
-    def _lowered(self, light: Light, c: Array, s: Array) -> tuple[Array, Array]:
+    def _lowered(self, light: ScatteredLight, c: Array, s: Array) -> tuple[Array, Array]:
         """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""
         settings = self._settings
         if self._both_sides:
@@ -195,7 +217,7 @@ class Surface:
             def order_0_excess(c: Array) -> Array:
                 zeroth = light.at_directions(c) * light.order_0(c)
                 factor = np.minimum(zeroth / room, settings.largest**2)
-                return np.where(zeroth > FAINT, factor, np.float32(1.0))
+                return np.where(zeroth > MIN_ORDER_0, factor, np.float32(1.0))
 
             c = lowered(c, order_0_excess, settings.passes)
         middle = c.mean(axis=0)
@@ -218,10 +240,18 @@ class Energy(HeightScales):
     ----------
     material : a reflector, or a dielectric that lets light through.
     wavelength_range : nm; its ends may be one.
+    stretch : least factor on lengths. A patch stretched by it is looked up with heights divided by
+        it, in light of wavelengths divided by it.
     """
 
     material: Reflector | Dielectric
     wavelength_range: tuple[float, float]
+    stretch: float = 1.0
+
+    @property
+    def most(self) -> float:
+        """Largest height scale: κ of a stretched patch stays within the table."""
+        return super().most / self.stretch
 
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""

@@ -48,11 +48,12 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
-    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
-lateral_scale_max : float [of a bitmap]
-    Largest factor of such a texture, above which factors are clipped. Required unless the texture
-    is a bitmap.
+    same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
+    to 1. Scales of energy follow it (docs/holograms.md).
+lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
+    Largest factor of a texture, above which factors are clipped; required unless the texture is a
+    bitmap. Or the largest value that a number may change to: give 1.5 × lateral_scale to optimise
+    a period in both directions. Tables grow with its square.
 height_scale : float or texture ∂ [1]
     Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
     a mesh attribute of one channel, for worn and fresh places.
@@ -108,14 +109,14 @@ coat_ior : float or string [none]
     a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
     own face is a mirror of the same coherence width. Light that the face sends back is summed as
     between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md), so that a coated surface never gains energy and is not scaled. The index
-    over that of the medium above is the differentiable parameter `coat_eta`.
+    (docs/validation.md). Energy is conserved as without a coat. The index over that of the medium
+    above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
     above it. The index over that of the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
-    costs a second or two at loading, is cached, and follows the film in steps of 5 nm and 0.01.
+    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01.
 film_thickness : float ∂ [none]
     Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
     coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.
@@ -221,11 +222,11 @@ from ..tables.directional import DirectionalTable
 from . import nesting
 from .boundary import Kirchhoff
 from .description import Energy, Nested, SecondOrder, Surface
+from .diffraction_parameters import read_parameters
 from .directions import Pair, vcavity
 from .energy import EnergyModel
 from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
-from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 from .support import ABSORBING, refusal
@@ -263,7 +264,7 @@ class Diffraction(DiffractingSurface):
         self._energy = None
         if read.scales_energy:
             mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving)
+            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
         if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
         components = nesting.components_of(self.nested)
@@ -342,20 +343,21 @@ class Diffraction(DiffractingSurface):
             others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, k)
             power = power + others * mi.UnpolarizedSpectrum(added)
-        power = factor * power
-        if self._energy is not None and self._energy.active_factors:
-            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
-            power *= self._energy.factor(pair, k, scale)
+        if not mi.is_rgb:
+            power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, si, pair, self.boundary, power, active)
+        value = self.lobe(ctx, si, pair, self.boundary, factor * power, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
+        if self._energy is not None and self._energy.active_factors:
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
+            value *= mi.Spectrum(self._energy.factor(pair, k, scale))
         return value
 
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """See `Nesting.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._energy is not None and isinstance(self.layering, Transmission):
+        if self._energy is not None and self._light_beneath:
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
@@ -423,7 +425,8 @@ class Diffraction(DiffractingSurface):
     @property
     def _light_beneath(self) -> bool:
         """Whether light that is not reflected goes on to a nested BSDF, by the albedo."""
-        return self.nested is not None and isinstance(self.layering, Transmission)
+        beneath = self.nested is not None and isinstance(self.layering, Transmission)
+        return beneath and self.coat is None
 
     # ------------------------------------------------------------------ for people and shaders
 
@@ -458,7 +461,7 @@ class Diffraction(DiffractingSurface):
 
     def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.scale`."""
-        if self._energy is None or not self._energy.conserving:
+        if self._energy is None or not self._energy.conserving or self.coat is not None:
             return None
         return self._energy.scale(height_scale)
 
