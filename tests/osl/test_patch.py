@@ -68,7 +68,7 @@ def test_draws_have_the_probabilities_that_weigh_them():
     [
         {"coat_ior": 1.4}, {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
         {"shadowing": "vcavity"},
-        {"pigment": {"type": "diffuse"}},
+        {"beneath": {"type": "diffuse"}},
         {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
     ],
     ids=lambda value: next(iter(value)),

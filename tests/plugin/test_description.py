@@ -155,8 +155,8 @@ PARAMETERS = [
     ({"height_scale": 0.5}, Feature.HEIGHT_SCALE),
     ({"lateral_scale": 0.5}, Feature.LATERAL_SCALE),
     ({"orientation": 30.0}, Feature.ORIENTATION),
-    ({"pigment": {"type": "diffuse"}}, Feature.NESTED),
-    ({"pigment": {"type": "diffuse"}, "layering": "thesis"}, Feature.THESIS),
+    ({"beneath": {"type": "diffuse"}}, Feature.NESTED),
+    ({"beneath": {"type": "diffuse"}, "layering": "thesis"}, Feature.THESIS),
     ({"plugin": "diffraction_dielectric"}, Feature.TRANSMISSION),
 ]
 
