@@ -208,10 +208,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
 from . import nesting
-from .boundary import Kirchhoff
-from .directions import Pair, vcavity
+from .boundary import KIRCHHOFF, Boundary
+from .directions import Pair
 from .energy import EnergyModel
 from .layers import CoatedPair, Transmission, UnderFilm
 from .parameter_changes import ObjectValues, check_parameters
@@ -246,7 +247,7 @@ class Diffraction(DiffractingSurface):
         super().__init__(props, read.surface, read.reflectance)
         # self.fresnel is the flat surface with its layers, self.boundary the structure alone
         self.boundary, self.coat = read.boundary, read.coat
-        self.mirror = None if self.coat is None else Kirchhoff(self.coat)
+        self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
         self.not_in_shaders = read.not_in_shaders

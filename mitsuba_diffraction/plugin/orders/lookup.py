@@ -9,9 +9,9 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...optics.coat import transmittances
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners, least_c
-from ..layers import transmittances
 from ..memory import index_between, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 

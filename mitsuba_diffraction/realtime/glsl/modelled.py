@@ -86,8 +86,6 @@ class Modelled:
         if hasattr(bsdf.layering, "weight"):
             definitions["THESIS"] = ""
             uniforms["diffuse_weight"] = float(bsdf.layering.weight)
-        from ...plugin.boundary import SmallSlope  # which only a variant has
-
         face = bsdf.fresnel
         if bsdf.coat is not None:
             face = face.material
@@ -95,7 +93,7 @@ class Modelled:
             uniforms["coat"] = self._coat
             uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
         packed = Packed((), uniforms, definitions)
-        if isinstance(bsdf.boundary, SmallSlope):
+        if bsdf.boundary.model.statistic is not None:
             packed |= pack_roughness(self.table.roughness)
         ratios = self.table.slope_ratios
         if bsdf.second_order_index is not None and ratios is not None:
