@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionWarning
+from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..heights.load import load_heights
-from ..heights.read import LoadOptions, is_recipe
+from ..heights.read import LoadOptions
 from ..heights.recipes import Recipe
 from ..progress import Progress, silent
-from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
+from ..tables.orders import OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
@@ -45,7 +46,7 @@ def read_scan(path: Path, options: LoadOptions, settings: Mapping[str, Any]) -> 
     DiffractionError
         If the file cannot be read, or a setting is not allowed.
     """
-    if not is_recipe(path):
+    if kind_of(path) is not FileKind.RECIPE:
         return Scan([load_heights(path, options)], TableSettings(**settings))
     recipe = Recipe.load(path)
     return Scan(recipe.fields(options), TableSettings(**{**recipe.table, **settings}))
@@ -65,8 +66,8 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
         return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
-def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
-    """Return the BSDF `diffraction` of a table in the variant that is set.
+def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
+    """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
 
@@ -74,10 +75,14 @@ def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
     """
     import mitsuba as mi
 
+    from ..plugin.bsdf import Diffraction
+    from ..plugin.orders.sheet import diffraction_orders
+
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "table.exr"
+        solved = isinstance(table, OrderTable)
+        file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
-        try:
-            return mi.load_dict({"type": "diffraction", "table": str(file), **parameters})
-        except RuntimeError as error:
-            raise error_of("cannot make its BSDF", error) from error
+        props = mi.Properties("diffraction_orders" if solved else "diffraction")
+        for name, value in {"table": str(file), **parameters}.items():
+            props[name] = value
+        return diffraction_orders(props) if solved else Diffraction(props)

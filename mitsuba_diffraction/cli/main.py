@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import NoReturn
 
-from ..errors import DiffractionError, shortened
+from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
 from ..streams import own_program
 from . import (
@@ -23,6 +23,7 @@ from . import (
     evaluate,
     export_osl,
     info,
+    orders,
     plan,
     precompute,
     realtime,
@@ -48,8 +49,9 @@ from .report import check_writable
 
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
-    precompute.add_parser, solve.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
-    render.add_parser, tonemap.add_parser, brdf_map.add_parser, spectrum.add_parser,
+    precompute.add_parser, solve.add_parser, orders.add_parser, info.add_parser,
+    tangents.add_parser, plan.add_parser, render.add_parser, tonemap.add_parser,
+    brdf_map.add_parser, spectrum.add_parser,
     evaluate.add_parser, survey.add_parser, sweep.add_parser, tradeoff.add_parser,
     realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,
     export_osl.add_parser,
@@ -62,7 +64,7 @@ class _Parser(argparse.ArgumentParser):
     """Argument parser whose errors shorten the values that they quote."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(shortened(message))
+        super().error(shortened(printable(message)))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -70,7 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for text in sys.argv[1:] if argv is None else argv:
             check_name(text)
-        args = build_parser().parse_args(argv)
+        args, unknown = build_parser().parse_known_args(argv)
+        if unknown:  # of the command, whose usage helps
+            args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     except DiffractionError as error:
         say_error(str(error))
         return FAILED

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
 from ..scene.load import set_variant
 from ..settings import TableSettings
 from . import options
@@ -18,6 +19,7 @@ from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Geometry, Spectra
+    from ..tables.orders import OrderTable
 
 _RANGE = (300.0, 830.0)
 
@@ -29,9 +31,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "directions in the plane of incidence, a white standard. Writes a CSV in per cent, `wl` "
         "in nm first and a column for each detector, as the R package pavo reads it, and a plot "
         "beside it. Several files are scans of one kind of surface: the CSV has their mean, "
-        "and a second file the standard errors.",
+        f"and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
-    options.add_files(parser, "tables, recipes or heights of any format")
+    options.add_files(parser, "tables, also of orders, recipes or heights of any format")
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
         "folder", ".csv",
@@ -91,14 +93,13 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, check_material, mean_spectra
+    from ..analysis.spectra import Geometry, mean_spectra
     from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(args.detector)
     geometry = Geometry(args.light, detectors, args.light_azimuth, args.acceptance)
-    if args.material is not None:  # before its table is built
-        check_material(args.material, lam)
+    lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         spectra = mean_spectra([_measured(args, file, geometry, lam, bar) for file in files])
     save_csv(spectra, output)
@@ -131,6 +132,23 @@ def _wavelengths(args: argparse.Namespace) -> Any:
     return first + args.step * np.arange(count)
 
 
+def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
+    """Return the wavelengths at which the material and the pigment are known.
+
+    Raises a DiffractionError if --wavelength-range names others, or there is no such material.
+    """
+    from ..analysis.spectra import check_material, known_range
+
+    if args.wavelength_range is None:
+        first, last = known_range(args.material, args.pigment)
+        known = lam[(lam >= first) & (lam <= last)]
+        if known.size and known.size < lam.size:
+            say(f"material or pigment are known from {known[0]:g} to {known[-1]:g} nm alone")
+            lam = known
+    check_material(args.material, lam, args.pigment)
+    return lam
+
+
 def _measured(
     args: argparse.Namespace, file: Path, geometry: Geometry, lam: Any, bar: Bar
 ) -> Spectra:
@@ -139,18 +157,23 @@ def _measured(
     from ..analysis.spectra import spectrum
     from ..heights.load import notes_line
     from ..optics.colour import LONGEST, SHORTEST
-    from ..tables.exr import is_table
+    from ..tables.build.checks import warnings_of
+    from ..tables.orders import OrderTable
     from ..tables.store import loaded_table
 
-    if is_table(file):
+    kind = kind_of(file)
+    solved = kind is FileKind.ORDERS
+    if solved or kind is FileKind.TABLE:
         names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
         names = [name for name in names if name != "--wavelength-range"]
         if refused := [*options.used_heights_options(args), *names]:
             raise DiffractionError(
                 f"'{file}' is a table, which has its own; leave {refused[0]} out"
             )
-        table = loaded_table(file)
-        if args.wavelength_range is None:
+        table = OrderTable.load(file) if solved else loaded_table(file)
+        if isinstance(table, OrderTable):
+            lam = _within(table, lam, file)
+        elif args.wavelength_range is None:
             lam = lam[lam >= table.wavelength_range[0]]
     else:
         # Mitsuba loads no table that begins later than the light that it renders
@@ -158,11 +181,29 @@ def _measured(
         how = options.load_options(args)
         asked = options.table_options(args) | {"wavelength_range": span}
         bar(0, 0, f"tabulating {file.name}")
-        table = table_of(read_scan(file, how, asked), bar)
-        if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
+        scan = read_scan(file, how, asked)
+        table = table_of(scan, bar)
+        if line := notes_line(warnings_of(*scan), file, how, TableSettings(**asked)):
             say(line)
     return spectrum(
         bsdf_of(table, **surface_parameters(args)),
         geometry.light, geometry.detectors, light_azimuth=geometry.azimuth,
         acceptance=geometry.acceptance, relative=args.relative, wavelengths=lam, progress=bar,
     )  # fmt: skip
+
+
+def _within(table: OrderTable, lam: Any, file: Path) -> Any:
+    """Return the wavelengths that a table of orders has.
+
+    Raises a DiffractionError if it has none of them.
+    """
+    low, high = table.wavelengths
+    inside = lam[(lam >= low) & (lam <= high)]
+    if not len(inside):
+        raise DiffractionError(
+            f"'{file}' has orders of {low:g} to {high:g} nm, and none of {lam[0]:g} to "
+            f"{lam[-1]:g} nm; choose others by --wavelength-range"
+        )
+    if len(inside) < len(lam):
+        say(f"'{file}' has orders of {low:g} to {high:g} nm: other wavelengths are left out")
+    return inside

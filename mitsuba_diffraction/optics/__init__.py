@@ -3,6 +3,10 @@
 Contents
 --------
 arithmetic  the arithmetic that formulas are written in: NumPy, plain numbers, registered kinds
+symbols    numbers that record a formula's expressions
+programs   formulas written as functions of a shading language
+printer    text of such a function
+dialects   words of GLSL and OSL
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
@@ -14,6 +18,8 @@ mean_second_order    mean of the second order under a thin film, for either dire
 coat       a clear coat over a structure
 through    light that goes through a dielectric, or a thin sheet
 paths      paths of light by a boundary: sides, widths w, matrices, order 0
+orders     a grating's orders: cells of efficiencies, lobes
 colour     spectra to XYZ and sRGB; differences of colours
+materials  names and numbers of materials; published indices of tissues
 display    linear sRGB to the values of a screen, by a view
 """

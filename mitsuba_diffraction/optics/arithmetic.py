@@ -17,9 +17,10 @@ Vectors are tuples of numbers. A branch on a value is `where`; a branch on a num
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
-from typing import Any, Protocol, TypeAlias
+from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -28,6 +29,10 @@ Number: TypeAlias = Any
 
 Mask: TypeAlias = Any
 """The result of a comparison of numbers."""
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
 
 
 class Arithmetic(Protocol):
@@ -39,6 +44,9 @@ class Arithmetic(Protocol):
     log2: Callable[[Number], Number]
     sin: Callable[[Number], Number]
     cos: Callable[[Number], Number]
+    arcsin: Callable[[Number], Number]
+    #: x to the power of y, x ≥ 0.
+    power: Callable[[Number, Number], Number]
     floor: Callable[[Number], Number]
     absolute: Callable[[Number], Number]
     minimum: Callable[[Number, Number], Number]
@@ -62,6 +70,7 @@ class _Arrays:
 
     sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
     floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
+    arcsin, power = np.arcsin, np.power
     where, clip, expm1 = np.where, np.clip, np.expm1
 
     @staticmethod
@@ -86,6 +95,7 @@ class _Plain:
 
     sqrt, exp, log2, sin, cos = math.sqrt, math.exp, math.log2, math.sin, math.cos
     floor, absolute, minimum, maximum = math.floor, abs, min, max
+    arcsin, power = math.asin, pow
     reciprocal, fma, expm1 = _Arrays.reciprocal, _Arrays.fma, math.expm1
     complex = complex
 
@@ -144,6 +154,24 @@ def squared(z: Number) -> Number:
     return z.real * z.real + z.imag * z.imag if is_complex(z) else z * z
 
 
+#: Writes a call of a formula while `programs.Program` writes another; None otherwise.
+emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
+
+
+def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Make a formula a function of its own in shaders, rather than a part of those that call it."""
+
+    @functools.wraps(function)
+    def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        if emission is None or kwargs:
+            return function(*args, **kwargs)
+        written: Result = emission(function, args)
+        return written
+
+    return call
+
+
+@formula
 def one_minus_exp(x: Number) -> Number:
     """Return 1 − exp(−x), x ≥ 0, without cancellation.
 

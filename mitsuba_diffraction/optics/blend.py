@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arithmetic import Number, of, one_minus_exp
+from .arithmetic import Number, formula, of, one_minus_exp
 
 Real = NDArray[np.float64]
 
@@ -127,6 +127,7 @@ class RoughnessTable:
         return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
+@formula
 def kirchhoff_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
     """Return 1 − s, the weight of Kirchhoff's matrix, eq. 9.
 
@@ -141,6 +142,7 @@ def kirchhoff_weight(kappa: Number, variance: Number, normal_reflectance: Number
     return one_minus_exp(_exponent(kappa, variance, normal_reflectance))
 
 
+@formula
 def small_slope_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
     """Return s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3), eq. 9; arguments as for `kirchhoff_weight`."""
     exponent = _exponent(kappa, variance, normal_reflectance)

@@ -22,7 +22,7 @@ although the face returns all of it and some leaves in the end (docs/validation/
 
 from __future__ import annotations
 
-from .arithmetic import Number, of, squared
+from .arithmetic import Number, formula, of, squared
 from .boundary import Direction, Geometry, Jones
 from .fresnel import Index, amplitudes
 
@@ -30,6 +30,7 @@ from .fresnel import Index, amplitudes
 Powers = tuple[Number, Number]
 
 
+@formula
 def refracted(direction: Direction, n: Number) -> Direction:
     """Return a unit vector above the face as it is in the coat, of relative index n."""
     outside_x, outside_y, _ = direction
@@ -39,6 +40,7 @@ def refracted(direction: Direction, n: Number) -> Direction:
     return x, y, xp.sqrt(xp.maximum(1.0 - (x * x + y * y), 1e-12))
 
 
+@formula
 def transmittances(cosine: Number, n: Number) -> Powers:
     """Return T_s and T_p of a face for the cosine of the angle outside; equal both ways."""
     xp = of(cosine, n)
@@ -48,6 +50,7 @@ def transmittances(cosine: Number, n: Number) -> Powers:
     return outside * (over_s * over_s), n * n * outside * (over_p * over_p)
 
 
+@formula
 def bounced(face: Powers, structure: Powers) -> Number:
     """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
     xp = of(*face, *structure)

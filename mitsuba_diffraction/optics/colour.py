@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
+from .arithmetic import Number, formula, of
 
 #: CIE standard illuminant D65 (daylight), and E, equal energy at all wavelengths.
 ILLUMINANTS = ("D65", "E")
@@ -119,11 +120,31 @@ def metal_tint(
     return np.asarray(fit / factors)
 
 
+def decode_srgb(encoded: ArrayLike) -> NDArray[np.float64]:
+    """Return linear sRGB from encoded values, both from 0 to 1 (IEC 61966-2-1)."""
+    values = np.asarray(encoded, np.float64)
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     """Encode linear sRGB for a display: clip to 0 to 1 and apply the transfer curve of sRGB."""
-    import colour
+    return np.asarray(encoded_channel(np.asarray(linear, np.float64)))
 
-    return np.asarray(colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB"))
+
+@formula
+def encoded_channel(linear: Number) -> Number:
+    """Encode a channel of linear sRGB for a display (IEC 61966-2-1), clipped to 0 to 1."""
+    xp = of(linear)
+    light = xp.clip(linear, 0.0, 1.0)
+    curve = 1.055 * xp.power(light, 1.0 / 2.4) - 0.055
+    return xp.where(light > 0.0031308, curve, 12.92 * light)
+
+
+@formula
+def encoded_colour(linear: tuple[Number, Number, Number]) -> tuple[Number, Number, Number]:
+    """Encode linear sRGB for a display, each channel by itself."""
+    red, green, blue = linear
+    return encoded_channel(red), encoded_channel(green), encoded_channel(blue)
 
 
 def delta_e(

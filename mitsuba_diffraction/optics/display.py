@@ -10,18 +10,21 @@ colours. `natural` keeps the order of hues and turns what is bright to white:
    16.5 stops, a sigmoid, and a matrix that moves the primaries outwards again.
 3. In sRGB, a colour outside the display's range moves towards grey of its luminance as in step 1.
 
-A reflectance of 0.18 keeps its brightness. `realtime/glsl/shaders/display.glsl` is the twin for
-shaders and gets its constants from `constants`.
+A reflectance of 0.18 keeps its brightness. Shaders have the functions from here (`programs`).
 """
 
 from __future__ import annotations
+
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
-from .colour import encode_srgb
+from .arithmetic import Number, formula, of
+from .colour import encode_srgb, encoded_colour
 
+Colour = tuple[Number, Number, Number]
 Array = NDArray[np.float64]
 
 #: Ways to show linear light.
@@ -35,6 +38,7 @@ _TO_WIDE = np.array(
         [0.0163914389, 0.0880133079, 0.8955952532],
     ]
 )
+_FROM_WIDE = np.linalg.inv(_TO_WIDE)
 _INSET = np.array(
     [
         [0.856627153315983, 0.0951212405381588, 0.0482516061458583],
@@ -50,7 +54,7 @@ _OUTSET = np.array(
     ]
 )
 # luminance of linear Rec. 2020 (BT.2020) and of linear sRGB (IEC 61966-2-1)
-_WIDE_LUMINANCE, _LUMINANCE = np.array([0.2627, 0.6780, 0.0593]), np.array([0.2126, 0.7152, 0.0722])
+_WIDE_LUMINANCE, _LUMINANCE = (0.2627, 0.6780, 0.0593), (0.2126, 0.7152, 0.0722)
 
 _GREY = 0.18  # reflectance that keeps its brightness
 _BELOW, _STOPS = 10.0, 16.5  # stops of the logarithm below grey, and in all
@@ -61,6 +65,8 @@ _SLOPE, _TOE, _SHOULDER = 2.4, 1.5, 2.5
 
 _PIVOT = (_BELOW / _STOPS, _GREY ** (1.0 / _GAMMA))
 _DARKEST = _GREY * 2.0**-_BELOW
+# times an entry of a matrix it is far from the largest number of single precision
+_MOST = 1e20
 
 
 def shown(linear: ArrayLike, view: str = "natural") -> Array:
@@ -81,43 +87,63 @@ def check_view(view: str) -> None:
 def natural(linear: ArrayLike) -> Array:
     """Return linear sRGB (..., 3), any values, within the display's range: 0 to 1, still linear."""
     light = np.asarray(linear, np.float64)
-    wide = _fitted(light @ _TO_WIDE.T, _WIDE_LUMINANCE, np.inf)
-    stops = np.log2(np.maximum(wide @ _INSET.T, _DARKEST) / _GREY)
-    curved = _sigmoid(np.clip((stops + _BELOW) / _STOPS, 0.0, 1.0))
-    wide = np.maximum(curved @ _OUTSET.T, 0.0) ** _GAMMA
-    return _fitted(wide @ np.linalg.inv(_TO_WIDE).T, _LUMINANCE, 1.0)
+    return np.stack(natural_colour((light[..., 0], light[..., 1], light[..., 2])), axis=-1)
 
 
-def constants() -> dict[str, float | Array]:
-    """Return the constants that the shader's twin needs, by name; matrices multiply columns."""
-    low, high = _reaches()
-    return {
-        "TO_WIDE": _TO_WIDE, "FROM_WIDE": np.linalg.inv(_TO_WIDE),
-        "INSET": _INSET, "OUTSET": _OUTSET,
-        "WIDE_LUMINANCE": _WIDE_LUMINANCE, "LUMINANCE": _LUMINANCE,
-        "GREY": _GREY, "BELOW": _BELOW, "STOPS": _STOPS, "GAMMA": _GAMMA, "DARKEST": _DARKEST,
-        "PIVOT": np.array(_PIVOT), "SLOPE": _SLOPE,
-        "TOE": np.array([_TOE, low]), "SHOULDER": np.array([_SHOULDER, high]),
-    }  # fmt: skip
+@formula
+def shown_colour(linear: Colour) -> Colour:
+    """Encode linear sRGB, where 1 is white, for a display by the view `natural`."""
+    return encoded_colour(natural_colour(linear))
 
 
-def _fitted(light: Array, luminance: Array, most: float) -> Array:
-    """Move colours (..., 3) towards grey of their luminance until all channels are 0 to `most`."""
-    grey = np.clip(light @ luminance, 0.0, most)[..., None]
-    away = light - grey
+@formula
+def natural_colour(linear: Colour) -> Colour:
+    """Return linear sRGB within the display's range by the view `natural`, still linear."""
+    xp = of(*linear)
+    red, green, blue = (xp.clip(channel, -_MOST, _MOST) for channel in linear)
+    wide = fitted_colour(_product(_TO_WIDE, (red, green, blue)), _WIDE_LUMINANCE, _MOST)
+    red, green, blue = (
+        (xp.log2(xp.maximum(c, _DARKEST) * (1.0 / _GREY)) + _BELOW) * (1.0 / _STOPS)
+        for c in _product(_INSET, wide)
+    )
+    curved = display_curve(red), display_curve(green), display_curve(blue)
+    red, green, blue = (xp.power(xp.maximum(c, 0.0), _GAMMA) for c in _product(_OUTSET, curved))
+    return fitted_colour(_product(_FROM_WIDE, (red, green, blue)), _LUMINANCE, 1.0)
+
+
+@formula
+def fitted_colour(light: Colour, luminance: Colour, most: Number) -> Colour:
+    """Move a colour towards grey of its luminance until all channels are 0 to `most`."""
+    xp = of(*light)
+    grey = xp.clip(sum(x * w for x, w in zip(light, luminance, strict=True)), 0.0, most)
+    away = light[0] - grey, light[1] - grey, light[2] - grey
     # 1e-30: no colour, no limit
-    below = grey / np.maximum(-away.min(axis=-1, keepdims=True), 1e-30)
-    above = (most - grey) / np.maximum(away.max(axis=-1, keepdims=True), 1e-30)
-    return np.clip(grey + np.minimum(1.0, np.minimum(below, above)) * away, 0.0, most)
+    below = grey * xp.reciprocal(xp.maximum(-reduce(xp.minimum, away), 1e-30))
+    above = (most - grey) * xp.reciprocal(xp.maximum(reduce(xp.maximum, away), 1e-30))
+    share = xp.minimum(1.0, xp.minimum(below, above))
+    red, green, blue = (xp.clip(grey + share * part, 0.0, most) for part in away)
+    return red, green, blue
 
 
-def _sigmoid(x: Array) -> Array:
-    """Return AgX's curve from (0, 0) to (1, 1), of slope `_SLOPE` at its pivot."""
-    away = _SLOPE * np.abs(x - _PIVOT[0])
+@formula
+def display_curve(stops: Number) -> Number:
+    """Return AgX's curve from (0, 0) to (1, 1), of a fixed slope at its pivot."""
+    xp = of(stops)
+    x = xp.clip(stops, 0.0, 1.0)
+    away = _SLOPE * xp.absolute(x - _PIVOT[0])
     low, high = _reaches()
-    under = _PIVOT[1] - away / (1.0 + (away / low) ** _TOE) ** (1.0 / _TOE)
-    over = _PIVOT[1] + away / (1.0 + (away / high) ** _SHOULDER) ** (1.0 / _SHOULDER)
-    return np.where(x < _PIVOT[0], np.maximum(under, 0.0), np.minimum(over, 1.0))
+    dark = x < _PIVOT[0]
+    power, scale = xp.where(dark, _TOE, _SHOULDER), xp.where(dark, low, high)
+    bent = xp.power(xp.power(away / scale, power) + 1.0, 1.0 / power)
+    change = away / bent
+    return xp.clip(xp.where(dark, _PIVOT[1] - change, _PIVOT[1] + change), 0.0, 1.0)
+
+
+def _product(matrix: Array, colour: Colour) -> Colour:
+    red, green, blue = (
+        sum(float(m) * x for m, x in zip(row, colour, strict=True)) for row in matrix
+    )
+    return red, green, blue
 
 
 def _reaches() -> tuple[float, float]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from .arithmetic import Number, is_complex, of, squared
+from .arithmetic import Number, formula, is_complex, of, squared
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,7 @@ def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
     ]
 
 
+@formula
 def amplitudes(cosine: Number, square: Number, index: Index) -> tuple[Number, Number]:
     """Amplitude coefficients (r_s, r_p) of reflection, of opposite signs at normal incidence.
 
@@ -151,6 +152,7 @@ def _layer(square: Number, index: Filmed) -> _Layer:
     return _Layer(epsilon, film, within, once, back_s, back_p)
 
 
+@formula
 def decaying_root(square: Number) -> Number:
     """Return the root whose wave exp(i root |z|) decays, or else travels, away from the surface."""
     xp = of(square)
@@ -164,12 +166,14 @@ def decaying_root(square: Number) -> Number:
     return xp.complex(xp.where(travels, larger, smaller), xp.where(travels, smaller, larger))
 
 
+@formula
 def reflectance(cosine: Number, index: Index) -> Number:
     """Reflectance for unpolarised light, the mean of both polarisations; as `amplitudes`."""
     r_s, r_p = amplitudes(cosine, 1.0 - cosine * cosine, index)
     return 0.5 * (squared(r_s) + squared(r_p))
 
 
+@formula
 def normal_reflectance(index: Index) -> Number:
     """Return R₀ of eq. 9, the reflectance along the normal."""
     if isinstance(index, Filmed):

@@ -34,7 +34,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from .arithmetic import Number, of
+from .arithmetic import Number, formula, of
 from .fresnel import decaying_root
 
 #: Real and imaginary part of two complex numbers, of a coefficient along and one across.
@@ -235,6 +235,7 @@ def factor(coefficients: ArrayLike, ratios: ArrayLike, small_slope_weight: Array
     return np.asarray(1.0 + change)
 
 
+@formula
 def added_power(c: Parts, r: Parts, weight: Number) -> Number:
     """Return |1 + weight (c_l r_l + c_t r_t)|² − 1, where what is added is at most `LIMIT`.
 

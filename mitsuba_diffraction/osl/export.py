@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.colour import WORKING_SPACES
+from ..plugin.description import Consumer, Feature, Surface
+from ..tables.orders import OrderTable
 from .orders import interpolation_error, order_constants, order_texture
-from .patch import check_patch, mean_transmittance, patch_constants, patch_error, patch_textures
+from .patch import mean_transmittance, patch_constants, patch_error, patch_textures
 from .sockets import (
     Socket,
     array_parameter,
@@ -32,6 +34,31 @@ from .spectrum import NODES, drawn_spectrum
 
 #: Script that adds the material to a .blend file, copied into the folder.
 SCRIPT = "blender_material.py"
+
+#: Features that the shaders for Cycles have.
+OSL = Consumer(
+    "OSL",
+    frozenset(
+        {
+            Feature.HEIGHTS, Feature.ORDERS, Feature.MIRROR, Feature.DIELECTRIC, Feature.RARER,
+            Feature.CONDUCTOR, Feature.SMALL_SLOPE, Feature.KIRCHHOFF, Feature.HEIGHT_SCALE,
+            Feature.LATERAL_SCALE, Feature.ORIENTATION,
+        }
+    ),
+    "export the surface without, or render it with Mitsuba",
+    remedies={
+        Feature.LIMITED: "export a table of all orders, or the height field",
+        Feature.MIX: "export its surfaces one by one, and mix their shaders in Blender",
+        Feature.NESTED: "leave it out, and set its colour as Pigment in Blender",
+        Feature.VARYING_ORIENTATION: "export a number, and link a texture to Rotation or Tangent "
+        "in Blender",
+        Feature.TRANSMISSION: "export a table of the reflecting side, or render it with Mitsuba",
+    },
+    left_out={
+        Feature.SECOND_ORDER: "colours in oblique light differ by several per cent; gratings can "
+        "be solved instead (docs/orders.md)"
+    },
+)  # fmt: skip
 
 _HEAD = "// {surface}; made by mitsuba_diffraction {version}.\n"
 
@@ -98,7 +125,9 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
             f"name={quoted(name)} must be letters, digits and underscores, a letter first: it is "
             "the name of a shader"
         )
-    shader = _shader(bsdf)
+    described = OSL.described(bsdf)
+    orders = described.orders
+    shader = _patch(described) if orders is None else _orders(described, orders)
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -136,58 +165,26 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     return exported
 
 
-def _shader(bsdf: Any) -> Shader:
-    """Return the shader of a BSDF, or refuse it."""
-    from ..plugin.bsdf import Diffraction  # which only a variant has
-    from ..plugin.orders.bsdf import DiffractionOrders
-
-    if not isinstance(bsdf, DiffractionOrders | Diffraction):
-        raise DiffractionError(
-            f"bsdf={type(bsdf).__name__} cannot be shown in OSL: give a BSDF of type 'diffraction' "
-            "or 'diffraction_orders', for instance mi.load_dict(md.bsdf_dict(...))"
-        )
-    if bsdf.nested is not None:
-        raise DiffractionError(
-            "a BSDF beneath the surface is not exported: leave it out, and set the colour as "
-            "Pigment in Blender"
-        )
-    turn = getattr(bsdf.orientation, "degrees", None)
-    if turn is None:
-        raise DiffractionError(
-            "orientation is a texture, which OSL does not read: export a number, and link a "
-            "texture to Rotation or Tangent in Blender"
-        )
-    common = common_sockets(float(turn[0]))
-    return _orders(bsdf, common) if isinstance(bsdf, DiffractionOrders) else _patch(bsdf, common)
-
-
-def _orders(bsdf: Any, common: Sequence[Socket]) -> Shader:
-    if bsdf.table.thin:
-        raise DiffractionError(
-            "the table is of a thin sheet, which lets light through, and OSL shows reflection "
-            "alone: export a table of the reflecting side, or render it with Mitsuba"
-        )
-    texture = order_texture(bsdf.table)
-    error = interpolation_error(bsdf.table, texture)
+def _orders(described: Surface, table: OrderTable) -> Shader:
+    texture = order_texture(table)
+    error = interpolation_error(table, texture)
     return Shader(
         "orders.osl",
-        order_constants(bsdf.table, texture),
+        order_constants(table, texture),
         [array_parameter("int", "Starts", texture.starts)],
-        [window_socket(bsdf.coherence_width), *common],
+        [window_socket(described.coherence_width), *common_sockets(described.orientation.number)],
         {"OrdersFile": texture.pixels},
-        str(bsdf.table),
+        str(table),
         {"mean": error.mean, "largest of 99.9 %": error.worst},
     )
 
 
-def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
-    from ..plugin.energy import indices_of
-
-    check_patch(bsdf)
-    table = bsdf.table
+def _patch(described: Surface) -> Shader:
+    table, material = described.patch, described.material
     textures = patch_textures(table)
-    index = indices_of(bsdf.fresnel, drawn_spectrum().wavelengths)
-    assert index is None or isinstance(index, np.ndarray)  # a film is refused
+    index = None
+    if material is not None and material.index is not None:
+        index = material.index(drawn_spectrum().wavelengths)
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     arrays = {
         "Eta": np.real(parts),
@@ -195,10 +192,9 @@ def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
         "Roughness": table.roughness.nodes,
         "Order0": textures.order_0,
     }
-    stretch = bsdf.lateral_scale.range_over_table()[0]
-    constants = patch_constants(table, textures, stretch)
+    constants = patch_constants(table, textures, described.lateral_scale.number)
     constants["PERFECT"] = int(index is None)
-    constants["SMALL_SLOPE"] = int(str(bsdf.boundary) == "small_slope")
+    constants["SMALL_SLOPE"] = int(described.model == "small_slope")
     constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
         "patch.osl",
@@ -206,11 +202,11 @@ def _patch(bsdf: Any, common: Sequence[Socket]) -> Shader:
         [array_parameter("float", name, values) for name, values in arrays.items()],
         [
             window_socket(table.coherence_width),
-            height_socket(bsdf.height_scale[0], table.height_scale_max),
-            *common,
+            height_socket(described.height_scale.number, table.height_scale_max),
+            *common_sockets(described.orientation.number),
         ],
         {"PowersFile": textures.powers, "DrawsFile": textures.draws},
-        f"patch of {bsdf.table.source.get('name', 'heights')}, {bsdf.fresnel}",
+        f"patch of {table.source.get('name', 'heights')}, {described.text}",
         patch_error(table, textures),
     )
 

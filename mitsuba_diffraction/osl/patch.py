@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, warn
 from ..optics.blend import NODES_PER_OCTAVE
 from ..optics.fresnel import reflectance
 from ..tables.powers import order_0_power
@@ -50,31 +49,6 @@ class PatchTextures(NamedTuple):
     scale: float
     rows: int
     order_0: NDArray[np.float64]
-
-
-def check_patch(bsdf: Any) -> None:
-    """Refuse a BSDF of the plugin `diffraction` with features that the shader lacks."""
-    lacking = {
-        "coat_ior": bsdf.coat is not None,
-        "a thin film (film_ior)": type(bsdf.fresnel).__name__ == "UnderFilm",
-        "shadowing='vcavity'": bsdf.vcavity,
-        "layering='thesis'": hasattr(bsdf.layering, "weight"),
-        "speckle (coherence='patch' or 'surface')": bsdf.table.grid.coherent
-        or bsdf.window_positions is not None,
-        "a height_scale or lateral_scale that varies": bsdf.scale_range().varies,
-    }
-    for feature, present in lacking.items():
-        if present:
-            raise DiffractionError(
-                f"{feature} cannot be shown in OSL: export the surface without, or render it with "
-                "Mitsuba"
-            )
-    bsdf.table.require_whole("an export needs")
-    if bsdf.second_order_index is not None:
-        warn(
-            "the second order of small slope (second_order) is left out in OSL: colours in oblique "
-            "light differ by several per cent; gratings can be solved instead (docs/orders.md)"
-        )
 
 
 def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:

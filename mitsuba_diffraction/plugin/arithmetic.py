@@ -17,6 +17,7 @@ class _Kernel:
     sqrt, exp, exp2, log2, sin, cos = dr.sqrt, dr.exp, dr.exp2, dr.log2, dr.sin, dr.cos
     floor, absolute, minimum, maximum = dr.floor, dr.abs, dr.minimum, dr.maximum
     reciprocal, clip, fma, where = dr.rcp, dr.clip, dr.fma, dr.select
+    arcsin, power = dr.asin, dr.power
     is_complex = dr.is_complex_v
 
     @staticmethod

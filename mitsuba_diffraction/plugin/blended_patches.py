@@ -34,6 +34,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .description import Mix
 from .memory import index_between
 from .parameter_changes import (
     Bounded,
@@ -71,9 +72,6 @@ Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
 
 class DiffractionMix(mi.BSDF):
     """Several BSDFs, blended by weights that vary over the surface."""
-
-    #: Feature that shaders do not support, beside those of the surfaces.
-    not_in_shaders = None
 
     def __init__(self, props: Properties) -> None:
         super().__init__(props)
@@ -196,6 +194,11 @@ class DiffractionMix(mi.BSDF):
     def derive(self) -> None:
         """Collect what `dr.freeze` must know."""
         self._for_freezing = arrays_within(list(self.weights.values()))
+
+    def describe(self) -> Mix:
+        """Return the description of the surfaces and weights (`description.describe`)."""
+        textures = [weight for weight in self.weights.values() if isinstance(weight, mi.Texture)]
+        return Mix(self.bsdfs, textures, lambda si: self.weights_at(si, mi.Mask(True)))
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""

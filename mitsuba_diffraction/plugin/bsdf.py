@@ -93,20 +93,23 @@ windows : float or string [none]
 
 The material
 ------------
-material : string
-    Name of a conductor, as in `roughconductor`; or `none`, which reflects all light.
+material : string or float
+    A tissue or a liquid, with its index over wavelength: `keratin`, `chitin`, `melanin`, `guanine`,
+    `water`; an index, `1.56` or `1.56+0.05i`; a conductor by symbol, as in `roughconductor`, or
+    plain name: `Au`, `gold`; or `none`, which reflects all light.
 eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin).
+    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
+    or names: `water`. The medium changes what is reflected; directions are those of light in air.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
-    a CD (1.58). Light is refracted into the layer and out again; its own face is a mirror of the
-    same coherence width. Light that the face sends back is summed as between two mirrors. Light
-    that leaves the structure beyond the critical angle is lost (docs/validation.md), so that a
-    coated surface never gains energy and is not scaled. The index over that of the medium above is
-    the differentiable parameter `coat_eta`.
+    a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
+    own face is a mirror of the same coherence width. Light that the face sends back is summed as
+    between two mirrors. Light that leaves the structure beyond the critical angle is lost
+    (docs/validation.md), so that a coated surface never gains energy and is not scaled. The index
+    over that of the medium above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
@@ -152,6 +155,9 @@ The light beneath
     BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected.
     Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; those of the
     nested BSDF follow.
+pigment : string or float [none]
+    Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
+    or a spectrum, a CSV of wavelengths in nm and reflectances. Beyond its ends it is constant.
 layering : string [transmission]
     Share of the light for the nested BSDF. `transmission`: T(ωi) T(ωo) with T = 1 − a and a the
     albedo of the diffracting surface; under a coat, the reflectance of both flat faces. `thesis`:
@@ -202,6 +208,7 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -212,9 +219,10 @@ from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
 from . import nesting
 from .boundary import KIRCHHOFF, Boundary
+from .description import Energy, Nested, SecondOrder, Surface
 from .directions import Pair
 from .energy import EnergyModel
-from .layers import CoatedPair, Transmission, UnderFilm
+from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
 from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
@@ -250,7 +258,6 @@ class Diffraction(DiffractingSurface):
         self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
-        self.not_in_shaders = read.not_in_shaders
         self._second_order = read.second_order
         self._energy = None
         if read.scales_energy:
@@ -424,27 +431,38 @@ class Diffraction(DiffractingSurface):
         """Name of the boundary model, for people."""
         return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
 
-    @property
-    def second_order_index(self) -> float | None:
-        """Index that the second order's coefficients are for; None without it."""
-        return None if self._second_order is None else self._second_order.index
+    def describe(self) -> Surface:
+        """See `DiffractingSurface.describe`."""
+        energy, nested, second_order = None, None, None
+        if self._second_order is not None and (ratios := self.table.slope_ratios) is not None:
+            second_order = SecondOrder(self._second_order.index, ratios)
+        if self._energy is not None and self._energy.conserving | self._light_beneath:
+            energy = Energy(self._energy_scale, self._reflected_ratio)
+        if self.nested is not None:
+            blend = self.layering
+            nested = Nested(self.nested, blend.weight if isinstance(blend, Blend) else None)
+        return replace(
+            super().describe(),
+            coat=None if self.coat is None else plain(self.coat.eta),
+            second_order=second_order,
+            energy=energy,
+            nested=nested,
+            shadowing=self.vcavity,
+        )
 
     @property
     def energy_conserving(self) -> bool:
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
         return self._energy is not None and self._energy.conserving
 
-    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
-        """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
-
-        (polar + 1, azimuthal) on `tables.directional.FINE`.
-        """
+    def _energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """See `description.Energy.scale`."""
         if self._energy is None or not self._energy.conserving:
             return None
         return self._energy.brightness(height_scale)
 
-    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Return albedo over flat reflectance, by which light goes on to a nested BSDF."""
+    def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
+        """See `description.Energy.reflected`."""
         if not self._light_beneath or self._energy is None:
             return None
         return self._energy.ratio(height_scale)

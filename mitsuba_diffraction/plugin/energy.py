@@ -29,7 +29,8 @@ from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
 from .fresnel import Inside, Perfect, Reflectance
-from .layers import UnderFilm, plain
+from .layers import UnderFilm
+from .memory import upload
 from .types import Colour, Float, Vector3f
 
 Array = NDArray[np.float32]
@@ -215,15 +216,18 @@ def indices_of(
         rounded = _rounded(thickness, THICKNESS_STEP)
         return fresnel.Filmed(index, film, 2.0 * np.pi * rounded / wavelengths)
     indices = []
-    for wavelength in wavelengths if mi.is_spectral else wavelengths[:1]:
-        si = dr.zeros(mi.SurfaceInteraction3f)
+    # one look-up of all wavelengths in a kernel, or one for each
+    at_once = not mi.is_spectral or dr.is_jit_v(mi.Float)
+    for light in [wavelengths] if at_once else wavelengths[:, None]:
+        si = dr.zeros(mi.SurfaceInteraction3f, len(light) if mi.is_spectral else 1)
         if mi.is_spectral:
-            si.wavelengths = mi.UnpolarizedSpectrum(float(wavelength))
-        channels = [_complex(n) for n in material.indices(si, True)]
-        indices.append(channels[0] if not mi.is_rgb else channels)
+            values = upload(mi.Float, light.astype(np.float32)) if at_once else float(light[0])
+            si.wavelengths = mi.UnpolarizedSpectrum(values)
+        indices.append([_complex(n) for n in material.indices(si, True)])
     if not mi.is_rgb:
-        return np.broadcast_to(np.array(indices), wavelengths.shape)
-    colours = np.broadcast_to(np.array(indices[0]), len(RGB_WAVELENGTHS))
+        values = np.concatenate([channels[0] for channels in indices])
+        return np.broadcast_to(values, wavelengths.shape)
+    colours = np.broadcast_to(np.ravel(indices[0]), len(RGB_WAVELENGTHS))
     return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
 
 
@@ -267,7 +271,10 @@ def _rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
     return np.where(rounded == 0.0, step, rounded)
 
 
-def _complex(number: Float) -> complex:
-    if dr.is_complex_v(number):
-        return complex(plain(number.real), plain(number.imag))
-    return complex(plain(number))
+def _complex(number: Float) -> NDArray[np.complex128]:
+    """Return a number of each lane as an array (lanes,)."""
+    real, imaginary = (
+        (number.real, number.imag) if dr.is_complex_v(number) else (number, mi.Float(0.0))
+    )
+    lanes = (np.array(dr.detach(part), np.float64).ravel() for part in (real, imaginary))
+    return np.asarray(next(lanes) + 1j * next(lanes))

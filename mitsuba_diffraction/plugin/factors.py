@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from .description import Quantity
 from .memory import index_between
 from .parameter_changes import Bounded, Changeable, ObjectValues
 from .properties import number
@@ -151,6 +152,12 @@ class LateralScale:
             return 1.0, 1.0
         factor = float(dr.slice(dr.detach(self._number.value))) / self.of_table
         return factor, factor
+
+    @property
+    def quantity(self) -> Quantity:
+        """The factor over that of the table, for descriptions."""
+        texture = None if self.varying is None else self.varying.texture
+        return Quantity(self.range_over_table()[1], texture)
 
     @property
     def differentiable(self) -> bool:

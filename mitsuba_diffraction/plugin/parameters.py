@@ -30,6 +30,9 @@ from .surface_parameters import (
 )
 from .types import BSDF, Properties
 
+#: Layers, pigment and medium that "none" leaves out.
+OPTIONAL = ("coat_ior", "film_ior", "ext_ior", "pigment")
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -46,7 +49,6 @@ class Parameters:
     layering : how diffraction and the nested BSDF share the light.
     nested : the BSDF beneath, or None.
     second_order : the second order of small slope, or None.
-    not_in_shaders : choice that shaders do not support, or None.
     """
 
     surface: SurfaceParameters
@@ -58,7 +60,6 @@ class Parameters:
     layering: Layering
     nested: BSDF | None
     second_order: SecondOrder | None
-    not_in_shaders: str | None
 
 
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
@@ -69,6 +70,9 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     DiffractionError
         With the parameter, its value and the choices.
     """
+    for name in OPTIONAL:  # so that a scene can have a parameter for them
+        if name in props and props.get(name) == "none":
+            del props[name]
     nested = nested_of(props, REFLECTING)
     coat = coat_of(props)
     material = material_of(props, coat)
@@ -94,7 +98,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         ratios = ratios_of_second_order(props, surface.table)
         if ratios is not None and boundary.model.has_second_order:
             second_order = SecondOrder(material, boundary, ratios)
-    undrawn = [choice.choice for choice in choices if not choice.shaders]
     return Parameters(
         surface=surface,
         reflectance=flat,
@@ -105,7 +108,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         layering=_layering(props, layering, flat, nested is not None),
         nested=nested,
         second_order=second_order,
-        not_in_shaders=undrawn[0] if undrawn else None,
     )
 
 
@@ -119,7 +121,8 @@ def _model(props: Properties, material: Reflectance) -> str:
 def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
     """Features that a scene asks for, as messages call them."""
     if nested is not None:
-        yield "nested", f"the nested BSDF {kind_of(nested)}"
+        pigment = "pigment" in props
+        yield "nested", "the pigment" if pigment else f"the nested BSDF {kind_of(nested)}"
     if (model := props.get("model", "kirchhoff")) != "kirchhoff":
         yield "index", f"model='{model}'"
     if props.get("layering", "") == "thesis":
@@ -138,7 +141,7 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
     if isinstance(material, Perfect):
         yield support.MIRROR
     elif isinstance(material, Conductor):
-        yield support.CONDUCTOR
+        yield support.CONDUCTOR if material.absorbs else support.DISPERSIVE
     elif float(dr.slice(material.eta)) < 1.0:
         yield support.RARER
     if "coat_ior" in props:
@@ -151,8 +154,6 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.THESIS
     if coherence_of(props) != COHERENCES[0]:
         yield support.PLACED if coherence_of(props) == SURFACE else support.PATCH
-    if isinstance(dict(props.objects()).get("height_scale"), mi.Texture):
-        yield support.VARYING
     if mi.is_rgb:
         yield support.COLOURS
 

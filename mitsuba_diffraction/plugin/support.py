@@ -26,7 +26,6 @@ class Support:
     nested : a BSDF beneath the structure.
     thesis : the layering of the thesis of 2014.
     placed : windows that sit where the light falls, `coherence="surface"`.
-    shaders : the realtime renderer.
     """
 
     choice: str
@@ -38,7 +37,6 @@ class Support:
     nested: bool = True
     thesis: bool = True
     placed: bool = True
-    shaders: bool = True
 
 
 MIRROR = Support(
@@ -46,17 +44,15 @@ MIRROR = Support(
     index=False, second_order=False, coat=False, film=False, nested=False,
 )  # fmt: skip
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
+DISPERSIVE = Support("a material whose index varies with the wavelength", second_order=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
 COAT = Support("coat_ior", energy=False, film=False, thesis=False)
-FILM = Support(
-    "a thin film (film_ior)", second_order=False, coat=False, thesis=False, shaders=False
-)
+FILM = Support("a thin film (film_ior)", second_order=False, coat=False, thesis=False)
 ABSORBING = Support("film_k, which absorbs the light for what lies beneath", nested=False)
 THESIS = Support("layering='thesis'", second_order=False)
 PATCH = Support("coherence='patch'", second_order=False)
-PLACED = Support("coherence='surface'", second_order=False, shaders=False)
+PLACED = Support("coherence='surface'", second_order=False)
 COLOURS = Support("an RGB variant, whose light has no wavelengths to tell speckle by", placed=False)
-VARYING = Support("a height_scale that varies", shaders=False)
 TRANSMISSION = Support(
     "the plugin diffraction_dielectric, through which light goes",
     nested=False, placed=False,
@@ -64,8 +60,8 @@ TRANSMISSION = Support(
 
 
 def without_second_order(model: str) -> Support:
-    """Return the declaration of a boundary model other than small slope; shaders draw Kirchhoff."""
-    return Support(f"model='{model}'", second_order=False, shaders=model == "kirchhoff")
+    """Return the declaration of a boundary model other than small slope."""
+    return Support(f"model='{model}'", second_order=False)
 
 
 def check_combination(asked: Mapping[str, str], choices: Sequence[Support]) -> None:

@@ -11,10 +11,13 @@ import drjit as dr
 import mitsuba as mi
 
 from .boundary import Boundary
+from .conductors import tabulated_range
+from .description import Feature, Film, Material, Quantity, Surface
 from .directions import Pair, PatchFrame
+from .energy import indices_of
 from .energy_factors import ScaleRange
 from .factors import LEAST_SCALE, VaryingFactor
-from .fresnel import Reflectance, tinted
+from .fresnel import Conductor, Perfect, Reflectance, tinted
 from .layers import CoatedPair, UnderCoat, UnderFilm
 from .parameter_changes import Bounded, Changeable, arrays_within, marks, take_changes
 from .power import power_model
@@ -81,11 +84,6 @@ class DiffractingSurface(mi.BSDF):
     def sigma(self) -> float:
         """Standard deviation of the amplitude window, µm."""
         return self.table.sigma
-
-    @property
-    def shortest_wavelength(self) -> float:
-        """Shortest wavelength that the table serves, nm."""
-        return self.table.wavelength_range[0]
 
     # ------------------------------------------------------------------ the model
 
@@ -195,7 +193,34 @@ class DiffractingSurface(mi.BSDF):
             self.table, str(self.window_positions), *textures, *constants
         )
 
-    # ------------------------------------------------------------------ for people
+    # ------------------------------------------------------------------ for people and shaders
+
+    def describe(self) -> Surface:
+        """Return the description of the surface (`description.describe`)."""
+        structure: Any = self.boundary.material
+        film = None
+        if isinstance(structure, UnderFilm):
+            film, structure = Film(*structure.numbers()), structure.material
+        largest = float(dr.slice(dr.max(dr.detach(self.height_scale))))
+        placed = self.window_positions is not None
+        return Surface(
+            table=self.table,
+            text=str(self.fresnel),
+            coherence_width=float(self.table.coherence_width),
+            orientation=self.orientation.quantity,
+            frame=lambda si: (
+                *self.orientation.rotation(si, mi.Mask(True)),
+                self.lateral_scale.over_table(si, mi.Mask(True)),
+            ),
+            coherence="surface" if placed else self.table.coherence,
+            heights=self.heights,
+            height_scale=Quantity(largest, self._varying and self._varying.texture),
+            lateral_scale=self.lateral_scale.quantity,
+            largest_scale=float(self.table.height_scale_max),
+            material=_described(structure),
+            film=film,
+            model=str(self.boundary),
+        )
 
     def described(self, plugin: str, model: str, conserving: bool, more: Mapping[str, Any]) -> str:
         """Return all parameters as `to_string` shows them.
@@ -220,6 +245,16 @@ class DiffractingSurface(mi.BSDF):
         }
         lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())
         return f"{plugin}[\n{lines}]"
+
+
+def _described(material: Any) -> Material:
+    """Return the record of a structure's material."""
+    if isinstance(material, Perfect):
+        return Material(Feature.MIRROR)
+    index: Any = partial(indices_of, material)
+    if isinstance(material, Conductor):
+        return Material(Feature.CONDUCTOR, index, tabulated_range(material.name), material.name)
+    return Material(Feature.RARER if material.reflects_all else Feature.DIELECTRIC, index)
 
 
 def _scale_refusal(most: float, height_scale: float) -> str:

@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .description import Quantity
 from .meshes import has_texcoords
 from .parameter_changes import Bounded, ObjectValues
 from .properties import name_of
@@ -143,6 +144,11 @@ class ConstantOrientation:
         sin, cos = dr.sincos(dr.deg2rad(self.degrees))
         return cos, sin
 
+    @property
+    def quantity(self) -> Quantity:
+        """The angle in degrees, for descriptions."""
+        return Quantity(float(dr.slice(dr.detach(self.degrees))))
+
     def __str__(self) -> str:
         return f"{dr.slice(self.degrees):g}°"
 
@@ -174,6 +180,11 @@ class OrientationTexture:
     def traverse(self, callback: Callback) -> None:
         """Expose the texture."""
         callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The texture, for descriptions."""
+        return Quantity(0.0, self.texture)
 
     def __str__(self) -> str:
         return " ".join(str(self.texture).split())

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
+from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
 from ..tables.orders import OrderTable
-from ..tables.orders.file import is_order_table
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
 
@@ -28,7 +29,7 @@ MATERIAL = "material:"
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
 # With one of these the surface is opaque, and nothing lies beneath it.
-_CONDUCTORS = ("material", "eta", "k")
+_CONDUCTORS = ("eta", "k")
 
 
 class SceneValues(NamedTuple):
@@ -189,7 +190,7 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
     file, *parameters = _COMMA.split(text)
     pairs = [parameter.partition("=")[::2] for parameter in parameters]
     values = {name.strip(): _value(value.strip()) for name, value in pairs}
-    names, solved = list(values), is_order_table(file)
+    names, solved = list(values), kind_of(file) is FileKind.ORDERS
     plugin = TRANSMITTING if "thin" in names else REFLECTING
     props = mi.Properties(ORDERS if solved else plugin)
     props["table" if solved else "heightfield"] = str(Path(file).absolute())
@@ -199,7 +200,8 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
         old = state.nodes[beneath].props
         if old.plugin_name().startswith("diffraction") and "orientation" in old:
             props["orientation"] = old["orientation"]
-    opaque = solved or plugin == TRANSMITTING or set(names) & set(_CONDUCTORS)
+    opaque = solved or plugin == TRANSMITTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = opaque or not lets_light_through(values.get("material", "keratin"))
     if beneath is not None and not opaque:
         props["beneath"] = mi.Properties.ResolvedReference(beneath)
     return props

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
 from ...optics.geometry import wavenumber
+from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
 from ...progress import Progress
@@ -19,6 +20,12 @@ from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .result import Bands, BrdfMap, Light
 
+#: Maps are of one place.
+MAPS = Consumer(
+    "a map of one place",
+    frozenset(Feature) - VARYING,
+    "give a surface with a number in its place, or one part of a mix",
+)
 #: Pixels of a kernel launch: enough for a GPU, with sums of some tens of megabytes.
 LAUNCH_PIXELS = 1 << 20
 #: Largest number of values in a spectral map, 4 GB.
@@ -75,14 +82,16 @@ def brdf_map(
     check_map(bands, resolution, samples, spectral)
     _check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
-    shortest = getattr(bsdf, "shortest_wavelength", 0.0)
-    if bands.low < shortest:
+    if (described := describe(bsdf)) is not None:
+        MAPS.check(described)
+    surface = described if isinstance(described, Surface) else None
+    if surface is not None and bands.low < (shortest := surface.shortest_wavelength):
         raise DiffractionError(
             f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a wider table "
             "with 'mitsuba-diffraction precompute --wavelength-range'"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
-    sigma = getattr(bsdf, "sigma", None)
+    sigma = None if surface is None else surface.sigma
     narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)

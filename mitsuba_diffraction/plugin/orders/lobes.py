@@ -17,6 +17,7 @@ import numpy as np
 
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import sigma_of
+from ...optics.orders import lobe_falloff, lobe_peak, order_lobe, wavenumber_step
 from ...tables.orders import OrderTable
 from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..directions import Pair
@@ -127,8 +128,7 @@ class _Window:
 
     def lobe(self, position: Vector2f, order: Float) -> Float:
         """Return exp(−σ²|q − q_m|²), of a position in units of orders."""
-        squared = dr.square(position.x - order) + dr.square(position.y)
-        return dr.exp(-self._sharpness * squared)
+        return order_lobe(position.x - order, position.y, self._sharpness)
 
     def drawn(self, row: Row, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
         """Draw an order of a row, and a direction in its lobe."""
@@ -167,8 +167,7 @@ class SpectralLobes(_Window):
                 light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
                 terms.append((order, lobe, share.efficiency))
-            peak = dr.square((2e3 * math.sqrt(math.pi) * self.sigma) * dr.rcp(wavelength))
-            peak *= pair.cos_o
+            peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self.sigma) * pair.cos_o
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
         mean = density * (1.0 / len(wavelengths))
@@ -266,9 +265,9 @@ class DaylightLobes(_Window):
 
         def body(n: Index, sums: list[Float]) -> tuple[Index, list[Float]]:
             node = read_record(self._order_0, n, 8)
-            squared = dr.square((2e3 * math.pi * self.sigma) * dr.rcp(node[CHANNELS]))
+            peak = lobe_peak(2e3 * math.pi * dr.rcp(node[CHANNELS]), self.sigma)
             value, share = shares(node[CHANNELS], mi.Float(0.0))
-            lobe = squared * dr.exp(-radius * squared) * (1.0 / math.pi)
+            lobe = peak * dr.exp(-math.pi * radius * peak)
             return n + 1, _added(sums, node, lobe, value, share)
 
         return self._loop(count, self._wavelengths, body)
@@ -279,8 +278,8 @@ class DaylightLobes(_Window):
         unit = 2.0 * math.pi / self.period
         square = dr.maximum(radius, 1e-8)
         # k_m = m · step, of the sign of u
-        step = dr.maximum(dr.abs(u), 1e-8) * unit * dr.rcp(square)
-        aside = dr.square(self.sigma * unit * v) * dr.rcp(square)
+        step = wavenumber_step(u, v, self.period)
+        aside = lobe_falloff(u, v, self.sigma, self.period)
         first = dr.maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
         last = dr.minimum(
             dr.floor(self._waves[1] * dr.rcp(step)), dr.sqrt(_FAR * dr.rcp(dr.maximum(aside, 1e-8)))

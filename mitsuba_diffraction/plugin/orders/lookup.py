@@ -10,6 +10,12 @@ import drjit as dr
 import mitsuba as mi
 
 from ...optics.coat import transmittances
+from ...optics.orders import (
+    cell_wavelengths,
+    order_cell,
+    smooth_coordinate,
+    wavelength_coordinate,
+)
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners, least_c
 from ..memory import index_between, read, read_record, upload
@@ -32,7 +38,7 @@ class Row:
     start : record of port 0.
     channel : j of the incident light.
     channels : number of channels of a side.
-    weights : of the eight corners of a cell.
+    weights : of the eight corners of a cell; 0 beyond the table's wavelengths.
     incident, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
     """
@@ -88,7 +94,7 @@ class OrderLookup:
         self._values = upload(mi.Float16, records.values)
         self._period = 1e3 * table.optical_period
         self._last = float(table.last_band)
-        self._ends = table.wavelengths
+        self._ends, self._reach = table.wavelengths, table.reach
         self._steps = 1e-3 / table.period
         self.index, self._least_c = table.superstrate, least_c(table.superstrate)
         self._parts = records.values.shape[1] // 8
@@ -108,22 +114,19 @@ class OrderLookup:
         """
         vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
         x, y = (incident.x * (-1.0 / self.index), incident.y * (1.0 / self.index))
-        c = dr.sqrt(dr.maximum(dr.fma(-y, y, 1.0), _LEAST))
         inverse = self._period * dr.rcp(wavelength)
-        big_k = 2.0 * c * inverse
-        p = dr.clip((c - x) * inverse, 0.0, big_k)
-        band = index_between(dr.floor(big_k), 0.0, self._last)
-        channel = index_between(dr.floor(p), 0.0, band)
-        r, f = dr.clip(big_k - band, 0.0, 1.0), p - channel
-        is_a = (f < r) | (channel >= band)
-        above = (f - r) * dr.rcp(dr.maximum(1.0 - r, _LEAST))
-        t = dr.select(is_a, f * dr.rcp(dr.maximum(r, _LEAST)), above)
-        places = [_smooth(t), _smooth(r), self._w(wavelength, big_k)]
+        place = order_cell(x, y, inverse, self._last, _LEAST)
+        band, channel, is_a = place.band, place.channel, place.kind_a
+        places = [
+            smooth_coordinate(place.t), smooth_coordinate(place.r),
+            self._w(wavelength, place.k_continuous),
+        ]  # fmt: skip
         kind = mi.UInt32(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
         channels = mi.UInt32(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
-        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
-        for place, count in zip(places, self._cells, strict=True):
-            position = place * float(count)
+        lit = (vacuum >= self._reach[0]) & (vacuum <= self._reach[1])
+        cell, weights = mi.UInt32(0), [dr.select(lit, mi.Float(1.0), 0.0)]
+        for coordinate, count in zip(places, self._cells, strict=True):
+            position = coordinate * float(count)
             lower = index_between(dr.floor(position), 0.0, count - 1.0)
             share = position - lower
             cell = cell * count + mi.UInt32(lower)
@@ -137,8 +140,8 @@ class OrderLookup:
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
-        lit = mi.UInt32(channel), channels, weights, incident, vacuum, face
-        return Row(kind, cell, start, *lit)
+        light = mi.UInt32(channel), channels, weights, incident, vacuum, face
+        return Row(kind, cell, start, *light)
 
     @staticmethod
     def port(
@@ -225,14 +228,8 @@ class OrderLookup:
     def _w(self, wavelength: Float, big_k: Float) -> Float:
         if self._cells.w == 1:
             return mi.Float(0.0)
-        longest = 2.0 * self._period * dr.rcp(dr.maximum(big_k, _LEAST))
-        low, high = (dr.clip(end, self._least_c * longest, longest) for end in self._ends)
-        return dr.clip((wavelength - low) * dr.rcp(dr.maximum(high - low, 1e-3)), 0.0, 1.0)
-
-
-def _smooth(t: Float) -> Float:
-    """Return τ of t = sin²(πτ/2)."""
-    return dr.asin(dr.sqrt(dr.clip(t, 0.0, 1.0))) * (2.0 / dr.pi)
+        low, high = cell_wavelengths(big_k, self._period, *self._ends, self._least_c)
+        return wavelength_coordinate(wavelength, low, high, 1e-3)
 
 
 _lookups: weakref.WeakKeyDictionary[OrderTable, dict[str, OrderLookup]] = (

@@ -29,9 +29,6 @@ from .parameters import Parameters, read_parameters
 class OrdersSheet(DiffractionOrders):
     """Reflection and transmission of a thin sheet with solved orders."""
 
-    #: Feature that shaders do not support.
-    not_in_shaders = "light that goes through"
-
     def __init__(self, props: Properties, read: Parameters) -> None:
         super().__init__(props, read)
         flags = mi.BSDFFlags

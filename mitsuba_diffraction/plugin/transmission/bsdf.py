@@ -59,6 +59,7 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import drjit as dr
@@ -69,6 +70,7 @@ from ...optics.boundary import Geometry, Jones, geometry, power
 from ...optics.coat import transmittances
 from ...optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
 from ..boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
+from ..description import Surface
 from ..directions import Pair, PatchFrame, TablePoint
 from ..fresnel import Inside
 from ..layers import CoatedPair
@@ -115,9 +117,6 @@ class DiffractionDielectric(DiffractingSurface):
     boundary, inner_boundary : models of light that is reflected above and below the surface.
     thin : whether the side below is beyond the flat side of a sheet.
     """
-
-    #: Feature that shaders do not support.
-    not_in_shaders = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
@@ -414,6 +413,10 @@ class DiffractionDielectric(DiffractingSurface):
             self._energy is not None and self._energy.scales_order_0,
             self._energy is not None and self._energy.attenuates,
         )
+
+    def describe(self) -> Surface:
+        """See `DiffractingSurface.describe`."""
+        return replace(super().describe(), transmits=True)
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""

@@ -19,6 +19,7 @@ camera         sensors as cameras; moving the camera and the light by hand
 packing        tables as textures
 texels         textures, uniforms and definitions that a shader reads; packing of numbers
 methods        tables and programs of each method, also of the thesis' methods
+formulas       formulas of optics that a shader calls, as functions in GLSL
 source         text of the shaders; removal of unused code, and prefixed names
 context        OpenGL without a window: programs, textures, framebuffers
 timing         time per fragment

@@ -16,14 +16,25 @@ import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
+from ...plugin.description import Consumer, Feature
 from .maps import Map
-from .materials import Diffracting, Material, diffraction_of, pack_conservation, pack_surface
+from .materials import GLSL, Diffracting, Material, pack_conservation, pack_surface, packed_by
+from .methods import CONSUMERS
 from .packing import pack_responses
-from .source import global_names, method_files, pruned, renamed, resolved, shader_file
+from .source import global_names, method_files, part, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that can be exported, and the names of their functions.
 EXPORTED = {"fast": "diffraction", "exact": "diffraction_exact"}
+
+#: Features that an exported shader has; orientation and base are left to the program that draws.
+SHADER = Consumer(
+    "an exported shader",
+    GLSL.shows - {Feature.MIX, Feature.VARYING_LENGTH},
+    "export the surface without, or render it with Mitsuba",
+    {Feature.MIX: "export its surfaces one by one",
+     Feature.VARYING_LENGTH: "export one with a number for each period"},
+)  # fmt: skip
 
 _PREFIX = "md_"
 _HEAD = """// Diffraction of a measured surface, made by mitsuba_diffraction {version}: {surface}.
@@ -112,29 +123,24 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         If the BSDF does not diffract or has features that the shaders lack, a method is unknown, or
         a method does not support the table.
     """
-    if lacking := getattr(bsdf, "not_in_shaders", None):
-        raise DiffractionError(
-            f"the surface has {lacking}, which the shaders do not support: export it without, or "
-            "render it with Mitsuba"
-        )
-    if (surface := diffraction_of(bsdf)) is None:
-        raise DiffractionError(
-            f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
-            "instance mi.load_dict(md.bsdf_dict(...))"
-        )
+    described = SHADER.described(bsdf)
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
         )
+    for method in methods:
+        if method in CONSUMERS:
+            CONSUMERS[method].check(described)
+    surface = packed_by(described)
     material = Material(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)
     common |= Packed(
-        uniforms={"height_scale": surface.height_scale},
+        uniforms={"height_scale": described.height_scale.number},
         definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
     tables = {method: _tables(method, surface) for method in methods}
-    return _joined(common, tables, surface.stretch, surface.words)
+    return _joined(common, tables, described.lateral_scale.number, surface.words)
 
 
 def export_shader(
@@ -188,8 +194,10 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
     second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
     look_up = "orders.glsl" if "ORDERS" in definitions else "pair.glsl"
-    files = ["library.glsl", "boundary.glsl", "layers.glsl", *second_order, look_up]
-    shared = "".join(constants) + resolved("\n".join(map(shader_file, files)), definitions)
+    files = ["library.glsl", "formulas", "boundary.glsl", "layers.glsl", *second_order, look_up]
+    shared = "".join(constants) + resolved(
+        "\n".join(part(name, definitions) for name in files), definitions
+    )
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)

@@ -95,7 +95,7 @@ def light_definitions(lights: int, sky: bool, view: str | None = None) -> dict[s
     if sky:
         definitions["SKY"] = ""
     if view is not None:
-        definitions |= {"DISPLAYED": "", **display_definitions(view)}
+        definitions |= display_definitions(view)
     return definitions
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.colour import linear_srgb, response
+from ...plugin.description import Mix, Surface
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
 
@@ -115,68 +116,50 @@ def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
     return total
 
 
-def axis_map(orientation: Any, lateral: Any = None) -> Map:
+def axis_map(described: Surface) -> Map:
     """Return the patch's frame: (cos, sin) of its x axis in the tangent frame, and its stretch.
-
-    lateral : `LateralScale` of the BSDF; its factor is relative to the table's patch. None: 1.
 
     Raises a DiffractionError for textures that do not fit one picture.
     """
-    import mitsuba as mi
-
-    turning = getattr(orientation, "texture", None)
-    stretching = None if lateral is None or lateral.varying is None else lateral.varying.texture
-
-    def stretches(si: Any) -> NDArray[np.floating]:
-        """Evaluate the factor."""
-        return np.array(1.0 if lateral is None else lateral.over_table(si, True), float).ravel()
-
-    stretch = 1.0
-    if stretching is None:
-        stretch = float(stretches(_interaction(np.zeros((1, 2))))[0])
-    if turning is None and stretching is None:
-        angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
-        return Map(np.array([np.cos(angle), np.sin(angle), stretch]))
-    attribute = None if turning is None else _attribute(turning)
-    if attribute is not None and stretching is None:
-        return Map(np.array([1.0, 0.0, stretch]), attribute=attribute)
+    turned, stretched = described.orientation, described.lateral_scale
+    if turned.texture is None and stretched.texture is None:
+        angle = np.radians(turned.number)
+        return Map(np.array([np.cos(angle), np.sin(angle), stretched.number]))
+    attribute = None if turned.texture is None else _attribute(turned.texture)
+    if attribute is not None and stretched.texture is None:
+        return Map(np.array([1.0, 0.0, stretched.number]), attribute=attribute)
 
     def frame(uv: Array) -> Array:
         """Evaluate both textures."""
-        si = _interaction(uv)
-        values = [*orientation.rotation(si, mi.Mask(True)), stretches(si)]
+        values = described.frame(_interaction(uv))
         return np.stack([np.broadcast_to(np.array(x, float).ravel(), len(uv)) for x in values], 1)
 
-    textures = [texture for texture in (turning, stretching) if texture is not None]
+    textures = [q.texture for q in (turned, stretched) if q.texture is not None]
     return _picture(textures, frame, "orientation and lateral_scale")
 
 
-def interval_maps(mix: Any) -> list[Map]:
-    """Return the interval of [0, 1) that each surface of a `diffraction_mix` takes, two channels.
+def interval_maps(mix: Mix) -> list[Map]:
+    """Return the interval of [0, 1) that each surface of a mix takes, two channels.
 
     Raises a DiffractionError for textures that do not fit one picture.
     """
-    import mitsuba as mi
-
-    count = len(mix.bsdfs)
-    textures = [weight for weight in mix.weights.values() if isinstance(weight, mi.Texture)]
 
     def edges(uv: Array) -> Array:
         """Evaluate the cumulative weights; the outer ones lie beyond 0 and 1."""
-        weights = mix.weights_at(_interaction(uv), mi.Mask(True))
+        weights = mix.weights(_interaction(uv))
         values = [np.broadcast_to(np.array(weight, float).ravel(), len(uv)) for weight in weights]
         inner = np.cumsum(values, axis=0)[:-1]
         return np.stack([np.full(len(uv), -1.0), *inner, np.full(len(uv), 2.0)], axis=1)
 
-    if textures:
-        whole = _picture(textures, edges, "the weights of a mix")
+    if mix.textures:
+        whole = _picture(mix.textures, edges, "the weights of a mix")
     else:
         whole = Map(np.zeros(2), edges(np.zeros((1, 2))).reshape(1, 1, -1))
     assert whole.picture is not None
-    return [replace(whole, picture=whole.picture[..., n : n + 2]) for n in range(count)]
+    return [replace(whole, picture=whole.picture[..., n : n + 2]) for n in range(len(mix.parts))]
 
 
-def _picture(textures: list[Any], look_up: Callable[[Array], Array], name: str) -> Map:
+def _picture(textures: Sequence[Any], look_up: Callable[[Array], Array], name: str) -> Map:
     """Evaluate a function of textures at the texels of the largest one."""
     sizes, transforms = [], []
     for texture in textures:

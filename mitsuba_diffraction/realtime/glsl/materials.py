@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...plugin.description import Consumer, Feature, Mix, Surface, describe
 from ...plugin.parameter_changes import children
-from .maps import Map, Spectrum, colour_map, interval_maps, raw_picture
+from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
 from .modelled import Modelled, index_spectra
 from .orders import Solved
 from .packing import pack_conductor
@@ -28,6 +28,16 @@ Array = NDArray[np.float64]
 #: Classes of BSDFs around another one, and the feature that is not supported, if any.
 _WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "", "NormalMap": "", "MaskBSDF": "mask"}
 _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
+
+#: Features that the shaders draw.
+GLSL = Consumer(
+    "the realtime renderer",
+    frozenset(Feature) - {
+        Feature.TRANSMISSION, Feature.FILM, Feature.OWN_MODEL, Feature.PLACED,
+        Feature.VARYING_HEIGHT,
+    },
+    "leave it out, or render the scene with Mitsuba",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -132,66 +142,14 @@ def _through(bsdf: Any) -> NDArray[np.float64]:
     return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
 
 
-class Diffracting(Protocol):
-    """Surface that diffracts: all that depends on the kind of its BSDF.
-
-    Attributes
-    ----------
-    table : data of the BSDF; surfaces of the same table share textures.
-    nested : BSDF beneath, or None.
-    height_scale : factor on the heights, 1 where the kind has none.
-    largest_scale : largest height scale of the table, or None where the kind has none.
-    coherence_width : 4σ of the amplitude window, µm.
-    coherent : whether orders interfere, which `exact` does not support.
-    """
-
-    table: Any
-    nested: Any
-    height_scale: float
-    largest_scale: float | None
-    coherence_width: float
-    coherent: bool
-
-    @property
-    def axis(self) -> Map:
-        """(cos, sin) from the tangent to the patch's x axis, and the patch's stretch."""
-
-    @property
-    def heights(self) -> HeightField:
-        """Heights, for the thesis' methods; raises a DiffractionError where the kind has none."""
-
-    @property
-    def stretch(self) -> float:
-        """Stretch of the patch; raises a DiffractionError if it varies."""
-
-    @property
-    def words(self) -> str:
-        """Description in a few words."""
-
-    def surface(self) -> Packed:
-        """Pack constants and definitions that all methods share."""
-
-    def conservation(self, scales: Sequence[float]) -> Packed:
-        """Pack energy conservation and the base's light, one page per height scale."""
-
-    def tables(self, method: str, *, floats: bool = False) -> Packed:
-        """Pack the table for `fast` or `exact`; raises a DiffractionError if it does not suit.
-
-        floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
-        """
-
-    def lobes(self) -> Packed:
-        """Pack directions drawn from the lobes, for shaders/lobes.glsl."""
+#: Table of a surface, packed for shaders.
+Diffracting = Modelled | Solved
 
 
-def diffraction_of(bsdf: Any) -> Diffracting | None:
-    """Return the surface of a BSDF that diffracts, or None for other BSDFs."""
-    from ...plugin.bsdf import Diffraction  # which only a variant has
-    from ...plugin.orders.bsdf import DiffractionOrders
-
-    if isinstance(bsdf, DiffractionOrders):
-        return Solved(bsdf)
-    return Modelled(bsdf) if isinstance(bsdf, Diffraction) else None
+def packed_by(described: Surface) -> Diffracting:
+    """Return what packs the table of a surface."""
+    orders = described.orders
+    return Modelled(described) if orders is None else Solved(described, orders)
 
 
 @dataclass(frozen=True)
@@ -225,8 +183,6 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
     """
     import mitsuba as mi
 
-    from ...plugin.blended_patches import DiffractionMix  # which only a variant has
-
     two_sided, bumps, normals = False, None, None
     while bsdf.class_name() in _WRAPPERS:
         kind, lost = bsdf.class_name(), _WRAPPERS[bsdf.class_name()]
@@ -241,14 +197,13 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
-    if only := getattr(bsdf, "not_in_shaders", None):
-        raise DiffractionError(
-            f"{name} has {only}, which the shaders do not support; leave it out, or render the "
-            "scene with Mitsuba"
-        )
-    if isinstance(bsdf, DiffractionMix):
+    described = describe(bsdf)
+    if described is not None:
+        GLSL.check(described, name)
+    if isinstance(described, Mix):
         parts = []
-        for (part, inner), mask in zip(bsdf.bsdfs.items(), interval_maps(bsdf), strict=True):
+        masks = interval_maps(described)
+        for (part, inner), mask in zip(described.parts.items(), masks, strict=True):
             materials = read_materials(inner, omissions, f"{part} of {name}", light)
             if len(materials) > 1 or materials[0].bumps or materials[0].normals:
                 raise DiffractionError(
@@ -260,11 +215,11 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
                 replace(materials[0], two_sided=both, bumps=bumps, normals=normals, mask=mask)
             )
         return parts
-    if (diffraction := diffraction_of(bsdf)) is not None:
+    if described is not None:
         pigment = Map(np.zeros(3))
-        if diffraction.nested is not None:
-            pigment = _diffuse(diffraction.nested, omissions, f"the base beneath {name}", light)
-        material = Material(pigment, diffraction, axis=diffraction.axis)
+        if (nested := described.nested) is not None:
+            pigment = _diffuse(nested.bsdf, omissions, f"the base beneath {name}", light)
+        material = Material(pigment, packed_by(described), axis=axis_map(described))
     elif (gloss := Gloss.read(bsdf)) is not None:
         omissions += [f"{part} of {name}" for part in gloss.omissions]
         pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
@@ -291,7 +246,7 @@ def pack_surface(material: Material) -> Packed:
     if diffraction is None:
         pigmented = gloss is None or gloss.pigment is not None
     else:
-        pigmented = diffraction.nested is not None
+        pigmented = diffraction.described.nested is not None
     if pigmented:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
@@ -303,7 +258,7 @@ def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> 
     """Pack energy conservation and the base's light, at the height scale times each factor."""
     if material.diffraction is None:
         return Packed()
-    height_scale = material.diffraction.height_scale
+    height_scale = material.diffraction.described.height_scale.number
     return material.diffraction.conservation([height_scale * factor for factor in factors])
 
 
@@ -342,7 +297,7 @@ def diffracts(bsdf: Any) -> bool:
     """Return whether a BSDF, or the first BSDF inside its wrappers, diffracts."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
-    return hasattr(bsdf, "not_in_shaders")
+    return describe(bsdf) is not None
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:

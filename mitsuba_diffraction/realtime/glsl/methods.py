@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
+from ...plugin.description import Consumer, Feature
 from ...settings import TableSettings
 from ...tables.build.build import build_with
 from ...tables.store import cached_table
@@ -17,11 +18,21 @@ from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method
 from .context import Bindings, compile_program
-from .materials import Diffracting
+from .materials import GLSL, Diffracting
 from .packing import area_factor
 from .scene import VERTEX, RealtimeScene
 from .source import METHODS, THESIS_METHODS
 from .texels import Packed, Uniform, as_half, listed, texels
+
+_REMEDY = "use method fast"
+#: Methods that draw less than `fast`.
+CONSUMERS = {
+    "exact": Consumer("method exact", GLSL.shows - {Feature.PATCH}, _REMEDY),
+    **{
+        name: Consumer(f"method {name} of the thesis", GLSL.shows - {Feature.ORDERS}, _REMEDY)
+        for name in THESIS_METHODS
+    },
+}
 
 #: Values of the thesis: terms of the series, bins read along each axis, wavelength step in nm.
 TERMS, TAPS, STEP = 37, 3, 5.0
@@ -137,14 +148,14 @@ class Prepared:
         self._surfaces, self._buffers = surfaces, buffers
         packed: dict[int, Packed] = {}
         for surface in scene.diffracting:
-            key = id(surface.table)
+            key = id(surface.described.table)
             if key not in packed:
                 packed[key] = method_tables(method, surface)
         bound = {key: Bindings(context, tables) for key, tables in packed.items()}
         without = Bindings(context, Packed())
         # one for each surface
         self.tables = [
-            without if surface is None else bound[id(surface.table)]
+            without if surface is None else bound[id(surface.described.table)]
             for surface in (s.material.diffraction for s in scene.surfaces)
         ]
         self.nbytes = sum(p.nbytes for p in packed.values())  # size of the method's textures
@@ -193,10 +204,13 @@ def method_tables(method: str, surface: Diffracting) -> Packed:
 
     Raises a DiffractionError if the method is unknown, or does not support the table.
     """
-    if method in THESIS_METHODS:
-        return pack_method(thesis_method(method, surface.heights, surface.table))
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    described = surface.described
+    if method in CONSUMERS:
+        CONSUMERS[method].check(described)
+    if method in THESIS_METHODS and described.heights is not None:
+        return pack_method(thesis_method(method, described.heights(), described.patch))
     return surface.tables(method)
 
 

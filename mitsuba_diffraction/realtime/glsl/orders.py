@@ -1,25 +1,22 @@
-"""Surfaces of the BSDF `diffraction_orders` for shaders: efficiencies as a texture, and lobes."""
+"""Surfaces with solved orders for shaders: efficiencies as a texture, and lobes."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ...errors import DiffractionError
-from ...heights.field import HeightField
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
+from ...plugin.description import Surface
 from ...tables.orders import OrderTable, cells
 from ...tables.orders.daylight import ENDS, daylight_weights
 from ...tables.orders.grids import face_transmittance, rows
 from ...tables.orders.table import Counts
 from .lobes import AZIMUTHS, RINGS, pack_lobes
-from .maps import Map, axis_map
 from .texels import PAGE, Packed, Texture
 
 Array = NDArray[np.float64]
@@ -36,56 +33,32 @@ _DIRECTIONS, _WAVELENGTHS = 32, 24
 
 
 class Solved:
-    """Surface of a `diffraction_orders` BSDF; see `materials.Diffracting`."""
+    """Table of solved orders of a surface as textures and constants."""
 
-    height_scale: float = 1.0
-    largest_scale: float | None = None
-    stretch: float = 1.0
-    coherent: bool = False
-
-    def __init__(self, bsdf: Any) -> None:
-        self.bsdf = bsdf
-        self.table: OrderTable = bsdf.table
-        self.nested = bsdf.nested
-        self.coherence_width = float(bsdf.coherence_width)
-
-    @property
-    def axis(self) -> Map:
-        """See `Diffracting.axis`."""
-        return axis_map(self.bsdf.orientation)
-
-    @property
-    def heights(self) -> HeightField:
-        """See `Diffracting.heights`."""
-        raise DiffractionError(
-            "the thesis' methods draw heights, but the surface has solved orders; use method fast "
-            "or exact"
-        )
+    def __init__(self, described: Surface, table: OrderTable) -> None:
+        self.described, self.table = described, table
 
     @property
     def words(self) -> str:
-        """See `Diffracting.words`."""
-        return f"{self.table}, coherence width {self.coherence_width:g} µm"
+        """See `Modelled.words`."""
+        return f"{self.table}, coherence width {self.described.coherence_width:g} µm"
 
     def surface(self) -> Packed:
-        """See `Diffracting.surface`."""
+        """See `Modelled.surface`."""
         channels = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
         return Packed((), {"channel_wavenumbers": channels}, {"DIFFRACTING": ""})
 
     def conservation(self, scales: Sequence[float]) -> Packed:
-        """See `Diffracting.conservation`: solved orders conserve energy."""
+        """See `Modelled.conservation`: solved orders conserve energy."""
         return Packed()
 
-    def tables(self, method: str, *, floats: bool = False, most_bytes: int = MOST_BYTES) -> Packed:
-        """See `Diffracting.tables`; the textures are floats in any case.
-
-        most_bytes : size of the efficiencies at most.
-        """
-        return pack_orders(method, self.table, self.bsdf.sigma, most_bytes)
+    def tables(self, method: str, *, floats: bool = False) -> Packed:
+        """See `Modelled.tables`; the textures are floats in any case."""
+        return pack_orders(method, self.table, self.described.sigma)
 
     def lobes(self) -> Packed:
-        """See `Diffracting.lobes`."""
-        sigma = self.bsdf.sigma
+        """See `Modelled.lobes`."""
+        sigma = self.described.sigma
         return pack_lobes(lambda edges: order_power(self.table, sigma, edges), sigma)
 
 
@@ -149,6 +122,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
             "period": table.period,
             "superstrate": table.superstrate,
             "solved_range": (1e-3 * low, 1e-3 * high),
+            "solved_reach": tuple(1e-3 * end for end in table.reach),
         },
         {"ORDERS": "", **({} if table.superstrate == 1.0 else {"FACE": ""})},
     )
@@ -185,12 +159,13 @@ def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
     daylight = np.diff(daylight_weights(sigma, table.period).cumulative)
     lam = ENDS[0] + (np.arange(len(daylight)) + 0.5) * (ENDS[1] - ENDS[0]) / len(daylight)
     some = np.linspace(*ENDS, _WAVELENGTHS)
+    lit = (some >= table.reach[0]) & (some <= table.reach[1])
     deviation = 1e-3 * lam / (2.0 * np.pi * np.sqrt(2.0) * sigma)
     around = np.linspace(-np.pi, np.pi, AZIMUTHS + 1)  # edges of azimuths
 
     def power(order: int) -> Array:
         """Return the mean efficiency at all wavelengths, as bright as these are."""
-        efficiency = table.efficiency(x, y, some, order)
+        efficiency = lit * table.efficiency(x, y, np.clip(some, *table.reach), order)
         mean = (through[:, None] * efficiency).mean(axis=0)
         if order == 0:
             mean = mean + (1.0 - through).mean()

@@ -113,7 +113,7 @@ class Stage:
         for surface in self._scene.surfaces:
             parts = [*around]
             if (diffraction := surface.material.diffraction) is not None:
-                key = id(diffraction.table)
+                key = id(diffraction.described.table)
                 if key not in lobes:
                     lobes[key] = self._bound(diffraction.lobes())
                 parts.append(lobes[key])
@@ -213,7 +213,7 @@ class ProgressiveLight:
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
         self._mean = compile_plain(
-            context, "whole.vert", "mean.frag", ("library.glsl", "display.glsl"),
+            context, "whole.vert", "mean.frag", ("library.glsl", "formulas"),
             display_definitions(renderer.view),
         )  # fmt: skip
         self._whole = context.vertex_array(self._mean, [])

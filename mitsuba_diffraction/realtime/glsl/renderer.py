@@ -273,7 +273,8 @@ class Renderer:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if (diffraction := surface.material.diffraction) is not None:
-                factor = scale if scale is not None else diffraction.height_scale
+                own = diffraction.described.height_scale.number
+                factor = own if scale is None else scale
                 set_uniforms(program, {"height_scale": factor})
                 if coherence_width is not None:
                     set_uniforms(program, window(part.tables, coherence_width))

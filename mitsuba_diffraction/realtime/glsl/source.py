@@ -12,11 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...errors import DiffractionError
-from ...optics.display import check_view, constants
+from ...optics.display import check_view
+from .formulas import formulas
 from .texels import PAGE
 
 Dialect = Literal["desktop", "web"]
@@ -87,7 +85,7 @@ def fragment_parts(
     known = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl", "frame.glsl", "boundary.glsl"]
+    shared = ["library.glsl", "formulas", "frame.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
     if "SHADOWED" in known:
@@ -104,9 +102,12 @@ def fragment_parts(
     if "WEIGHTED" in known or "LOOKED_UP" in known:
         shared += ["obstacles.glsl", "surroundings.glsl", "lobes.glsl"]
     shared += method_files(method, known)
-    if "DISPLAYED" in known:
-        shared.append("display.glsl")
-    return parts + [(name, shader_file(name)) for name in (*shared, main)]
+    return parts + [(name, part(name, known)) for name in (*shared, main)]
+
+
+def part(name: str, definitions: Mapping[str, str]) -> str:
+    """Return the text of a file, or of `formulas`."""
+    return formulas(definitions) if name == "formulas" else shader_file(name)
 
 
 def method_files(method: str, definitions: Mapping[str, str]) -> list[str]:
@@ -126,30 +127,20 @@ def plain_source(
 ) -> str:
     """Return the source of a stage that depends on neither surfaces nor tables.
 
-    shared : files that it includes.
+    shared : files that it includes, or `formulas`.
     """
     known = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {key} {value}\n" for key, value in known.items()]
-    return _PREAMBLES[dialect] + "".join((*lines, *map(shader_file, shared), shader_file(name)))
+    return _PREAMBLES[dialect] + "".join((*lines, *(part(n, known) for n in (*shared, name))))
 
 
 def display_definitions(view: str) -> dict[str, str]:
-    """Return the definitions with which shaders/display.glsl shows light by a view.
+    """Return the definitions with which shaders show light by a view, by `displayed`.
 
     Raises a DiffractionError if the view is unknown.
     """
     check_view(view)
-    if view == "standard":
-        return {}
-    return {f"DISPLAY_{name}": _literal(value) for name, value in constants().items()}
-
-
-def _literal(value: float | NDArray[np.float64]) -> str:
-    """Write a number, a vector or a matrix, whose columns come first, in GLSL."""
-    numbers = np.asarray(value).T.ravel()
-    text = ", ".join(f"{number:.9g}" if number % 1.0 else f"{number:.1f}" for number in numbers)
-    kind = {1: "float", 2: "vec2", 3: "vec3", 9: "mat3"}[numbers.size]
-    return f"{kind}({text})"
+    return {"DISPLAYED": ""} | ({"NATURAL": ""} if view == "natural" else {})
 
 
 _COMPARISONS = {"==": operator.eq, "!=": operator.ne, ">": operator.gt, "<": operator.lt}
@@ -220,7 +211,7 @@ def global_names(source: str) -> set[str]:
 
 
 def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
-    """Prefix names in a source, and remove comments except those of uniforms.
+    """Prefix names in a source, and remove comments except those of uniforms and functions.
 
     prefixes : pairs of a prefix and the names that get it.
     """
@@ -230,16 +221,17 @@ def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
         code, mark, comment = line.partition("//")
         code = re.sub(r"(?<![.\w])[A-Za-z_]\w*", lambda m: new.get(m[0], m[0]), code)
         indent = (len(code) - len(code.lstrip(" "))) // 4
-        declared = f" {mark}{comment}" if code.startswith("uniform") and mark else ""
-        lines.append(("\t" * indent + code.strip(" ") + declared).rstrip())
+        kept = code.startswith("uniform") or line.startswith("// ")
+        declared = f" {mark}{comment}" if kept and mark else ""
+        lines.append(("\t" * indent + (code.strip(" ") + declared).strip(" ")).rstrip())
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
 
 
 def pruned(source: str, prefix: str) -> str:
     """Remove unused functions, constants and macros with this prefix from a resolved source."""
-    body = r"\(.*\)(?: {.*}|\n{\n(?s:.*?)^})| = .*;"
+    body = r"\([^()]*\)(?: {.*}|\n{\n(?s:.*?)^})| = .*;"
     of_type, macro = rf"(?:const )?{_TYPES} ({prefix}\w+)(?:{body})", rf"#define ({prefix}\w+) .*"
-    pattern = re.compile(rf"(?m)^(?:{of_type}|{macro})\n+")
+    pattern = re.compile(rf"(?m)(?:^// .*\n)*^(?:{of_type}|{macro})\n+")
 
     def if_used(match: re.Match[str]) -> str:
         """Return the definition if its name occurs elsewhere, or else nothing."""

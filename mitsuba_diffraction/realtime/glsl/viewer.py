@@ -101,8 +101,8 @@ class Viewer(moderngl_window.WindowConfig):
         renderer = self._ready
         scene = renderer.scene
         self.orbit = Orbit.start(scene.camera, 0.5 * (scene.low + scene.high))
-        first = scene.diffracting[0]
-        self.scale, self.largest_scale = first.height_scale, first.largest_scale
+        first = scene.diffracting[0].described
+        self.scale, self.largest_scale = first.height_scale.number, first.largest_scale
         self.table_width = self.width = first.coherence_width
         renderer.lights = list(scene.lighting.lights)
         self._dragged = False

@@ -8,7 +8,7 @@ import html
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,8 @@ from ..glsl.materials import (
     pack_relief,
     pack_surface,
 )
-from ..glsl.scene import RealtimeScene, load, read_scene
+from ..glsl.methods import CONSUMERS
+from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.source import (
     display_definitions,
     fragment_parts,
@@ -117,7 +118,7 @@ def make_page(
             f"the page would have {len(text.encode()) / 1e6:.1f} MB, more than "
             f"{MAX_BYTES / 1e6:.0f}; use fewer triangles or a smaller coherence_width"
         )
-    return Page(text, header["loss"], header["left_out"], tuple(header["omissions"]))
+    return Page(text, header.loss, header.left_out, tuple(header.omissions))
 
 
 def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> Page:
@@ -149,13 +150,85 @@ class Viewer:
         )
 
 
-def _filled(header: dict[str, Any], data: bytes) -> str:
+@dataclass(frozen=True)
+class SurfaceEntry:
+    """Surface of a scene in the page's header.
+
+    Attributes
+    ----------
+    mesh, parts : numbers of its sections (`sections`).
+    emits : whether it emits light.
+    height_scale : height scale of the scene; null where nothing diffracts.
+    table : number of its table; 0 where nothing diffracts.
+    programs : number of its shader's source, by method.
+    """
+
+    name: str
+    mesh: dict[str, Any]
+    parts: dict[str, Any]
+    emits: bool
+    height_scale: float | None
+    table: int
+    programs: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Header:
+    """Data of a page beside its arrays; `page/data.js` reads the fields by name.
+
+    Attributes
+    ----------
+    light, around : see `light.packed_light` and `light.packed_surroundings`.
+    tables : numbers of each table's sections, by method.
+    octaves, energy_pages : ends of the slider of height scales, and pages of energy scales.
+    background : radiance of the sky, linear sRGB.
+    box, subject : corners of the scene, and of what diffracts.
+    programs : section of the distinct sources; the page replaces LIGHTS_LIT by its light's
+        definitions and appends one of `mains`.
+    vertex, shadow, shown : other sources.
+    loss, left_out, omissions : see `Page`.
+    orders : brightest orders of each table.
+    sections : position and layout of each section.
+    """
+
+    title: str
+    surfaces: list[SurfaceEntry]
+    light: dict[str, Any]
+    around: dict[str, Any] | None
+    tables: dict[str, list[dict[str, Any]]]
+    methods: list[str]
+    omissions: list[str]
+    background: list[float]
+    camera: dict[str, Any]
+    box: list[list[float]]
+    subject: list[list[float]]
+    programs: int
+    shown: dict[str, str]
+    loss: dict[str, tuple[float, float]]
+    left_out: dict[str, str]
+    orders: list[list[list[float]]]
+    sections: list[dict[str, Any]]
+    octaves: tuple[float, float] = (OCTAVES[0], OCTAVES[-1])
+    energy_pages: int = len(OCTAVES)
+    mains: dict[str, str] = field(
+        default_factory=lambda: {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")}
+    )
+    vertex: str = field(default_factory=lambda: vertex_source("web"))
+    shadow: str = field(default_factory=lambda: plain_source("position.frag", dialect="web"))
+
+    def json(self) -> str:
+        """Return the header as JSON for an element of a page."""
+        text = json.dumps(self, default=vars, ensure_ascii=False)
+        # "</script" would end the element, and "<!--<script" its end
+        return text.replace("<", "\\u003c")
+
+
+def _filled(header: Header, data: bytes) -> str:
     """Fill the template of the page."""
     parts: dict[str, Callable[[], str]] = {
         "style": lambda: _asset("style.css"),
         "script": lambda: "\n".join(_asset(name) for name in _SCRIPTS),
-        # "</script" would end the element, and "<!--<script" its end
-        "header": lambda: json.dumps(header, ensure_ascii=False).replace("<", "\\u003c"),
+        "header": header.json,
         "data": lambda: base64.b64encode(data).decode(),
     }
     pieces = []
@@ -172,75 +245,101 @@ def _asset(name: str) -> str:
 
 def _packed(
     loaded: Any, sensor: int, title: str, methods: Sequence[str], view: str, progress: Progress
-) -> tuple[dict[str, Any], bytes]:
-    """Return the page's header as JSON types, and all arrays and pictures, compressed.
+) -> tuple[Header, bytes]:
+    """Return the page's header, and all arrays and pictures, compressed.
 
     The last methods are left out if their tables exceed the size of the page.
     """
     scene = read_scene(loaded, sensor)
     emitters = Emitters(loaded, scene.middle) if loaded.emitters() else None
     sections = Sections()
-    tables: list[Diffracting] = []  # a surface of each table
-    surfaces = []
-    for number, surface in enumerate(scene.surfaces):
-        progress(number, len(scene.surfaces), f"packing {surface.name}")
-        material = surface.material
-        # energy conservation at all height scales of the slider
-        common = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
-        common |= pack_conservation(material, [2.0**n for n in OCTAVES])
-        entry: dict[str, Any] = {
-            "name": surface.name,
-            "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
-            "parts": packed_parts(common, sections),
-            "emits": surface.radiance is not None,
-        }
-        if (diffraction := material.diffraction) is not None:
-            entry["height_scale"] = diffraction.height_scale
-            if not any(diffraction.table is other.table for other in tables):
-                tables.append(diffraction)
-            entry["table"] = next(
-                n for n, other in enumerate(tables) if other.table is diffraction.table
-            )
-        surfaces.append((entry, common))
+    packers: dict[int, Diffracting] = {}
+    for diffracting in scene.diffracting:
+        packers.setdefault(id(diffracting.described.table), diffracting)
+    numbers = {key: n for n, key in enumerate(packers)}
+    tables = list(packers.values())  # a surface of each table
+    stored = []
+    for n, surface in enumerate(scene.surfaces):
+        progress(n, len(scene.surfaces), f"packing {surface.name}")
+        common = _common(surface)
+        mesh = sections_of(packed_mesh(surface.vertices), sections.add)
+        stored.append((common, mesh, packed_parts(common, sections)))
     light = packed_light(scene, emitters, sections)
     around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections)
-
     room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
-    header: dict[str, Any] = {
-        "title": title,
-        "surfaces": [entry for entry, _ in surfaces],
-        "light": light,
-        "around": around,
-        "tables": {
+    sources: list[str] = []
+    entries = []
+    for surface, (common, mesh, parts) in zip(scene.surfaces, stored, strict=True):
+        described = surface.material.diffraction and surface.material.diffraction.described
+        number = numbers[id(described.table)] if described else 0
+        programs = {}
+        for method in shown:
+            own = packed[method, number].packed.definitions if described else {}
+            source = _source(method, {**common.definitions, **own, **definitions, "SHADOWED": ""})
+            if source not in sources:
+                sources.append(source)
+            programs[method] = sources.index(source)
+        entries.append(
+            SurfaceEntry(
+                surface.name,
+                mesh,
+                parts,
+                surface.radiance is not None,
+                described.height_scale.number if described else None,
+                number,
+                programs,
+            )
+        )
+    count = range(len(tables))
+    header = Header(
+        title=title,
+        surfaces=entries,
+        light=light,
+        around=around,
+        tables={
             method: [
                 packed_parts(packed[method, n].packed, sections, packed[method, n].sections)
-                for n in range(len(tables))
+                for n in count
             ]
             for method in shown
         },
-        "methods": shown,
-        "octaves": [OCTAVES[0], OCTAVES[-1]],
-        "energy_pages": len(OCTAVES),
-        "omissions": _omissions(scene, emitters),
-        "background": _zenith(scene.lighting.sky),
-        "camera": {
+        methods=shown,
+        omissions=_omissions(scene, emitters),
+        background=_zenith(scene.lighting.sky),
+        camera={
             "to_world": scene.camera.to_world.tolist(),
             "fov": scene.camera.fov,
             "size": list(scene.camera.size),
             "offset": list(scene.camera.offset),
         },
-        "box": [scene.low.tolist(), scene.high.tolist()],
-        "subject": [x.tolist() for x in scene.subject],
-    }
-    _add_programs(header, sections, surfaces, shown, packed, definitions, view)
-    header["loss"] = {
-        method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
-    }
-    header["left_out"] = left_out
-    header["orders"] = [strongest_orders(table) for table in tables]
-    data, header["sections"] = sections.joined()
-    return header, data
+        box=[scene.low.tolist(), scene.high.tolist()],
+        subject=[x.tolist() for x in scene.subject],
+        programs=sections.add(
+            packed_array(np.frombuffer(json.dumps(sources).encode(), np.uint8)[:, None])
+        ),
+        shown=_display(view),
+        loss={method: _worst([packed[method, n].loss for n in count]) for method in shown},
+        left_out=left_out,
+        orders=[strongest_orders(table.described) for table in tables],
+        sections=[],
+    )
+    data, layouts = sections.joined()
+    return replace(header, sections=layouts), data
+
+
+def _common(surface: Surface) -> Packed:
+    """Pack a surface without its table; energy conservation at all height scales of the slider."""
+    material = surface.material
+    packed = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
+    return packed | pack_conservation(material, [2.0**n for n in OCTAVES])
+
+
+def _display(view: str) -> dict[str, str]:
+    """Return the sources that show the picture under a view."""
+    files, definitions = ("library.glsl", "formulas"), display_definitions(view)
+    fragment = plain_source("shown.frag", files, definitions, "web")
+    return {"vertex": vertex_source("web", "whole.vert"), "fragment": fragment}
 
 
 def _fitted(
@@ -248,9 +347,12 @@ def _fitted(
 ) -> tuple[list[str], Any, dict[str, str]]:
     """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
-    if "exact" in shown and any(surface.coherent for surface in tables):
-        shown.remove("exact")
-        left_out["exact"] = "it has no interference of orders, which coherence='patch' requires"
+    for method in methods:
+        consumer = CONSUMERS.get(method)
+        refusals = [consumer.refusal(surface.described) for surface in tables] if consumer else []
+        if reason := next((refusal for refusal in refusals if refusal), None):
+            shown.remove(method)
+            left_out[method] = reason
     while shown:
         packed = fitting_tables(shown, tables, room, progress)
         if not isinstance(packed, int):
@@ -268,48 +370,6 @@ def _fitted(
 def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Return the largest mean and the largest 99th percentile of some tables."""
     return max(mean for mean, _ in losses), max(most for _, most in losses)
-
-
-def _add_programs(
-    header: dict[str, Any],
-    sections: Sections,
-    surfaces: Sequence[tuple[dict[str, Any], Packed]],
-    methods: Sequence[str],
-    packed: Any,
-    around: dict[str, str],
-    view: str,
-) -> None:
-    """Add all distinct shader sources, and the number of each surface's source.
-
-    The page replaces the definition of LIGHTS_LIT by those of its light, and appends one of the
-    main functions.
-
-    around : definitions of the surroundings.
-    view : view of the page's picture.
-    """
-    sources: list[str] = []
-    for entry, common in surfaces:
-        diffracts = "table" in entry
-        table = entry.setdefault("table", 0)  # of which other surfaces read nothing
-        entry["programs"] = {}
-        for method in methods:
-            tables = packed[method, table].packed.definitions if diffracts else {}
-            source = _source(method, {**common.definitions, **tables, **around, "SHADOWED": ""})
-            if source not in sources:
-                sources.append(source)
-            entry["programs"][method] = sources.index(source)
-    text = np.frombuffer(json.dumps(sources).encode(), np.uint8)
-    header["programs"] = sections.add(packed_array(text[:, None]))
-    header["mains"] = {
-        main: shader_file(f"{file}.frag")
-        for main, file in (("surface", "surface"), ("picked", "picked"), ("map", "map"))
-    }
-    header["vertex"] = vertex_source("web")
-    header["shadow"] = plain_source("position.frag", dialect="web")
-    whole = plain_source(
-        "shown.frag", ("library.glsl", "display.glsl"), display_definitions(view), "web"
-    )
-    header["shown"] = {"vertex": vertex_source("web", "whole.vert"), "fragment": whole}
 
 
 def _source(method: str, definitions: dict[str, str]) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
+from ...plugin.description import Surface
 from ...progress import Progress
 from ...tables.colour.table import colour_difference, power_colour_difference
 from ...tables.orders import OrderTable, cells
@@ -20,7 +21,7 @@ from ...tables.powers import power_series
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.materials import Diffracting
-from ..glsl.orders import MOST_WITHIN, Solved, cells_within
+from ..glsl.orders import MOST_WITHIN, cells_within, pack_orders
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array, packed_series
@@ -60,10 +61,11 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
 
     `exact` does not support coherent tables.
     """
+    orders = surface.described.orders
     packed, loss, width = (
-        _solved(method, surface, digits)
-        if isinstance(surface, Solved)
-        else _modelled(method, surface, digits)
+        _modelled(method, surface.described.patch, digits)
+        if orders is None
+        else _solved(method, orders, surface.described.sigma, digits)
     )
     sections = {}
     for texture in packed.textures:
@@ -91,9 +93,8 @@ class Rounded(NamedTuple):
     width: int
 
 
-def _modelled(method: str, surface: Diffracting, digits: int) -> Rounded:
-    """Round a table of `diffraction`."""
-    table: DiffractionTable = surface.table
+def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
+    """Round a table of heights."""
     if method == "fast":
         colours = cached_colours(table)
         # rounded twice, so that the upper halves of floats, which the shader reads, are exact
@@ -113,10 +114,10 @@ def _modelled(method: str, surface: Diffracting, digits: int) -> Rounded:
     return Rounded(packed, power_colour_difference(powers, less), width)
 
 
-def _solved(method: str, surface: Solved, digits: int) -> Rounded:
+def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounded:
     """Round a table of solved orders, and take fewer cells."""
-    packed = surface.tables(method, most_bytes=_ORDER_BYTES)
-    counts = cells_within(surface.table, _ORDER_BYTES)
+    packed = pack_orders(method, table, sigma, _ORDER_BYTES)
+    counts = cells_within(table, _ORDER_BYTES)
     width = 4 * (counts.rho + 1)
     textures = [
         replace(t, data=rounded(as_columns(t.data, width), digits, FLOOR).reshape(t.data.shape))
@@ -124,7 +125,7 @@ def _solved(method: str, surface: Solved, digits: int) -> Rounded:
         else t
         for t in packed.textures
     ]
-    loss = _solved_loss(surface.table, counts, digits)
+    loss = _solved_loss(table, counts, digits)
     return Rounded(replace(packed, textures=tuple(textures)), loss, width)
 
 
@@ -187,15 +188,15 @@ def fitting_tables(
     return needed
 
 
-def strongest_orders(surface: Diffracting) -> list[list[float]]:
+def strongest_orders(described: Surface) -> list[list[float]]:
     """Return the brightest separate orders in green light along the normal.
 
     Each entry has q_x and q_y in rad/µm, and the share of the light; a pair ±q has one entry. The
     list of a coherent table is empty; that of solved orders has the first.
     """
-    if isinstance(surface, Solved):
-        return [[2.0 * np.pi / surface.table.period, 0.0, 1.0]]
-    table: DiffractionTable = surface.table
+    if described.orders is not None:
+        return [[2.0 * np.pi / described.orders.period, 0.0, 1.0]]
+    table = described.patch
     if table.grid.coherent:
         return []
     series, _, scale, expansion = power_series(table)

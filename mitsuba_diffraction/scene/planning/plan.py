@@ -19,7 +19,7 @@ from ...settings import RECIPE_SETTINGS, TableSettings
 from ...tables.table import DiffractionTable
 from .lookups import Lookups
 from .paths import TracedPaths, trace
-from .recording import Session
+from .recording import Session, described_table
 
 #: Settings that a plan chooses.
 CHOSEN = ("frequency_limit", "height_scale_max", "second_order")
@@ -110,7 +110,7 @@ def _names(session: Session) -> str:
 
 def _recorded(key: str, session: Session, traced: TracedPaths) -> RecordedTable:
     table = session.tables[key]
-    bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
+    bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if described_table(bsdf) is table]
     rows = traced.of(bsdfs)
     lookups = None
     if len(rows):

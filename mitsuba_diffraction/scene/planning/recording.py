@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair
 from ...plugin.properties import own_id
 from ...plugin.sources import TableRequest
@@ -90,7 +91,7 @@ class Session:
 
     def _make(self, props: Properties) -> BSDF:
         bsdf = _kind(self)(props, self.table)
-        heights = bsdf.table.source.get("name") or "heights without a name"
+        heights = described_table(bsdf).source.get("name") or "heights without a name"
         name = own_id(props.id()) or f"a diffraction BSDF without id (of {heights})"
         self.bsdfs.append((name, bsdf))
         return bsdf
@@ -140,6 +141,13 @@ class Session:
         self.bsdfs.clear()
         self.tables.clear()
         self.requests.clear()
+
+
+def described_table(bsdf: BSDF) -> DiffractionTable:
+    """Return the table of heights of a BSDF that a session made."""
+    described = describe(bsdf)
+    assert isinstance(described, Surface)
+    return described.patch
 
 
 def _kind(session: Session) -> type[BSDF]:

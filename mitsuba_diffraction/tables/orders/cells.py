@@ -32,10 +32,18 @@ channels of light above the sheet, then the n of light below it: a side has the 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ...optics.orders import (
+    cell_wavelengths,
+    order_cell,
+    smooth_coordinate,
+    wavelength_coordinate,
+)
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -100,18 +108,12 @@ def to_cell(x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, optical_period: f
     x, y, lam = np.broadcast_arrays(
         *(np.asarray(value, np.float64) for value in (x, y, wavelength))
     )
-    c = np.sqrt(np.maximum(1.0 - y * y, _LEAST))
-    big_k = 2e3 * c * optical_period / lam
-    p = 0.5 * big_k * (1.0 - x / c)
-    outside = (p < 0.0) | (p > big_k)
-    p = np.clip(p, 0.0, big_k)
-    band, channel = np.floor(big_k).astype(np.int64), np.floor(p).astype(np.int64)
-    r, f = big_k - band, p - channel
-    # p = K is the end of kind A's last channel, of which rounding makes kind B's
-    is_a = (f < r) | (channel == band)
-    share = np.where(is_a, f / np.maximum(r, _LEAST), (f - r) / np.maximum(1.0 - r, _LEAST))
-    tau = _smooth(share)
-    return Cell(band, np.where(is_a, A, B), np.where(outside, -1, channel), tau, _smooth(r), big_k)
+    cell = order_cell(x, y, 1e3 * optical_period / lam, math.inf, _LEAST)
+    channel = np.where(np.abs(x / cell.c) > 1.0, -1, cell.channel).astype(np.int64)
+    return Cell(
+        cell.band.astype(np.int64), np.where(cell.kind_a, A, B), channel,
+        smooth_coordinate(cell.t), smooth_coordinate(cell.r), cell.k_continuous,
+    )  # fmt: skip
 
 
 def from_cell(
@@ -139,10 +141,17 @@ def from_cell(
 
 
 def wavelength_of(
-    k_continuous: ArrayLike, w: ArrayLike, wavelengths: tuple[float, float], optical_period: float
+    k_continuous: ArrayLike,
+    w: ArrayLike,
+    wavelengths: tuple[float, float],
+    optical_period: float,
+    least_c: float = 0.0,
 ) -> Array:
-    """Return the wavelength in vacuum, nm, at w (0 to 1) for K; see the module."""
-    low, high = _ends(k_continuous, wavelengths, optical_period)
+    """Return the wavelength in vacuum, nm, at w (0 to 1) for K; see the module.
+
+    least_c : least c of the light, at which w = 0 if the table has shorter wavelengths.
+    """
+    low, high = _ends(k_continuous, wavelengths, optical_period, least_c)
     return np.asarray(low + np.asarray(w) * (high - low))
 
 
@@ -155,7 +164,7 @@ def w_of(
     """Return w of a wavelength in vacuum (nm); wavelengths outside the table get 0 or 1."""
     low, high = _ends(k_continuous, wavelengths, optical_period)
     lam = np.asarray(wavelength, np.float64)
-    return np.clip((lam - low) / np.maximum(high - low, _LEAST), 0.0, 1.0)
+    return np.asarray(wavelength_coordinate(lam, low, high, _LEAST))
 
 
 def largest_band(wavelengths: tuple[float, float], optical_period: float) -> int:
@@ -193,13 +202,12 @@ def sine_squared(tau: ArrayLike) -> Array:
     return np.asarray(np.sin(0.5 * np.pi * np.asarray(tau, np.float64)) ** 2)
 
 
-def _smooth(t: Array) -> Array:
-    """Return τ of t, the inverse of `sine_squared`."""
-    return np.asarray(np.arcsin(np.sqrt(np.clip(t, 0.0, 1.0))) * (2.0 / np.pi))
-
-
 def _ends(
-    k_continuous: ArrayLike, wavelengths: tuple[float, float], optical_period: float
+    k_continuous: ArrayLike,
+    wavelengths: tuple[float, float],
+    optical_period: float,
+    least_c: float = 0.0,
 ) -> tuple[Array, Array]:
-    longest = 2e3 * optical_period / np.maximum(np.asarray(k_continuous, np.float64), _LEAST)
-    return np.minimum(wavelengths[0], longest), np.minimum(wavelengths[1], longest)
+    """Return the ends of w, nm; least_c : least c of the light."""
+    big_k = np.asarray(k_continuous, np.float64)
+    return cell_wavelengths(big_k, 1e3 * optical_period, *wavelengths, least_c)

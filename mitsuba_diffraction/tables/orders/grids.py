@@ -169,10 +169,8 @@ def least_c(index: float) -> float:
 
 def wavelength_of(table: OrderTable, big_k: Array, w: Array) -> Array:
     """Return the wavelength (vacuum, nm) at w of the even grids."""
-    longest = 2e3 * table.optical_period / np.maximum(big_k, 1e-12)
-    shortest = least_c(table.superstrate) * longest
-    low, high = (np.clip(end, shortest, longest) for end in table.wavelengths)
-    return np.asarray(low + w * (high - low))
+    period, least = table.optical_period, least_c(table.superstrate)
+    return cells.wavelength_of(big_k, w, table.wavelengths, period, least)
 
 
 def face_transmittance(squared_sine: Array, index: float) -> Array:

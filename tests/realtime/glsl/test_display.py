@@ -1,4 +1,4 @@
-"""shaders/display.glsl against its twin in NumPy."""
+"""`displayed` of the shaders against NumPy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ void main() { fragment = vec4(displayed(texelFetch(light, ivec2(gl_FragCoord.xy)
 def test_shader_and_numpy_show_the_same(gl, view):
     light = ramp()
     rows, columns, _ = light.shape
-    source = plain_source("shown.frag", ("library.glsl", "display.glsl"), display_definitions(view))
+    source = plain_source("shown.frag", ("library.glsl", "formulas"), display_definitions(view))
     program = gl.program(
         vertex_shader=plain_source("whole.vert"),
         fragment_shader=source.partition("// Picture of a page")[0] + SHOW,

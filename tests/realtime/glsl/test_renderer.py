@@ -156,7 +156,7 @@ def test_another_height_scale_has_its_own_energy(
     scales = {1.0: 1.0, 1.1: 1.0, 1.4: 0.5}
     monkeypatch.setattr(
         type(plate),
-        "energy_scale",
+        "_energy_scale",
         lambda self, scale: np.full(shape, scales[scale], np.float32),
     )
     scene = {

@@ -1,4 +1,4 @@
-// Functions that all methods share: lists, reflectance, shadowing, energy conservation, display.
+// Functions that all methods share: lists, reflectance, shadowing, energy conservation.
 
 const float PI = 3.14159265358979;
 
@@ -43,6 +43,9 @@ vec3 elevations(vec3 cosines)
     return 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
                + c * (-0.02394849 + c * 0.006196195))));
 }
+
+// asin of sines from 0 to 1, from `elevations`.
+float arcsine(float sine) { return 0.5 * PI * elevations(vec3(sine)).x; }
 
 #ifdef LIGHTS
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
@@ -201,12 +204,3 @@ float energy_scale(vec2 tangential, float cosine)
 }
 
 #endif
-
-// ---------------------------------------------------------------- display
-
-// Encode linear sRGB for a display (IEC 61966-2-1), clipped.
-vec3 encode_srgb(vec3 linear)
-{
-    vec3 c = clamp(linear, 0.0, 1.0);
-    return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
-}

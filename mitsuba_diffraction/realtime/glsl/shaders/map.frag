@@ -18,5 +18,5 @@ void main()
         found = diffraction(wi, light_direction, vec2(stretch, 0.0), 0);
     }
 #endif
-    fragment = vec4(encode_srgb(found * exposure), 1.0);
+    fragment = vec4(encoded_colour(found * exposure), 1.0);
 }

@@ -8,6 +8,7 @@ uniform float last_band;
 uniform float period;            // µm
 uniform float superstrate;       // index of the clear layer over the grooves
 uniform vec2 solved_range;       // shortest and longest wavelength of the table, µm
+uniform vec2 solved_reach;       // ends of the light that it reflects, µm
 
 // Row of efficiencies of one direction and wavelength (Row of plugin/orders/lookup.py).
 vec2 row_incident;               // tangential part of ωi in the patch's frame
@@ -16,6 +17,7 @@ float row_face;                  // share of the light that the layer's face ref
 float row_channel, row_channels;
 int row_tile;
 vec3 row_place;                  // τ, ρ and w
+float row_lit;                   // 0 beyond the table's wavelengths, else 1
 
 #ifdef FACE
 
@@ -44,26 +46,22 @@ void begin_orders(vec3 wi, vec2 rotation)
 void find_row(float wavelength)
 {
     row_wavelength = wavelength;
+    row_lit = step(solved_reach.x, wavelength) * step(wavelength, solved_reach.y);
     wavelength = max(wavelength, solved_range.x);
     vec2 mirror = vec2(-row_incident.x, row_incident.y) / superstrate;
-    float c = sqrt(max(1.0 - mirror.y * mirror.y, 1e-7));
-    float inverse = superstrate * period / wavelength;
-    float orders = 2.0 * c * inverse;  // K of the table's cells
-    float p = clamp((c - mirror.x) * inverse, 0.0, orders);
-    float band = clamp(floor(orders), 0.0, last_band);
-    row_channel = clamp(floor(p), 0.0, band);
-    float r = clamp(orders - band, 0.0, 1.0), f = p - row_channel;
-    bool kind_a = f < r || row_channel >= band;
-    float t = kind_a ? f / max(r, 1e-7) : (f - r) / max(1.0 - r, 1e-7);
+    float optical_period = superstrate * period, c, orders, band, t, r, shortest, longest;
+    bool kind_a;
+    order_cell(mirror.x, mirror.y, optical_period / wavelength, last_band, 1e-7, c, orders, band,
+               row_channel, kind_a, t, r);
     row_channels = band + (kind_a ? 1.0 : 0.0);
     int k = int(band);
     int first = k * (k + 1) * (2 * k + 1) / 3 + (kind_a ? 0 : (k + 1) * (k + 2));
     row_tile = first + int(row_channel) * int(row_channels + 1.0);
-    row_place.xy = elevations(vec3(sqrt(clamp(vec2(t, r), 0.0, 1.0)), 0.0)).xy;  // 2/π asin
-    float longest = wavelength * 2.0 * inverse / max(orders, 1e-7);
-    float shortest = longest * sqrt(1.0 - 1.0 / (superstrate * superstrate));
-    vec2 ends = clamp(solved_range, shortest, longest);
-    row_place.z = clamp((wavelength - ends.x) / max(ends.y - ends.x, 1e-6), 0.0, 1.0);
+    float least_c = sqrt(1.0 - 1.0 / (superstrate * superstrate));
+    cell_wavelengths(orders, optical_period, solved_range.x, solved_range.y, least_c, shortest,
+                     longest);
+    row_place = vec3(smooth_coordinate(t), smooth_coordinate(r),
+                     wavelength_coordinate(wavelength, shortest, longest, 1e-6));
 }
 
 // Interpolate the row's efficiency towards channel q; the sum of all is beyond the last one.
@@ -78,7 +76,7 @@ float efficiency_towards(float q)
     vec2 at = corner + row_place.yx * order_cells.yx + 0.5;
     vec4 four = textureLod(efficiencies, at / vec2(textureSize(efficiencies, 0)), 0.0);
     vec4 apart = abs(w - 3.0 * group - vec4(0.0, 1.0, 2.0, 3.0));
-    return dot(four, max(1.0 - apart, 0.0));
+    return row_lit * dot(four, max(1.0 - apart, 0.0));
 }
 
 // Efficiency of an order of the row; 0 if it does not propagate.

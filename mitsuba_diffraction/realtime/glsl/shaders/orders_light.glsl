@@ -12,16 +12,15 @@ float orders_at(vec2 uv, float k)
 {
     find_row(2.0 * PI / k);
     vec2 place = uv * (k * period / (2.0 * PI));
-    float sharpness = 2.0 * PI * sigma / period;
-    float reach = sqrt(FAR) / sharpness;
+    float sharpness = pow(2.0 * PI * sigma / period, 2.0);
+    float reach = sqrt(FAR / sharpness);
     int last = int(floor(place.x + reach));
     float sum = 0.0;
     for (int m = int(ceil(place.x - reach)); m <= last; ++m) {
-        vec2 apart = sharpness * (place - vec2(float(m), 0.0));
-        float squared = dot(apart, apart);
-        if (squared < FAR) sum += exp(-squared) * efficiency_of(float(m));
+        float lobe = order_lobe(place.x - float(m), place.y, sharpness);
+        if (lobe > exp(-FAR)) sum += lobe * efficiency_of(float(m));
     }
-    return sum * (k * k * sigma * sigma / PI);
+    return sum * lobe_peak(k, sigma);
 }
 
 #if defined(MONOCHROME)
@@ -31,16 +30,6 @@ uniform float wavenumber;        // wavenumber of monochromatic light, rad/µm
 vec3 all_orders(vec2 uv, int light) { return light_colour[light] * orders_at(uv, wavenumber); }
 
 #else
-
-// Order m is brightest along a direction at m times this wavenumber.
-float wavenumber_step(vec2 uv) { return abs(uv.x) * 2.0 * PI / (period * dot(uv, uv)); }
-
-// exp(−σ² q_m² v²/r²) is the largest value of the lobe of order m along a direction.
-float aside(vec2 uv)
-{
-    float away = sigma * 2.0 * PI / period * uv.y;
-    return away * away / dot(uv, uv);
-}
 
 #ifdef DAYLIGHT
 
@@ -61,7 +50,8 @@ vec3 daylight_at(float k, float variance)
 vec3 all_orders(vec2 uv, int light)
 {
     uv.x = abs(uv.x) < 1e-4 ? 1e-4 : uv.x;
-    float square = dot(uv, uv), step = wavenumber_step(uv), falloff = aside(uv);
+    float square = dot(uv, uv), step = wavenumber_step(uv.x, uv.y, period);
+    float falloff = lobe_falloff(uv.x, uv.y, sigma, period);
     float first = max(ceil(daylight_waves.x / step), 1.0);
     float last = min(floor(daylight_waves.y / step), sqrt(FAR / max(falloff, 1e-8)));
     vec3 sum = vec3(0.0);
@@ -77,9 +67,10 @@ vec3 all_orders(vec2 uv, int light)
     if (square * longest * longest < FAR)
         for (int n = 0; n < nodes; ++n) {
             vec4 node = texelFetch(order_0, ivec2(n, 0), 0);
-            float k = 2.0 * PI / node.w, squared = sigma * sigma * k * k;
+            float k = 2.0 * PI / node.w;
             find_row(node.w);
-            sum += node.rgb * (squared / PI * exp(-square * squared) * efficiency_of(0.0));
+            sum += node.rgb * (lobe_peak(k, sigma) * exp(-square * sigma * sigma * k * k)
+                               * efficiency_of(0.0));
         }
     return light_colour[light] * sum;
 }
@@ -97,7 +88,8 @@ vec3 all_orders(vec2 uv, int light)
     vec3 sum = vec3(0.0);
     if (deviation < WIDEST_LOBE) {
         uv.x = abs(uv.x) < 1e-4 ? 1e-4 : uv.x;
-        float step = wavenumber_step(uv), falloff = aside(uv);
+        float step = wavenumber_step(uv.x, uv.y, period);
+        float falloff = lobe_falloff(uv.x, uv.y, sigma, period);
         float first = max(ceil((wavenumbers.x - 3.0 * deviation) / step), 1.0);
         float last = min(floor((wavenumbers.y + 3.0 * deviation) / step), sqrt(FAR / max(falloff, 1e-8)));
         for (float m = first; m <= last; ++m) {

@@ -68,7 +68,7 @@ class BrdfMap {
     if (!this.at || this.viewer.lost) return;
     this.prepare();
     this.found = this.pick(...this.at);
-    const diffracts = this.found && this.found.surface.height_scale !== undefined;
+    const diffracts = this.found && this.found.surface.height_scale !== null;
     this.canvas.hidden = !diffracts;
     if (!diffracts) {
       this.words.textContent = "Point at a surface that diffracts: the map shows where its light goes.";

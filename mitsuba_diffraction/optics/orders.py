@@ -1,0 +1,122 @@
+"""Orders of a grating: coordinates of their efficiencies, and lobes under the coherence window.
+
+Formulas for any numbers of `arithmetic`. `tables.orders.cells` explains the coordinates. Period d,
+medium of index n, vacuum wavelength λ, wavenumber k = 2π/λ; (u, v) is the tangential part of
+ωi + ωo, in the patch's frame.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from .arithmetic import Mask, Number, formula, of
+
+
+class OrderCell(NamedTuple):
+    """Cell of incident light among a grating's orders.
+
+    Attributes
+    ----------
+    c : √(1 − y²).
+    k_continuous : K.
+    band : k = ⌊K⌋, at most the last one.
+    channel : j = ⌊p⌋.
+    kind_a : whether channels 0 … k propagate, not 0 … k − 1.
+    t, r : coordinates within the cell, 0 to 1.
+    """
+
+    c: Number
+    k_continuous: Number
+    band: Number
+    channel: Number
+    kind_a: Mask
+    t: Number
+    r: Number
+
+
+@formula
+def order_cell(
+    x: Number, y: Number, inverse: Number, last_band: Number, least: Number
+) -> OrderCell:
+    """Return the cell of the mirror direction (x, y) within the medium.
+
+    inverse : n d/λ.
+    least : positive, against division by 0 where a kind or the y range has no width.
+    """
+    xp = of(x, y, inverse)
+    c = xp.sqrt(xp.maximum(1.0 - y * y, least))
+    k_continuous = 2.0 * c * inverse
+    p = xp.clip((c - x) * inverse, 0.0, k_continuous)
+    band = xp.clip(xp.floor(k_continuous), 0.0, last_band)
+    channel = xp.clip(xp.floor(p), 0.0, band)
+    r, f = xp.clip(k_continuous - band, 0.0, 1.0), p - channel
+    # p = K is the end of kind A's last channel, of which rounding makes kind B's
+    kind_a = (f < r) | (channel >= band)
+    of_a = f * xp.reciprocal(xp.maximum(r, least))
+    of_b = (f - r) * xp.reciprocal(xp.maximum(1.0 - r, least))
+    t = xp.where(kind_a, of_a, of_b)
+    return OrderCell(c, k_continuous, band, channel, kind_a, t, r)
+
+
+@formula
+def smooth_coordinate(t: Number) -> Number:
+    """Return τ of t = sin²(πτ/2), in which square roots at both ends vanish."""
+    xp = of(t)
+    return xp.arcsin(xp.sqrt(xp.clip(t, 0.0, 1.0))) * (2.0 / math.pi)
+
+
+@formula
+def cell_wavelengths(
+    k_continuous: Number, optical_period: Number, shortest: Number, longest: Number, least_c: Number
+) -> tuple[Number, Number]:
+    """Return the shortest and longest wavelength at which light of some K has a direction.
+
+    optical_period : n d, in the unit of the wavelengths.
+    shortest, longest : wavelengths of the table.
+    least_c : least c of the light, √(1 − 1/n²) of light that comes from outside the medium.
+    """
+    xp = of(k_continuous)
+    most = 2.0 * optical_period * xp.reciprocal(xp.maximum(k_continuous, 1e-7))
+    low = xp.clip(shortest, least_c * most, most)
+    high = xp.clip(longest, least_c * most, most)
+    return low, high
+
+
+@formula
+def wavelength_coordinate(wavelength: Number, low: Number, high: Number, least: Number) -> Number:
+    """Return w, the place of a wavelength between the ends of `cell_wavelengths`, 0 to 1."""
+    xp = of(wavelength, low)
+    return xp.clip((wavelength - low) * xp.reciprocal(xp.maximum(high - low, least)), 0.0, 1.0)
+
+
+@formula
+def order_lobe(across: Number, along: Number, sharpness: Number) -> Number:
+    """Return exp(−σ²|q − q_m|²), the lobe of order m over its largest value.
+
+    across, along : of k (u, v) d/2π from (m, 0), in orders.
+    sharpness : (2πσ/d)².
+    """
+    return of(across, along).exp(-sharpness * (across * across + along * along))
+
+
+@formula
+def lobe_peak(k: Number, sigma: Number) -> Number:
+    """Return k²σ²/π, the largest value of a lobe of efficiency 1."""
+    return k * k * (sigma * sigma * (1.0 / math.pi))
+
+
+@formula
+def wavenumber_step(u: Number, v: Number, period: Number) -> Number:
+    """Return k_1 = 2π|u|/(d(u² + v²)): order m is brightest along a direction at k = m k_1."""
+    xp = of(u, v)
+    square = xp.maximum(u * u + v * v, 1e-8)
+    return xp.maximum(xp.absolute(u), 1e-8) * (2.0 * math.pi / period) * xp.reciprocal(square)
+
+
+@formula
+def lobe_falloff(u: Number, v: Number, sigma: Number, period: Number) -> Number:
+    """Return σ² q_1² v²/(u² + v²): exp(−m² of it) is the largest lobe of order m in a direction."""
+    xp = of(u, v)
+    away = sigma * (2.0 * math.pi) / period * v
+    return away * away * xp.reciprocal(xp.maximum(u * u + v * v, 1e-8))

@@ -1,0 +1,224 @@
+"""Programs: formulas of this folder, written as functions of a shading language.
+
+`Program.add` runs a formula on `symbols`. The formula becomes a function of the program, and so
+does each function with the decorator `arithmetic.formula` that it calls. Local variables keep their
+names, the docstring's first paragraph becomes the function's comment, and an expression that is
+used more than once is a variable. The language (`dialects`) decides how numbers, complex numbers
+and calls are written.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+from typing import Any
+
+from . import arithmetic
+from .dialects import Dialect
+from .printer import Function, Printer
+from .symbols import (
+    Symbol,
+    components_of,
+    current,
+    kind_of,
+    kinds_of,
+    leaves_of,
+    like,
+    refuse,
+    scopes,
+    structured,
+)
+
+
+@dataclass
+class Program:
+    """Functions in a dialect, those that a function calls before it."""
+
+    dialect: Dialect
+    functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
+
+    def add(
+        self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
+    ) -> Function:
+        """Write a formula, and the formulas that it calls, as functions.
+
+        Parameters
+        ----------
+        formula : function of this folder.
+        arguments : of each parameter its kind ("float", "complex", "vector": three components), a
+            tuple of kinds, or else a value that is constant in the program, such as a function by
+            `supplied` or a symbol by `known`.
+        name : of the function; the formula's by default.
+        comment : of the function; the docstring's first paragraph by default.
+
+        Raises
+        ------
+        DiffractionError
+            If the formula cannot be written, with its line.
+        """
+        formula = getattr(formula, "__wrapped__", formula)
+        key = (formula, name, *map(_key, arguments))
+        if key not in self.functions:
+            scope = Scope(self, formula, name or formula.__name__.lstrip("_"))
+            self.functions[key] = scope.write(arguments, comment or _comment(formula))
+        return self.functions[key]
+
+    @property
+    def text(self) -> str:
+        """Source of all functions."""
+        return "\n".join(function.text for function in self.functions.values())
+
+
+class Scope:
+    """Function that is being written: its expressions, each once, in the order of the formula."""
+
+    def __init__(self, program: Program, formula: Callable[..., Any], name: str) -> None:
+        self.program, self.formula, self.name = program, formula, name
+        self.dialect = program.dialect
+        self.expressions: dict[tuple[Any, ...], Symbol] = {}
+        self.order: list[Symbol] = []
+        self.callees: set[str] = set()
+        self.taken: set[str] = set()
+
+    def expression(self, kind: str, operation: str, parts: tuple[Any, ...]) -> Symbol:
+        """Return the symbol of an expression, which may be known already."""
+        key = (kind, operation, *(id(p) if isinstance(p, Symbol) else p for p in parts))
+        if key not in self.expressions:
+            self._check(parts)
+            self.expressions[key] = symbol = Symbol(kind, operation, parts, self)
+            self.order.append(symbol)
+        return self.expressions[key]
+
+    def _check(self, parts: Iterable[Any]) -> None:
+        for part in parts:
+            if isinstance(part, Symbol) and part.scope not in (None, self):
+                refuse("it reads a variable of another function; hand it on as an argument")
+
+    def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
+        """Write a call of another formula, and the formula itself if it is new."""
+        function = self.program.add(formula, *map(kind_of, values))
+        leaves = [leaf for value in values for leaf in leaves_of(value)]
+        results = self.call(function.name, leaves, list(kinds_of(function.result)))
+        return structured(function.result, iter(results))
+
+    def call(self, name: str, arguments: Sequence[Any], kinds: Sequence[str]) -> list[Any]:
+        """Return the results of a function; a vector as its components."""
+        self.callees.add(name)
+        call = self.expression(kinds[0] if len(kinds) == 1 else "call", "call", (name, *arguments))
+        results = [call]
+        if len(kinds) > 1:
+            results = [self.expression(k, "result", (call, n)) for n, k in enumerate(kinds)]
+        return [components_of(self, r) if r.kind == "vector" else r for r in results]
+
+    def write(self, arguments: Sequence[Any], comment: str) -> Function:
+        """Run the formula on symbols and print it."""
+        parameters: list[Symbol] = []
+        names = list(inspect.signature(self.formula).parameters)
+        values = [
+            _parameter(self, name, argument, parameters)
+            for name, argument in zip(names, arguments, strict=False)
+        ]
+        with _active(self), _local_names(self):
+            result = self.formula(*values)
+        return self._printed(parameters, result, comment)
+
+    def take(self, name: str) -> str:
+        """Return a name for a variable that is new in the function and legal in the language."""
+        name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
+        if name in self.dialect.reserved or name == self.name:
+            name += "_"
+        numbered, n = name, 1
+        while numbered in self.taken:
+            n += 1
+            numbered = f"{name.rstrip('_')}_{n}"
+        self.taken.add(numbered)
+        return numbered
+
+    def _printed(self, parameters: list[Symbol], result: Any, comment: str) -> Function:
+        return Printer(self).function(parameters, result, comment)
+
+
+def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol]) -> Any:
+    """Return a formula's argument, and add its leaves to the function's parameters."""
+    if isinstance(argument, str):
+        symbol = Symbol(argument, "name", (scope.take(name),), scope)
+        parameters.append(symbol)
+        return symbol if argument != "vector" else components_of(scope, symbol)
+    if isinstance(argument, tuple):
+        fields = getattr(argument, "_fields", None) or [f"{name}{n}" for n in range(len(argument))]
+        parts = [
+            _parameter(scope, f"{name}_{field}" if hasattr(argument, "_fields") else field, part,
+                       parameters)
+            for field, part in zip(fields, argument, strict=True)
+        ]  # fmt: skip
+        return like(argument, parts)
+    return argument
+
+
+def _key(argument: Any) -> Any:
+    if isinstance(argument, tuple):
+        return (type(argument), *map(_key, argument))
+    return argument if isinstance(argument, str) else id(argument)
+
+
+def _comment(formula: Callable[..., Any]) -> str:
+    """Return the first paragraph of a docstring, in one line."""
+    return " ".join((inspect.getdoc(formula) or "").partition("\n\n")[0].split())
+
+
+@contextmanager
+def _active(scope: Scope) -> Iterator[None]:
+    """Let a function be the one that expressions belong to."""
+    before = arithmetic.emission
+    scopes.append(scope)
+    arithmetic.emission = _emitted
+    try:
+        yield
+    finally:
+        scopes.pop()
+        arithmetic.emission = before
+
+
+def _emitted(formula: Callable[..., Any], values: tuple[Any, ...]) -> Any:
+    """Call a formula from within another: write a call if a symbol is among its arguments."""
+    if not any(isinstance(leaf, Symbol) for value in values for leaf in leaves_of(value)):
+        return formula(*values)
+    return current().called(formula, values)
+
+
+@contextmanager
+def _local_names(scope: Scope) -> Iterator[None]:
+    """Name expressions like the local variables of the formula and of functions that it runs."""
+
+    def on_return(frame: FrameType, event: str, _: Any) -> None:
+        if event != "return" or scopes[-1:] != [scope]:
+            return
+        own = frame.f_code is scope.formula.__code__
+        if own or frame.f_code.co_filename == scope.formula.__code__.co_filename:
+            for name, value in frame.f_locals.items():
+                _name(scope, name, value, own)
+
+    before = sys.getprofile()
+    sys.setprofile(on_return)
+    try:
+        yield
+    finally:
+        sys.setprofile(before)
+
+
+def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
+    """Name a symbol, or the parts of a tuple; own : a variable of the formula itself."""
+    if isinstance(value, Symbol):
+        if value.scope is scope and (own or value.name is None):
+            value.name = name
+    elif isinstance(value, tuple):
+        fields = getattr(value, "_fields", range(len(value)))
+        for suffix, part in zip(fields, value, strict=True):
+            word = f"{name}_{suffix}" if isinstance(suffix, str) else f"{name}{suffix}"
+            if not (isinstance(part, Symbol) and part.name):
+                _name(scope, word, part, own)

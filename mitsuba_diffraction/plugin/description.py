@@ -1,0 +1,357 @@
+"""Description of a surface: one record that shaders, page, OSL, maps, spectra and plans read.
+
+`describe` returns the record of a BSDF. A `Consumer` declares the features that it shows; its
+`check` refuses a surface with any other feature in one sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError, warn
+from ..heights.field import HeightField
+from ..optics.geometry import sigma_of
+from ..optics.slope_ratios import SlopeRatios
+from ..tables.directional import DirectionalTable
+from ..tables.orders import OrderTable
+from ..tables.table import DiffractionTable
+from .types import BSDF, Interaction, Texture
+
+
+class Feature(Enum):
+    """Feature of a surface: the group of features that exclude each other, and a phrase."""
+
+    HEIGHTS = "table", "a table of heights"
+    ORDERS = "table", "solved orders"
+    MIX = "table", "a mix of surfaces (diffraction_mix)"
+    VARYING_WEIGHTS = "", "weights that vary"
+    LIMITED = "", "a table that lacks orders (frequency_limit)"
+    TRANSMISSION = "", "light that goes through"
+    MIRROR = "material", "material='none'"
+    DIELECTRIC = "material", "a dielectric"
+    RARER = "material", "a dielectric rarer than the medium above"
+    CONDUCTOR = "material", "a conductor"
+    COAT = "", "a coat (coat_ior)"
+    FILM = "", "a thin film (film_ior)"
+    SMALL_SLOPE = "model", "model='small_slope'"
+    KIRCHHOFF = "model", "model='kirchhoff'"
+    OWN_MODEL = "model", "model='{model}'"
+    SECOND_ORDER = "", "the second order of small slope (second_order)"
+    ENERGY_SCALE = "", "a scale of energy (energy_conserving)"
+    SHADOWING = "", "shadowing='vcavity'"
+    PATCH = "coherence", "speckle (coherence='patch')"
+    PLACED = "coherence", "speckle (coherence='surface')"
+    HEIGHT_SCALE = "", "a height_scale other than 1"
+    VARYING_HEIGHT = "", "a height_scale that varies"
+    LATERAL_SCALE = "", "a lateral_scale other than 1"
+    VARYING_LENGTH = "", "a lateral_scale that varies"
+    ORIENTATION = "", "an orientation other than 0"
+    VARYING_ORIENTATION = "", "an orientation that varies"
+    NESTED = "", "a BSDF beneath"
+    THESIS = "", "layering='thesis'"
+
+    def phrase(self, model: str = "") -> str:
+        """Return the feature as messages call it; model : name of the boundary model."""
+        phrase: str = self.value[1]
+        return phrase.replace("{model}", model)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Number over a surface: the same everywhere, or a texture's or mesh attribute's.
+
+    Attributes
+    ----------
+    number : the number; the largest where it varies.
+    texture : the texture or mesh attribute, or None.
+    """
+
+    number: float
+    texture: Texture | None = None
+
+
+#: Index n + ik of a material, over that of the medium above, at wavelengths (n,) in nm.
+Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Material of a structure.
+
+    Attributes
+    ----------
+    kind : MIRROR, DIELECTRIC, RARER or CONDUCTOR.
+    index : see `Index`; None of a mirror. In RGB variants it interpolates three values.
+    known : first and last wavelength of a tabulated index, nm, or None.
+    name : name of a conductor, for messages.
+    """
+
+    kind: Feature
+    index: Index | None = None
+    known: tuple[float, float] | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Film:
+    """Thin film on a structure: index over that of the medium above, and thickness in nm."""
+
+    index: complex
+    thickness: float
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Second order of small slope: index of its coefficients, and slope ratios of the heights."""
+
+    index: float
+    ratios: SlopeRatios
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Scales of directions, as functions of the height scale.
+
+    Attributes
+    ----------
+    scale : luminous mean e over wavelengths of the scale s, (polar + 1, azimuthal) on
+        `tables.directional.FINE`; None where all are 1. The BSDF is multiplied by s(ωi) s(ωo).
+    reflected : albedo over the flat interface's reflectance, by which light goes on to a nested
+        BSDF; None where the flat reflectance decides.
+    """
+
+    scale: Callable[[float], NDArray[np.float32] | None]
+    reflected: Callable[[float], DirectionalTable | None]
+
+
+@dataclass(frozen=True)
+class Nested:
+    """BSDF beneath a surface; `weight` is the diffuse weight of layering `thesis`, else None."""
+
+    bsdf: BSDF
+    weight: float | None = None
+
+
+def _unturned(si: Interaction) -> tuple[Any, Any, Any]:
+    return 1.0, 0.0, 1.0
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Surface that diffracts, as its BSDF has it when it is described.
+
+    Attributes
+    ----------
+    table : table of heights or of solved orders.
+    text : material with its layers, for people.
+    coherence_width : 4σ of the amplitude window, µm.
+    orientation : degrees from the first tangent to the patch's x axis.
+    frame : function of interactions that returns (cos, sin) of the orientation, and the factor on
+        lengths over those of the table.
+    coherence : "ensemble", "patch" or "surface".
+    heights : function that reads the heights of the table, or None of solved orders.
+    height_scale, lateral_scale : factors on heights, and on lengths over those of the table.
+    largest_scale : largest height scale of the table.
+    material, coat, film : material of the structure; index of a coat over the medium above it.
+    model : name of the boundary model; empty for solved orders.
+    second_order, energy, nested : see their classes; None where the surface has none.
+    shadowing : whether grooves shadow each other (`vcavity`).
+    transmits : whether light goes through.
+    """
+
+    table: DiffractionTable | OrderTable
+    text: str
+    coherence_width: float
+    orientation: Quantity
+    frame: Callable[[Interaction], tuple[Any, Any, Any]] = _unturned
+    coherence: str = "ensemble"
+    heights: Callable[[], HeightField] | None = None
+    height_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
+    lateral_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
+    largest_scale: float | None = None
+    material: Material | None = None
+    coat: float | None = None
+    film: Film | None = None
+    model: str = ""
+    second_order: SecondOrder | None = None
+    energy: Energy | None = None
+    nested: Nested | None = None
+    shadowing: bool = False
+    transmits: bool = False
+
+    @property
+    def patch(self) -> DiffractionTable:
+        """Table of heights; for consumers that show no solved orders."""
+        assert isinstance(self.table, DiffractionTable)
+        return self.table
+
+    @property
+    def orders(self) -> OrderTable | None:
+        """Table of solved orders, or None."""
+        return self.table if isinstance(self.table, OrderTable) else None
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the amplitude window, µm."""
+        return sigma_of(self.coherence_width)
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Shortest wavelength that the table serves, nm; 0 for solved orders."""
+        return 0.0 if self.orders else self.patch.wavelength_range[0]
+
+    def features(self) -> set[Feature]:
+        """Return all features that the surface has."""
+        known = {"": None, "small_slope": Feature.SMALL_SLOPE, "kirchhoff": Feature.KIRCHHOFF}
+        turned, tall, wide = self.orientation, self.height_scale, self.lateral_scale
+        scales = self.energy is not None and not tall.texture
+        present = {
+            Feature.ORDERS: self.orders is not None,
+            Feature.HEIGHTS: self.orders is None,
+            Feature.LIMITED: self.orders is None and self.patch.limited,
+            Feature.TRANSMISSION: self.transmits,
+            Feature.COAT: self.coat is not None,
+            Feature.FILM: self.film is not None,
+            Feature.SECOND_ORDER: self.second_order is not None,
+            Feature.ENERGY_SCALE: scales and self.energy_scale(tall.number) is not None,
+            Feature.SHADOWING: self.shadowing,
+            Feature.PATCH: self.coherence == "patch",
+            Feature.PLACED: self.coherence == "surface",
+            Feature.HEIGHT_SCALE: tall.texture is None and tall.number != 1.0,
+            Feature.VARYING_HEIGHT: tall.texture is not None,
+            Feature.LATERAL_SCALE: wide.texture is None and wide.number != 1.0,
+            Feature.VARYING_LENGTH: wide.texture is not None,
+            Feature.ORIENTATION: turned.texture is None and turned.number != 0.0,
+            Feature.VARYING_ORIENTATION: turned.texture is not None,
+            Feature.NESTED: self.nested is not None,
+            Feature.THESIS: self.nested is not None and self.nested.weight is not None,
+        }
+        kind = None if self.material is None else self.material.kind
+        chosen = (kind, known.get(self.model, Feature.OWN_MODEL))
+        found = {feature for feature, has in present.items() if has}
+        return found | {feature for feature in chosen if feature is not None}
+
+    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """See `Energy.scale`; None without scales of energy."""
+        return None if self.energy is None else self.energy.scale(height_scale)
+
+
+@dataclass(frozen=True)
+class Mix:
+    """Several BSDFs in one, by weights.
+
+    Attributes
+    ----------
+    parts : BSDFs by name.
+    textures : textures and mesh attributes among the weights.
+    weights : function of interactions that returns the weight of each part, of sum 1.
+    """
+
+    parts: Mapping[str, BSDF]
+    textures: Sequence[Texture]
+    weights: Callable[[Interaction], Sequence[Any]]
+
+    @property
+    def model(self) -> str:
+        """Names of the boundary models."""
+        models = [part.model for part in map(describe, self.parts.values()) if part]
+        return ", ".join(dict.fromkeys(models))
+
+    def features(self) -> set[Feature]:
+        """Return the features of the mix and of all its parts."""
+        own = {Feature.MIX, *([Feature.VARYING_WEIGHTS] if self.textures else [])}
+        return own.union(*(part.features() for part in map(describe, self.parts.values()) if part))
+
+
+Description = Surface | Mix
+
+#: Features that differ from place to place.
+VARYING = frozenset(
+    {
+        Feature.VARYING_HEIGHT,
+        Feature.VARYING_LENGTH,
+        Feature.VARYING_ORIENTATION,
+        Feature.VARYING_WEIGHTS,
+    }
+)
+
+
+@runtime_checkable
+class Described(Protocol):
+    """BSDF of this package, in any variant."""
+
+    def describe(self) -> Description:
+        """Return all that the surface has, with the current values of its parameters."""
+
+
+def describe(bsdf: BSDF) -> Description | None:
+    """Return the description of a BSDF of this package; None for any other BSDF."""
+    return bsdf.describe() if isinstance(bsdf, Described) else None
+
+
+@dataclass(frozen=True)
+class Consumer:
+    """Consumer of descriptions, and the features that it shows.
+
+    Attributes
+    ----------
+    name : name for messages, with its article.
+    shows : features that it shows.
+    remedy : advice for any other feature; `remedies` : for some features.
+    left_out : features that it leaves out with a warning, and the effect on the picture.
+    """
+
+    name: str
+    shows: frozenset[Feature]
+    remedy: str = "leave it out, or render with Mitsuba"
+    remedies: Mapping[Feature, str] = field(default_factory=dict)
+    left_out: Mapping[Feature, str] = field(default_factory=dict)
+
+    def described(self, bsdf: BSDF, what: str = "the surface") -> Surface:
+        """Return the description of a BSDF after `check`, for consumers that show no mixes."""
+        if (described := describe(bsdf)) is None:
+            raise DiffractionError(
+                f"bsdf={type(bsdf).__name__} does not diffract, so {self.name} cannot show it; "
+                "give a BSDF of type 'diffraction' or 'diffraction_orders', for instance "
+                "mi.load_dict(md.bsdf_dict(...))"
+            )
+        self.check(described, what)
+        assert isinstance(described, Surface)
+        return described
+
+    def refusal(self, described: Description, what: str = "the surface") -> str | None:
+        """Return the sentence on the first feature that is not shown, or None.
+
+        what : name of the surface, for messages.
+        """
+        lacking = described.features() - self.shows - set(self.left_out)
+        for feature in Feature:
+            if feature in lacking:
+                group = feature.value[0]
+                others = [f.phrase() for f in Feature if f in self.shows and f.value[0] == group]
+                choices = f" (but {', '.join(others)})" if group and others else ""
+                return (
+                    f"{what} has {feature.phrase(described.model)}, which {self.name} cannot "
+                    f"show{choices}; {self.remedies.get(feature, self.remedy)}"
+                )
+        return None
+
+    def check(self, described: Description, what: str = "the surface") -> None:
+        """Refuse a surface with a feature that is not shown; warn of those that are left out.
+
+        Raises
+        ------
+        DiffractionError
+            With the feature, the consumer, the choices and a remedy.
+        """
+        if refusal := self.refusal(described, what):
+            raise DiffractionError(refusal)
+        for feature, effect in self.left_out.items():
+            if feature in described.features():
+                warn(f"{what}: {self.name} leaves out {feature.phrase()}: {effect}")
