@@ -181,6 +181,10 @@ N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckm
 
 Denoisers that ask for an albedo get the reflectance at normal incidence, nested BSDF included.
 
+Derivatives pass through renderings backward and forward, for all parameters marked ∂. A function
+that `dr.freeze` records must give `mi.render` a seed of type `mi.UInt32`: a plain number becomes
+part of the recording.
+
 The BSDF `diffraction_mix` blends several such surfaces by weights (docs/own-scene.md).
 
 XML and the same in Python:
