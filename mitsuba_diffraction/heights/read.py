@@ -262,7 +262,7 @@ def _height_scale(
         )
         raise DiffractionError(
             f"{shown} {unit_stated} for its heights; give height_unit, and pixel_size in µm if "
-            "that is missing, too, for instance --height-unit nm --pixel-size 0.05"
+            "that is missing, too, for instance height_unit=nm pixel_size=0.05"
         )
     return raw.unit, []
 
@@ -275,12 +275,11 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
     )
     lacks, names, values = zip(*(words for missing, *words in known if missing), strict=True)
     examples = dict(zip(names, values, strict=True)).items()
-    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in examples)
-    parameters = " ".join(f"-D {name}={value}" for name, value in examples)
+    options = " ".join(f"{name}={value}" for name, value in examples)
     what = " is an image of grey levels and" if height else ""
     return DiffractionError(
         f"{shown}{what} does not say {' nor '.join(lacks)}; give {' and '.join(names)} in µm, for "
-        f"instance {options} (for a scene that has them as parameters, {parameters})"
+        f"instance {options}"
     )
 
 

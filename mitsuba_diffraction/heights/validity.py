@@ -107,7 +107,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
         slope_x, slope_y = plane_of(field)
         turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
         lines.append(
-            f"{field.name}: use level=plane (--level plane): the patch is not levelled; its best "
+            f"{field.name}: use level=plane: the patch is not levelled; its best "
             f"plane rises {plane_rise(field):.3g} µm across it and turns the mirror direction by "
             f"{turn:.2g}°"
         )
@@ -121,7 +121,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
             else "with no step between neighbours inside"
         )
         lines.append(
-            f"{field.name}: use periodic=smooth (--periodic smooth): the patch tiles the surface, "
+            f"{field.name}: use periodic=smooth: the patch tiles the surface, "
             f"and its seams, {share:.0%} of the mean-square slope, diffract like a grating; "
             f"opposite edges differ by {worst.step:.3g} µm RMS{levelled}, {compared}"
         )
