@@ -154,10 +154,10 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
     )  # fmt: skip
 
 
-def add_files(parser: argparse.ArgumentParser, kinds: str) -> None:
+def add_files(parser: argparse.ArgumentParser, kinds: str, *, needed: bool = True) -> None:
     """Add the argument FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
     parser.add_argument(
-        "files", metavar="FILE", type=Path, nargs="+",
+        "files", metavar="FILE", type=Path, nargs="+" if needed else "*",
         help=f"{kinds}; folders and patterns of names, too",
     )  # fmt: skip
 

@@ -138,7 +138,17 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     file = readable_file(path)
     raw, measured = _read(file, options.channel)
     field = _to_field(raw, file, options)
-    options = replace(options, crop=None)  # `_to_field` crops before it fills gaps
+    # `_to_field` crops before it fills gaps
+    return treated_by_default(field, replace(options, crop=None), measured)
+
+
+def treated_by_default(
+    field: HeightField, options: LoadOptions, measured: bool = False
+) -> HeightField:
+    """Treat a patch; level it and make it periodic by default where tilt or seams would diffract.
+
+    measured : whether an instrument wrote the file; a line then says that it is not levelled.
+    """
     small = field.heights.size <= LARGE  # wider scans are cut into windows, which are levelled
     if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
         field = _by_default(LEVELS["plane"](field), "level")
