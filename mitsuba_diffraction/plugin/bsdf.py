@@ -48,11 +48,12 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
-    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
-lateral_scale_max : float [of a bitmap]
-    Largest factor of such a texture, above which factors are clipped. Required unless the texture
-    is a bitmap.
+    same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
+    to 1. Scales of energy follow it (docs/holograms.md).
+lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
+    Largest factor of a texture, above which factors are clipped; required unless the texture is a
+    bitmap. Or the largest value that a number may change to: give 1.5 × lateral_scale to optimise
+    a period in both directions. Tables grow with its square.
 height_scale : float or texture ∂ [1]
     Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
     a mesh attribute of one channel, for worn and fresh places.

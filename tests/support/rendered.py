@@ -19,7 +19,7 @@ PIXELS = 8
 #: coefficients follow an index (0.01).
 STEP = 1e-3
 #: The same for angles, degrees.
-DEGREES = 0.1
+DEGREES = 0.02
 
 #: Surfaces by what they show: plugin's parameters, and the values to take derivatives at.
 SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
@@ -29,7 +29,7 @@ SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
          "k.value": 6.0},
     ),
     "pigment": (
-        {"int_ior": 1.5, "pigment": PIGMENT},
+        {"int_ior": 1.5, "beneath": PIGMENT},
         {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5, "nested.reflectance.value": 0.4},
     ),
     "coat": (
@@ -92,6 +92,8 @@ def scene(bsdf: dict[str, Any]) -> Any:
 
 def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
     """Compare derivatives, backward and forward, with differences of the same random numbers."""
+    # look-ups of colours bend between their bins: their kinks average out
+    spp = 16 * spp if mi.is_rgb else spp
     loaded = scene(bsdf)
     parameters = mi.traverse(loaded)
     keys = {name: f"plate.bsdf.{name}" for name in at}
