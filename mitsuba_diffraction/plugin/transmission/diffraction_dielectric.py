@@ -96,8 +96,8 @@ from .crossing import (
     out_of_sheet,
     tangent_plane,
 )
+from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
-from .parameters import read_parameters
 
 _LEAST_SHARE = 0.1
 
