@@ -11,7 +11,7 @@ from mitsuba_diffraction.optics.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.beam import solve_beam
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings
-from mitsuba_diffraction.solve.profiles import polygon, sinusoidal
+from mitsuba_diffraction.solve.profiles import sinusoidal
 
 #: One wavelength.
 GREEN = Settings(wavelengths=(550.0, 550.0))
@@ -26,24 +26,6 @@ def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
     truth = np.abs(np.stack(fresnel(np.cos(theta), index))) ** 2
     # 10⁻³ nm of the depth; single precision
     np.testing.assert_allclose(table.polarised_efficiency(x, y, 550.0, 0), truth, atol=1e-4)
-
-
-@pytest.mark.thorough
-def test_an_echelle_sends_its_light_back_into_the_order_of_its_blaze():
-    """R2, 79 lines/mm, aluminium: 2 d sin θ = m λ has m = 41 at 552 nm."""
-    period, tangent = 1e3 / 79, 2.0
-    width = period / (1.0 + tangent**2)
-    echelle = polygon([(0, 0), (width, width * tangent)], period)
-    theta = np.degrees(np.arctan(tangent))
-    lam = 2e3 * period * np.sin(np.radians(theta)) / 41
-    settings = Settings(wavelengths=(lam, lam), resolution=80)
-    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
-        table = solve_beam(echelle, "Al", theta=-theta, settings=settings)
-    efficiency = table.polarised_efficiency(np.sin(np.radians(theta)), 0.0, lam, -41)
-    # the facet is 41 half waves deep: most of R = 0.91 but for shadowed edges
-    assert efficiency[0] > 0.6
-    # its next resolution
-    assert table.header["solver_error"] < 1e-3
 
 
 @pytest.mark.parametrize(
