@@ -28,21 +28,23 @@ class Side:
     Attributes
     ----------
     index : n, of the medium in which directions are measured, over that above the surface.
-    at_structure : m, of the medium at the structure. It is another one below a thin sheet, whose
-        directions are those beyond its flat other side.
+    at_structure : m, of the medium at the structure. It is another one under a coat and below a
+        thin sheet: directions there are those beyond the flat face.
+    below : whether the side is below the surface.
     """
 
     index: float = 1.0
     at_structure: float = 1.0
+    below: bool = False
 
     @property
     def number(self) -> int:
         """0 above the surface, 1 below."""
-        return 0 if self.at_structure == 1.0 else 1
+        return int(self.below)
 
     @property
-    def beyond_sheet(self) -> bool:
-        """Whether directions are those beyond the flat side of a sheet."""
+    def beyond_face(self) -> bool:
+        """Whether directions are those beyond the flat face of a sheet or a coat."""
         return self.index != self.at_structure
 
     def normal(self, cosine: Real) -> Real:
@@ -81,8 +83,8 @@ class Path:
 
     @property
     def thin(self) -> bool:
-        """Whether light passes the flat side of a sheet."""
-        return self.came.beyond_sheet or self.left.beyond_sheet
+        """Whether light passes the flat face of a sheet or a coat."""
+        return self.came.beyond_face or self.left.beyond_face
 
     @property
     def sign(self) -> int:
@@ -130,7 +132,9 @@ class Path:
             return [through.matrices(name, above, below, self._real, self.thin) for name in names]
         if self.thin:  # the flat side lies over the structure as the face of a coat does
             n = self.came.at_structure
-            return [coat.matrices(boundary.MODELS[name], wi, wo, n, self._real) for name in names]
+            assert self.index is not None
+            assert not isinstance(self.index, Filmed)  # no coat lies on it
+            return [coat.matrices(boundary.MODELS[name], wi, wo, n, self.index) for name in names]
         assert self.index is not None
         return [boundary.matrices_of(name)(wi, wo, self.index) for name in names]
 
@@ -142,12 +146,12 @@ class Path:
         )
         return np.asarray(np.mean(np.sqrt(came * left), axis=0))
 
-    def face_reflectance(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return G of the flat side of a sheet for light that it reflects from below."""
+    def face_reflectance(self, cos_i: Real, cos_o: Real, cos_turn: Real | float = -1.0) -> Real:
+        """Return G of the flat face of a sheet or a coat for light that it reflects outside."""
         face = Path(None, "kirchhoff")
-        total = np.hypot(face.tangential(cos_i, cos_o, -1.0), face.width(cos_i, cos_o))
+        total = np.hypot(face.tangential(cos_i, cos_o, cos_turn), face.width(cos_i, cos_o))
         shares = reflectance(0.5 * total, self.came.at_structure)  # at ωi + ωo
-        return np.asarray(face.common(cos_i, cos_o, -1.0) * shares)
+        return np.asarray(face.common(cos_i, cos_o, cos_turn) * shares)
 
     @property
     def _real(self) -> float:
