@@ -21,7 +21,7 @@ from ..errors import DiffractionError, one_line, quoted
 from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
-from .orders import interpolation_error, order_constants, order_texture
+from .orders import interpolation_error, order_constants, order_formulas, order_texture
 from .patch import mean_transmittance, patch_constants, patch_error, patch_textures
 from .sockets import (
     Socket,
@@ -89,6 +89,7 @@ class Shader:
     Attributes
     ----------
     source : name of the file in `shaders`.
+    formulas : functions of `optics` that it calls.
     constants : macros.
     arrays : declarations of parameters that are constant arrays.
     sockets : inputs.
@@ -97,6 +98,7 @@ class Shader:
     """
 
     source: str
+    formulas: str
     constants: Mapping[str, Any]
     arrays: Sequence[str]
     sockets: Sequence[Socket]
@@ -170,6 +172,7 @@ def _orders(described: Surface, table: OrderTable) -> Shader:
     error = interpolation_error(table, texture)
     return Shader(
         "orders.osl",
+        order_formulas(),
         order_constants(table, texture),
         [array_parameter("int", "Starts", texture.starts)],
         [window_socket(described.coherence_width), *common_sockets(described.orientation.number)],
@@ -198,6 +201,7 @@ def _patch(described: Surface) -> Shader:
     constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
         "patch.osl",
+        "",
         constants,
         [array_parameter("float", name, values) for name, values in arrays.items()],
         [
@@ -230,7 +234,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
     )
     own = own.replace("SHADER(PARAMETERS)", f"{name}(\n    " + ",\n    ".join(parameters) + "\n)")
     head = _HEAD.format(surface=shader.surface, version=version("mitsuba_diffraction"))
-    return head + "\n".join(lines) + "\n\n" + common + "\n" + own
+    return "\n".join([head + "\n".join(lines), "", common, shader.formulas, own])
 
 
 def _literal(value: float | int) -> str:
