@@ -17,7 +17,6 @@ from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
 from ..heights.recipes import Recipe
 from ..progress import Progress, silent
-from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
@@ -74,10 +73,12 @@ def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
     """
     import mitsuba as mi
 
+    from ..plugin.bsdf import Diffraction
+
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table.exr"
         table.save(file)
-        try:
-            return mi.load_dict({"type": "diffraction", "table": str(file), **parameters})
-        except RuntimeError as error:
-            raise error_of("cannot make its BSDF", error) from error
+        props = mi.Properties("diffraction")
+        for name, value in {"table": str(file), **parameters}.items():
+            props[name] = value
+        return Diffraction(props)

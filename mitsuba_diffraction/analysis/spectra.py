@@ -25,10 +25,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import kirchhoff_factor, wavenumber
-from ..plugin.conductors import tabulated_range
+from ..optics.materials import PERFECT, material_named
+from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
+from ..plugin.pigment import pigment_range
 from ..progress import Progress, silent
 
 Reals = NDArray[np.float64]
@@ -188,7 +190,7 @@ def spectrum(
         SPECTRA.check(described)
     if isinstance(described, Surface):
         sigma = described.sigma
-        if described.material is not None:
+        if described.material is not None and described.material.known:
             check_material(described.material.name, lam)
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
@@ -226,15 +228,35 @@ def check_wavelengths(wavelengths: ArrayLike) -> Reals:
     return lam
 
 
-def check_material(material: str, wavelengths: Reals) -> None:
-    """Refuse wavelengths (n,) in nm beyond Mitsuba's table of a conductor."""
-    limits = tabulated_range(material)
-    if limits is not None and not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
-        raise DiffractionError(
-            f"material='{material}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
-            f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
-            "(--wavelength-range)"
-        )
+def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
+    """Return the wavelengths, nm, between which a material and a pigment beneath it are known.
+
+    Raises a DiffractionError if there is no such material, or the pigment cannot be read.
+    """
+    name = PERFECT if material is None else material_named(material)
+    limits = None
+    if isinstance(name, str) and name != PERFECT:
+        limits = tabulated_range(name)
+        if limits is None:
+            raise DiffractionError(unknown_conductor(name))
+    first, last = limits or (0.0, math.inf)
+    least, most = pigment_range(pigment)
+    return max(first, least), min(last, most)
+
+
+def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
+    """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
+    for name, limits in (
+        ("material", known_range(material)),
+        ("pigment", known_range(None, pigment)),
+    ):
+        if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
+            value = material if name == "material" else pigment
+            raise DiffractionError(
+                f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
+                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
+                "(--wavelength-range)"
+            )
 
 
 def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:

@@ -57,12 +57,14 @@ class Job:
     resolution: int  # pixels a side of the map
     variant: str  # variant of Mitsuba
     threads: int  # threads of Dr.Jit
+    surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF of the map; R = 1 without
 
     @property
     def key(self) -> str:
         """Digest of all parameters that the row depends on."""
         treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
-        parameters = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
+        variant = self.variant.partition("_")[2]
+        parameters = (VERSION, self.theta, self.resolution, variant, *self.surface)
         return key_of("survey", self.files.digest, treatment, *parameters)[:32]
 
 
@@ -129,8 +131,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(table.source.get("warnings", ()))
     phi = gratings[0].direction if gratings else 0.0
-    # ideal reflection: the effect of the structure alone, without a material
-    bsdf = bsdf_of(table, material="none")
+    # without a material ideal reflection: the effect of the structure alone
+    bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     diffracted = diffracted_light(table, Light(job.theta, phi))
@@ -170,6 +172,7 @@ def run_survey(
     theta: float = 30.0,
     resolution: int = 160,
     threads: int = 0,
+    surface: Mapping[str, Any] | None = None,
     repeats: str = "name",
     client: Any = None,
     progress: Progress = silent,
@@ -190,6 +193,7 @@ def run_survey(
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
+    surface : parameters of the map's BSDF, e.g. {"material": "keratin"}; R = 1 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
@@ -209,12 +213,13 @@ def run_survey(
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
     named = [{"file": str(file), "sample": sample_of(file, repeats)} for file in files]
+    shown = tuple((surface or {}).items())
     rows: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job] = {}
     for n, file in enumerate(files):
         try:
             treatment = treatment_for(file, treatments).updated(common or Treatment())
-            job = Job(_files_of(file), treatment, theta, resolution, variant, threads)
+            job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
         except DiffractionError as error:
             rows[n] = {"reason": str(error)}
             continue

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
+from ..optics.materials import TISSUES
 from ..scene.load import set_variant
 from . import options
 from .console import Bar
@@ -24,10 +25,13 @@ _TABLE = {
     "second_order": f"{_KEPT}auto",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
-_SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
+_SURFACE = (
+    "material", "int_ior", "ext_ior", "coat_ior", "pigment", "model", "orientation", "height_scale",
+)  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
-    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis", "second_order",
+    "mode", "material", "ext_ior", "coat_ior", "pigment", "model", "orientation", "height_scale",
+    "basis", "second_order",
 )  # fmt: skip
 
 
@@ -88,18 +92,7 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
 
     turned: include its orientation.
     """
-    group.add_argument(
-        "--material", metavar="NAME",
-        help="conductor, e.g. Al, or none for a reflectance of 1; default: a dielectric",
-    )  # fmt: skip
-    group.add_argument(
-        "--int-ior",
-        metavar="N",
-        help="index of the dielectric, or its name; default: 1.5, as in scenes",
-    )
-    group.add_argument(
-        "--coat-ior", metavar="N", type=float, help="index of a flat clear coat over the surface"
-    )
+    add_material(group)
     group.add_argument(
         "--model", choices=tuple(MODELS),
         help="model of the boundary; default: small_slope for materials with an index",
@@ -110,6 +103,31 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"
     )
     options.add_table(group, tuple(_TABLE), **_TABLE)
+
+
+def add_material(group: argparse._ArgumentGroup) -> None:
+    """Declare the options of what a surface consists of, by the plugin's names."""
+    group.add_argument(
+        "--material", metavar="MATERIAL",
+        help=f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, gold or Au; or "
+        "none for a reflectance of 1; default: a dielectric of --int-ior",
+    )  # fmt: skip
+    group.add_argument(
+        "--int-ior", metavar="N",
+        help="index of the dielectric at all wavelengths, or its name; default: 1.5, as in scenes",
+    )  # fmt: skip
+    group.add_argument(
+        "--ext-ior", metavar="N", help="index of the medium above, or its name; default: air"
+    )
+    group.add_argument(
+        "--coat-ior", metavar="N",
+        help="index of a flat clear coat over the surface, or its name: water on a wet animal",
+    )  # fmt: skip
+    group.add_argument(
+        "--pigment", metavar="COLOUR|CSV",
+        help="diffuse pigment beneath a clear material: a grey from 0 to 1, 'r,g,b', sienna, or a "
+        "file of wavelengths (nm) and reflectances; default: none",
+    )  # fmt: skip
 
 
 def add_relative(group: argparse._ArgumentGroup) -> None:
@@ -292,18 +310,7 @@ def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
     """Return the options of `add_surface` that are parameters of the BSDF, by name."""
     if args.material is not None and args.int_ior is not None:
         args.parser.error("argument --int-ior: not allowed with argument --material")
-    parameters = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
-    if "int_ior" in parameters and _is_number(parameters["int_ior"]):
-        parameters["int_ior"] = float(parameters["int_ior"])
-    return parameters
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
 
 
 def _surface(bsdf: Any) -> str:

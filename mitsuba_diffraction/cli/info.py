@@ -163,6 +163,7 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         **_periods(field),
         "window": width_reason(resolved(settings, [field]).width, [field]),
         "warnings": options.table_warnings(field, settings),
+        "limits": options.LIMITS,
     }
 
 

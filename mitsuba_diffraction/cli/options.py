@@ -30,6 +30,15 @@ WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 #: `--json` without a file, which only `info` has: printed instead of the text.
 STDOUT = Path("-")
 
+#: Limits of spectra from heights, for help and descriptions.
+LIMITS = (
+    "The model is light that one surface diffracts. Layers (beetles, butterflies' laminae, "
+    "feathers, nacre, iridophores), volumes (pigment cells, spongy keratin) and structures deeper "
+    "than a wavelength or steeper than 45° are not in a scan of heights. Where they make the "
+    "colour, measure the layers and use a multilayer or FDTD program; deep gratings: "
+    "'mitsuba-diffraction solve'."
+)
+
 #: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 

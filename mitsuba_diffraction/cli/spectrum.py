@@ -29,7 +29,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "directions in the plane of incidence, a white standard. Writes a CSV in per cent, `wl` "
         "in nm first and a column for each detector, as the R package pavo reads it, and a plot "
         "beside it. Several files are scans of one kind of surface: the CSV has their mean, "
-        "and a second file the standard errors.",
+        f"and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
     options.add_files(parser, "tables, recipes or heights of any format")
     options.add_output(
@@ -91,14 +91,13 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, check_material, mean_spectra
+    from ..analysis.spectra import Geometry, mean_spectra
     from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(args.detector)
     geometry = Geometry(args.light, detectors, args.light_azimuth, args.acceptance)
-    if args.material is not None:  # before its table is built
-        check_material(args.material, lam)
+    lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         spectra = mean_spectra([_measured(args, file, geometry, lam, bar) for file in files])
     save_csv(spectra, output)
@@ -129,6 +128,23 @@ def _wavelengths(args: argparse.Namespace) -> Any:
         args.parser.error("argument --wavelength-range: give the shortest first, e.g. 400 700")
     count = int((last - first) / args.step + 1e-9) + 1
     return first + args.step * np.arange(count)
+
+
+def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
+    """Return the wavelengths at which the material and the pigment are known.
+
+    Raises a DiffractionError if --wavelength-range names others, or there is no such material.
+    """
+    from ..analysis.spectra import check_material, known_range
+
+    if args.wavelength_range is None:
+        first, last = known_range(args.material, args.pigment)
+        known = lam[(lam >= first) & (lam <= last)]
+        if known.size and known.size < lam.size:
+            say(f"material or pigment are known from {known[0]:g} to {known[-1]:g} nm alone")
+            lam = known
+    check_material(args.material, lam, args.pigment)
+    return lam
 
 
 def _measured(

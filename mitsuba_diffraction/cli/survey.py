@@ -11,6 +11,7 @@ from typing import Any
 
 from ..scene.load import set_variant
 from . import options
+from .brdf_map import add_material, surface_parameters
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say
 from .options import number_between, whole_number
 from .report import check_writable, save_report
@@ -47,6 +48,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "those of one folder; default: name",
     )  # fmt: skip
     options.add_mode(parser)
+    add_material(parser.add_argument_group("the surface of the maps, by default R = 1"))
     options.add_heights(parser)
     options.add_table(parser.add_argument_group("the tables"))
     add_workers(parser)
@@ -96,5 +98,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
             args.files, args.output, treatments=treatments,
             common=Treatment(own_options, settings), variant=variant, theta=args.theta,
             resolution=args.resolution, threads=worker_threads(args), repeats=args.repeats,
+            surface=surface_parameters(args),
             client=client, progress=bar,
         )  # fmt: skip

@@ -120,6 +120,12 @@ def metal_tint(
     return np.asarray(fit / factors)
 
 
+def decode_srgb(encoded: ArrayLike) -> NDArray[np.float64]:
+    """Return linear sRGB from encoded values, both from 0 to 1 (IEC 61966-2-1)."""
+    values = np.asarray(encoded, np.float64)
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     """Encode linear sRGB for a display: clip to 0 to 1 and apply the transfer curve of sRGB."""
     return np.asarray(encoded_channel(np.asarray(linear, np.float64)))

@@ -19,6 +19,7 @@ support         features that go together, declared by each choice of a scene
 meshes          arrays of Mitsuba's meshes, of 3.9 and 3.10
 properties      words, flags and numbers from them, refused by name; what elements are called
 materials       material, coat and film
+pigment         pigment beneath a structure, of a colour or a measured spectrum
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
 factors         factors on heights and on lengths in the plane: numbers, textures, attributes

@@ -93,20 +93,23 @@ windows : float or string [none]
 
 The material
 ------------
-material : string
-    Name of a conductor, as in `roughconductor`; or `none`, which reflects all light.
+material : string or float
+    A tissue or a liquid, with its index over wavelength: `keratin`, `chitin`, `melanin`, `guanine`,
+    `water`; an index, `1.56` or `1.56+0.05i`; a conductor by symbol, as in `roughconductor`, or
+    plain name: `Au`, `gold`; or `none`, which reflects all light.
 eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin).
+    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
+    or names: `water`. The medium changes what is reflected; directions are those of light in air.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
-    a CD (1.58). Light is refracted into the layer and out again; its own face is a mirror of the
-    same coherence width. Light that the face sends back is summed as between two mirrors. Light
-    that leaves the structure beyond the critical angle is lost (docs/validation.md), so that a
-    coated surface never gains energy and is not scaled. The index over that of the medium above is
-    the differentiable parameter `coat_eta`.
+    a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
+    own face is a mirror of the same coherence width. Light that the face sends back is summed as
+    between two mirrors. Light that leaves the structure beyond the critical angle is lost
+    (docs/validation.md), so that a coated surface never gains energy and is not scaled. The index
+    over that of the medium above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
@@ -152,6 +155,9 @@ The light beneath
     BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected.
     Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; those of the
     nested BSDF follow.
+pigment : string or float [none]
+    Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
+    or a spectrum, a CSV of wavelengths in nm and reflectances. Beyond its ends it is constant.
 layering : string [transmission]
     Share of the light for the nested BSDF. `transmission`: T(ωi) T(ωo) with T = 1 − a and a the
     albedo of the diffracting surface; under a coat, the reflectance of both flat faces. `thesis`:

@@ -1,4 +1,4 @@
-"""Optical constants of conductors in Mitsuba's tables."""
+"""Optical constants over wavelength: conductors of Mitsuba's tables, and tissues."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..optics.colour import LONGEST, SHORTEST
+from ..optics.materials import METALS, TISSUES
 from .types import Texture
 
 Array = NDArray[Any]
@@ -19,13 +20,14 @@ Array = NDArray[Any]
 
 def unknown_conductor(material: str) -> str:
     """Return the message on an unknown conductor, with the names of known ones."""
-    names = _names()
-    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
-    listed = [name for name in names if name.lower() in close] or names
+    names = [*TISSUES, *_names()]
+    words = [name.lower() for name in (*names, *METALS)]
+    close = difflib.get_close_matches(material.lower(), words, 3, 0.6)
+    listed = [name for name in (*names, *METALS) if name.lower() in close] or names
     hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
     return (
-        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
-        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
+        f"material={material!r} is unknown{hint} Or give an index, e.g. 1.56 or 1.56+0.05i, or "
+        "none for R = 1"
     )
 
 
@@ -40,27 +42,41 @@ def _names() -> list[str]:
 
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
-    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = _file(material, "eta")
-    if not file.is_file():
+    """Return the first and the last wavelength, nm, of a material's table, if there is one."""
+    if material not in TISSUES and not _file(material, "eta").is_file():
         return None
     nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
 
 
 def tabulated_index(material: str) -> tuple[Array, Array]:
-    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
+    """Return wavelengths in nm and n + ik of a conductor or tissue, (n,) each.
 
     Raises
     ------
     DiffractionError
-        If Mitsuba has no such table.
+        If there is no table of that name.
     """
     if tabulated_range(material) is None:
         raise DiffractionError(unknown_conductor(material))
     nodes, eta = _table(material, "eta")
     k = tabulated(material, "k", nodes)
     return nodes, np.asarray(eta + 1j * k)
+
+
+def parameters_of(material: str) -> dict[str, Any]:
+    """Return a material as parameters of Mitsuba's BSDF `conductor`."""
+    tissue = TISSUES.get(material)
+    if tissue is None:
+        return {"material": material}
+    parts = {"eta": tissue.index(tissue.nodes).real, "k": tissue.index(tissue.nodes).imag}
+    pairs = {
+        name: list(zip(tissue.nodes.tolist(), part.tolist(), strict=True))
+        for name, part in parts.items()
+    }
+    spectra = {name: {"type": "spectrum", "value": values} for name, values in pairs.items()}
+    # Mitsuba refuses spectra that are 0 everywhere
+    return spectra if tissue.absorbs else spectra | {"k": {"type": "uniform", "value": 0.0}}
 
 
 def texture_at(material: str, name: str, wavelength: float) -> Texture:
@@ -84,12 +100,15 @@ def extended_texture(material: str, name: str) -> Texture:
 
 
 def tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
-    """Part of a material's index at wavelengths in nm, as Mitsuba has it tabulated."""
+    """Part of a material's index at wavelengths in nm, as it is tabulated."""
     return np.asarray(np.interp(wavelengths, *_table(material, name)))
 
 
 def _table(material: str, name: str) -> Array:
     """Wavelengths in nm and values of a part of a material's index, (2, n)."""
+    if tissue := TISSUES.get(material):
+        index = tissue.index(tissue.nodes)
+        return np.stack([tissue.nodes, index.real if name == "eta" else index.imag])
     return np.asarray(np.loadtxt(_file(material, name)).T)
 
 

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics import fresnel
 from ..optics.colour import LONGEST, SHORTEST, metal_tint
+from ..optics.materials import TISSUES
 from .conductors import (
     extended_texture,
+    parameters_of,
     tabulated,
     tabulated_range,
     texture_at,
@@ -238,6 +240,8 @@ class Conductor:
         self.eta: Texture = eta.thing
         self.k: Texture = k.thing
         self.name, self.changeable = name, (eta, k)
+        #: Whether light that is not reflected is absorbed, and none goes beneath.
+        self.absorbs = True
         self.medium: Dielectric | None = None  #: what lies above, if not air
         # of RGB's channels: the index over wavelengths, and as the channels have it
         self._spectrum: tuple[Array, Array] | None = None
@@ -246,13 +250,13 @@ class Conductor:
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
-        """Return one of Mitsuba's tabulated conductors, by the names that `roughconductor` accepts.
+        """Return a tissue, or one of Mitsuba's tabulated conductors, by its name in the tables.
 
         wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
 
         Raises a DiffractionError if the material is unknown, or its table is too short.
         """
-        objects = children(_load("conductor", material=material))
+        objects = children(_load("conductor", **parameters_of(material)))
         first, last = tabulated_range(material) or (SHORTEST, LONGEST)
         needed = (wavelength, wavelength) if mi.is_monochromatic else _REQUIRED
         if not first <= needed[0] <= needed[1] <= last:
@@ -267,6 +271,7 @@ class Conductor:
             objects = {name: extended_texture(material, name) for name in INDEX_PARTS}
         eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
         conductor = cls(eta, k, material)
+        conductor.absorbs = material not in TISSUES or TISSUES[material].absorbs
         if mi.is_rgb:
             index = tabulated(material, "eta", _VISIBLE) + 1j * tabulated(material, "k", _VISIBLE)
             conductor._spectrum = index, conductor._channels()
@@ -308,7 +313,7 @@ class Conductor:
         dr.make_opaque(self.tint)
 
     def __str__(self) -> str:
-        return f"conductor[{self.name}]"
+        return f"{'conductor' if self.absorbs else 'dielectric'}[{self.name}]"
 
 
 Reflectance = Perfect | Dielectric | Conductor
@@ -329,7 +334,7 @@ def tinted(value: Spectrum, material: object) -> Spectrum:
     return mi.Spectrum([[of_channels(value[i, j]) for j in range(4)] for i in range(4)])
 
 
-def _load(plugin: str, **parameters: float | str) -> BSDF:
+def _load(plugin: str, **parameters: Any) -> BSDF:
     """Load one of Mitsuba's own BSDFs, which know the names of materials."""
     try:
         return mi.load_dict({"type": plugin, **parameters})
@@ -337,7 +342,7 @@ def _load(plugin: str, **parameters: float | str) -> BSDF:
         arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
         if plugin == "conductor":
-            raise DiffractionError(unknown_conductor(str(parameters["material"]))) from error
+            raise DiffractionError(unknown_conductor(str(parameters.get("material")))) from error
         raise DiffractionError(
             f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
             "name from Mitsuba's table of materials, or eta and k"

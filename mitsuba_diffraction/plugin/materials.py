@@ -8,11 +8,12 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError, warn
+from ..optics.materials import PERFECT, material_named
 from ..tables.table import DiffractionTable
 from .fresnel import INDEX_PARTS, Conductor, Dielectric, Perfect, Reflectance
 from .layers import UnderFilm
 from .parameter_changes import ObjectValues
-from .properties import number
+from .properties import kind_of, number
 from .surface_parameters import DEFAULT_WAVELENGTH, read_index
 from .types import Properties
 
@@ -26,7 +27,7 @@ ROUGH = 65.0
 def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
     """Read the structure's material: conductor, perfect mirror or dielectric, in air or a coat."""
     conductor = [n for n in ("material", "eta", "k") if n in props]
-    dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
+    dielectric = [n for n in ("int_ior",) if n in props]
     if conductor and dielectric:
         raise DiffractionError(
             f"{conductor[0]} makes a conductor and {dielectric[0]} a dielectric; give one of them"
@@ -34,20 +35,55 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
     if "material" in conductor and len(conductor) > 1:
         raise DiffractionError("material and eta, k both say what the conductor is; give one")
     if "material" in conductor:
-        material = str(props.get("material"))
-        if material == "none":
-            return Perfect()
-        metal = Conductor.of_material(material, number(props, "wavelength", DEFAULT_WAVELENGTH))
-        metal.medium = coat
-        return metal
+        return _named(props, coat)
     if conductor:
         if len(conductor) == 1:
             raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
         metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
-        metal.medium = coat
+        metal.medium = _medium(props, coat)
         return metal
+    return _dielectric(props, read_index(props, "int_ior", KERATIN), coat)
+
+
+def _named(props: Properties, coat: Dielectric | None) -> Reflectance:
+    """Read the parameter `material`: a name or an index (`optics.materials`)."""
+    value = props.get("material")
+    if not isinstance(value, str | int | float):
+        raise DiffractionError(f"material={kind_of(value)} must be a name or an index")
+    material = material_named(value)
+    if material == PERFECT:
+        return Perfect()
+    if isinstance(material, complex):
+        if not material.imag:
+            return _dielectric(props, material.real, coat)
+        parts = zip(INDEX_PARTS, (material.real, material.imag), strict=True)
+        eta, k = (
+            ObjectValues(n, mi.load_dict({"type": "uniform", "value": x}), INDEX_PARTS[n])
+            for n, x in parts
+        )
+        metal = Conductor(eta, k, f"n = {material.real:g} + {material.imag:g}i")
+    else:
+        metal = Conductor.of_material(material, number(props, "wavelength", DEFAULT_WAVELENGTH))
+    metal.medium = _medium(props, coat)
+    return metal
+
+
+def _dielectric(props: Properties, index: float | str, coat: Dielectric | None) -> Dielectric:
+    """Dielectric in the medium above it, or in a coat."""
     name, default = ("ext_ior", AIR) if coat is None else ("coat_ior", 1.0)
-    return Dielectric(read_index(props, "int_ior", KERATIN), read_index(props, name, default))
+    return Dielectric(index, read_index(props, name, default))
+
+
+def _medium(props: Properties, coat: Dielectric | None) -> Dielectric | None:
+    """Return what an index over wavelength is relative to: the coat, a medium, or None in air."""
+    if "ext_ior" not in props:
+        return coat
+    if coat is not None:
+        raise DiffractionError(
+            "ext_ior and coat_ior over a material with an index over wavelength: only one medium "
+            "can be above it; leave ext_ior out"
+        )
+    return Dielectric(read_index(props, "ext_ior"), 1.0, "ext_eta")
 
 
 def coat_of(props: Properties) -> Dielectric | None:

@@ -29,6 +29,9 @@ from .surface_parameters import (
 )
 from .types import BSDF, Properties
 
+#: Layers, pigment and medium that "none" leaves out.
+OPTIONAL = ("coat_ior", "film_ior", "ext_ior", "pigment")
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -66,6 +69,9 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     DiffractionError
         With the parameter, its value and the choices.
     """
+    for name in OPTIONAL:  # so that a scene can have a parameter for them
+        if name in props and props.get(name) == "none":
+            del props[name]
     nested = nested_of(props, REFLECTING)
     coat = coat_of(props)
     material = material_of(props, coat)
@@ -114,7 +120,8 @@ def _model(props: Properties, material: Reflectance) -> str:
 def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
     """Features that a scene asks for, as messages call them."""
     if nested is not None:
-        yield "nested", f"the nested BSDF {kind_of(nested)}"
+        pigment = "pigment" in props
+        yield "nested", "the pigment" if pigment else f"the nested BSDF {kind_of(nested)}"
     if (model := props.get("model", "kirchhoff")) != "kirchhoff":
         yield "index", f"model='{model}'"
     if props.get("layering", "") == "thesis":
@@ -133,7 +140,7 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
     if isinstance(material, Perfect):
         yield support.MIRROR
     elif isinstance(material, Conductor):
-        yield support.CONDUCTOR
+        yield support.CONDUCTOR if material.absorbs else support.DISPERSIVE
     elif float(dr.slice(material.eta)) < 1.0:
         yield support.RARER
     if "coat_ior" in props:

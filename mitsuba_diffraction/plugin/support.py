@@ -44,6 +44,7 @@ MIRROR = Support(
     index=False, second_order=False, coat=False, film=False, nested=False,
 )  # fmt: skip
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
+DISPERSIVE = Support("a material whose index varies with the wavelength", second_order=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
 COAT = Support("coat_ior", energy=False, film=False, thesis=False)
 FILM = Support("a thin film (film_ior)", second_order=False, coat=False, thesis=False)

@@ -15,11 +15,13 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
+from ..optics.materials import index_at_sodium
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .dictionary import ORDERS, PLUGINS
 from .factors import HEIGHT, LATERAL, LateralScale, VaryingFactor, largest_of, read_factor
 from .llvm import require_loaded_llvm
+from .pigment import pigment_bsdf
 from .properties import choice, flag, kind_of, number
 from .sources import (
     Factors,
@@ -59,7 +61,9 @@ _COMMON = (
     "wavelength",
     "energy_conserving",
 )
-_LAYERS = ("coat_ior", "film_ior", "film_k", "film_thickness", "layering", "diffuse_weight")
+_LAYERS = (
+    "coat_ior", "film_ior", "film_k", "film_thickness", "layering", "diffuse_weight", "pigment",
+)  # fmt: skip
 REFLECTING, TRANSMITTING = PLUGINS
 #: Names of the parameters of each plugin.
 NAMES: Mapping[str, tuple[str, ...]] = {
@@ -145,7 +149,7 @@ def read_surface(
 
 
 def nested_of(props: Properties, plugin: str) -> BSDF | None:
-    """Return the nested BSDF, or None; refuse parameters that the plugin does not have.
+    """Return the nested BSDF or pigment, or None; refuse parameters that the plugin lacks.
 
     Raises
     ------
@@ -162,6 +166,12 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
         if name not in (*NAMES[plugin], *nested, "id"):
             raise DiffractionError(_unknown(name, plugin))
     bsdf = next(iter(nested.values()), None)
+    if "pigment" in props:
+        if bsdf is not None:
+            raise DiffractionError(
+                f"pigment and the nested BSDF {kind_of(bsdf)} both lie beneath; give one of them"
+            )
+        return pigment_bsdf(props.get("pigment"))
     if bsdf is not None and bsdf.flags() & mi.BSDFFlags.Transmission:
         raise DiffractionError(
             f"the nested BSDF {kind_of(bsdf)} lets light through, which would be lost beneath; "
@@ -176,7 +186,7 @@ def coherence_of(props: Properties) -> str:
 
 
 def read_index(props: Properties, name: str, default: float = 1.0) -> float | str:
-    """Return a refractive index, or the name of a medium that Mitsuba knows.
+    """Return a refractive index, that of a tissue too, or a medium that Mitsuba knows by name.
 
     Raises
     ------
@@ -185,7 +195,9 @@ def read_index(props: Properties, name: str, default: float = 1.0) -> float | st
     """
     value = props.get(name, default)
     if isinstance(value, str):
-        return value
+        value = index_at_sodium(value, name)
+        if isinstance(value, str):
+            return value
     if not (isinstance(value, int | float) and math.isfinite(value) and value >= 1.0):
         raise DiffractionError(
             f"{name}={value} must be a refractive index of at least 1, or a name"

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
 from ..tables.orders import OrderTable
 from ..tables.orders.file import is_order_table
@@ -28,7 +29,7 @@ MATERIAL = "material:"
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
 # With one of these the surface is opaque, and nothing lies beneath it.
-_CONDUCTORS = ("material", "eta", "k")
+_CONDUCTORS = ("eta", "k")
 
 
 class SceneValues(NamedTuple):
@@ -199,7 +200,8 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
         old = state.nodes[beneath].props
         if old.plugin_name().startswith("diffraction") and "orientation" in old:
             props["orientation"] = old["orientation"]
-    opaque = solved or plugin == TRANSMITTING or set(names) & set(_CONDUCTORS)
+    opaque = solved or plugin == TRANSMITTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = opaque or not lets_light_through(values.get("material", "keratin"))
     if beneath is not None and not opaque:
         props["beneath"] = mi.Properties.ResolvedReference(beneath)
     return props

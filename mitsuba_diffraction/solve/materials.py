@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError
+from ..optics.materials import PERFECT, material_named
 from ..plugin.conductors import tabulated_index
-
-#: Name of the perfect conductor, as in the BSDF `diffraction`.
-PERFECT = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class Material:
 def material_of(
     material: str | float | complex | Material, wavelengths: tuple[float, float]
 ) -> Material:
-    """Return a material from a name that Mitsuba knows, an index, or "none" (R = 1).
+    """Return a material from a name of `optics.materials`, an index, or "none" (R = 1).
 
     Parameters
     ----------
@@ -57,27 +55,17 @@ def material_of(
     """
     if isinstance(material, Material):
         return material
-    if material == PERFECT:
+    number = material_named(material)
+    if number == PERFECT:
         return Material("perfect conductor", np.array([0.0]), None)
-    try:
-        number = (
-            complex(material.replace(" ", "").replace("i", "j"))
-            if isinstance(material, str)
-            else complex(material)
-        )
-    except ValueError:
-        nodes, values = tabulated_index(str(material))
+    if isinstance(number, str):
+        nodes, values = tabulated_index(number)
         low, high = wavelengths
         if low < nodes[0] or high > nodes[-1]:
             raise DiffractionError(
                 f"material={material!r} is tabulated from {nodes[0]:.0f} to {nodes[-1]:.0f} nm, "
                 f"and the wavelengths are {low:g} to {high:g} nm; choose wavelengths within, or "
                 "give the index as a number"
-            ) from None
-        return Material(str(material), nodes, values)
-    if not (0.01 <= number.real <= 100 and 0 <= number.imag <= 100):
-        raise DiffractionError(
-            f"material={quoted(material)}: an index is n + ik with n from 0.01 to 100 and k from 0 "
-            "to 100, such as 1.5 or 0.65+5.6j"
-        )
+            )
+        return Material(number, nodes, values)
     return Material(f"index {number.real:g}+{number.imag:g}i", np.array([0.0]), np.array([number]))

@@ -65,7 +65,7 @@ def test_the_error_compares_with_new_solutions(table):
         (lambda: Profile(np.array([0, np.nan]), np.zeros(2), 1.0), "finite"),
         (lambda: Profile(LOOP[0], LOOP[1], 1.0), "cross"),
         (lambda: Profile(SPIKE[0], SPIKE[1], 1.0), "turns back"),
-        (lambda: md.solve_orders(PROFILE, "Unobtainium"), "no conductor"),
+        (lambda: md.solve_orders(PROFILE, "Unobtainium"), "is unknown"),
         (lambda: md.solve_orders(PROFILE, "-1"), "index"),
         (lambda: md.solve_orders(PROFILE, "Al", settings=Settings((50.0, 700.0))), "nm"),
         (lambda: Settings(tolerance=2.0), "tolerance"),

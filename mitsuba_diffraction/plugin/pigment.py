@@ -1,0 +1,133 @@
+"""Pigment beneath a structure: a diffuse BSDF of a colour or a measured spectrum."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError, quoted
+from ..files import read_text
+from ..optics.colour import decode_srgb
+from .types import BSDF
+
+#: Wavelengths that a measured reflectance has to cover, nm; beyond its ends it is constant.
+REQUIRED = (400.0, 700.0)
+#: Suffixes of measured spectra.
+SPECTRA = (".csv", ".txt", ".tsv")
+
+# Wavelengths, nm, to which a spectrum is continued at either end.
+_ENDS = (100.0, 10000.0)
+
+
+def pigment_bsdf(text: str | float) -> BSDF:
+    """Return a diffuse BSDF of a pigment.
+
+    text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
+        "sienna", or a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
+        cent.
+
+    Raises
+    ------
+    DiffractionError
+        If the text is none of these, or the spectrum is not one or ends within 400 to 700 nm.
+    """
+    return mi.load_dict({"type": "diffuse", "reflectance": _reflectance(str(text))})
+
+
+def pigment_range(text: str | float | None) -> tuple[float, float]:
+    """Return the wavelengths, nm, between which a pigment is known; without limits of a colour."""
+    if text is None or Path(str(text)).suffix.lower() not in SPECTRA:
+        return 0.0, math.inf
+    lam, _ = read_reflectance(str(text))
+    return float(lam[0]), float(lam[-1])
+
+
+def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read wavelengths (n,) in nm and reflectances (n,) from 0 to 1 from a file of two columns.
+
+    A header is skipped; numbers are separated by commas, semicolons, tabs or spaces.
+
+    Raises
+    ------
+    DiffractionError
+        If the file has no such columns, or its reflectances are out of range.
+    """
+    rows = []
+    for line in read_text(path).splitlines():
+        cells = next(csv.reader([line.replace(";", ",").replace("\t", ",")]), [])
+        cells = cells if len(cells) > 1 else line.split()
+        try:
+            rows.append((float(cells[0]), float(cells[1])))
+        except (ValueError, IndexError):
+            if rows and line.strip():
+                raise DiffractionError(
+                    f"'{path}': {quoted(line)} is no wavelength and reflectance"
+                ) from None
+    table = np.array(sorted(rows)).reshape(-1, 2)
+    lam, value = table[:, 0], table[:, 1]
+    if len(lam) < 2 or not np.isfinite(table).all() or not np.all(np.diff(lam) > 0.0):
+        raise DiffractionError(
+            f"'{path}' is no spectrum: give two columns, wavelengths in nm, each once, and "
+            "reflectances from 0 to 1 or in per cent"
+        )
+    if value.max() > 1.0:
+        value = value / 100.0
+    if not 0.0 <= value.min() <= value.max() <= 1.0:
+        raise DiffractionError(
+            f"'{path}': reflectances are {table[:, 1].min():g} to {table[:, 1].max():g}; a "
+            "pigment's are from 0 to 1, or from 0 to 100 per cent"
+        )
+    return lam, value
+
+
+def _reflectance(text: str) -> dict[str, Any]:
+    """Return a reflectance as Mitsuba's dictionary of a spectrum."""
+    if Path(text).suffix.lower() in SPECTRA:
+        lam, value = read_reflectance(text)
+        if lam[0] > REQUIRED[0] or lam[-1] < REQUIRED[1]:
+            raise DiffractionError(
+                f"pigment='{text}' is known from {lam[0]:g} to {lam[-1]:g} nm, and light from "
+                f"{REQUIRED[0]:g} to {REQUIRED[1]:g} nm needs it; give a longer spectrum"
+            )
+        lam = np.array([_ENDS[0], *lam, _ENDS[1]])
+        value = np.array([value[0], *value, value[-1]])
+        if not value.any():
+            return {"type": "uniform", "value": 0.0}
+        pairs = list(zip(lam.tolist(), value.tolist(), strict=True))
+        return {"type": "spectrum", "value": pairs}
+    colour = _colour(text)
+    if len(set(colour)) == 1:
+        return {"type": "uniform", "value": colour[0]}
+    return {"type": "rgb", "value": colour}
+
+
+def _colour(text: str) -> list[float]:
+    """Return the linear sRGB values of a number, three of them, or a colour of CSS."""
+    try:
+        numbers = [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        numbers = _css(text)
+    if len(numbers) == 1:
+        numbers *= 3
+    if len(numbers) != 3 or not all(0.0 <= number <= 1.0 for number in numbers):
+        raise DiffractionError(
+            f"pigment={quoted(text)} is no colour: give a grey from 0 to 1, 'r,g,b', '#804020', a "
+            f"name of CSS such as sienna, or a spectrum ({', '.join(SPECTRA)})"
+        )
+    return numbers
+
+
+def _css(text: str) -> list[float]:
+    from matplotlib.colors import to_rgb
+
+    try:
+        encoded = np.array(to_rgb(text.strip()))
+    except ValueError:
+        return []
+    return [float(x) for x in decode_srgb(encoded)]
