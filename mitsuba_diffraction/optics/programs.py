@@ -37,10 +37,14 @@ from .symbols import (
 
 @dataclass
 class Program:
-    """Functions in a dialect, those that a function calls before it."""
+    """Functions in a dialect, those that a function calls before it.
+
+    complex_numbers : whether a function has complex numbers; their operations then come first.
+    """
 
     dialect: Dialect
     functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
+    complex_numbers: bool = False
 
     def add(
         self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
@@ -107,7 +111,9 @@ class Program:
     @property
     def text(self) -> str:
         """Source of all functions."""
-        return "\n".join(function.text for function in self.functions.values())
+        texts = [function.text for function in self.functions.values()]
+        prelude = [self.dialect.prelude] if self.complex_numbers else []
+        return "\n".join([*prelude, *texts])
 
 
 class Scope:
@@ -125,6 +131,7 @@ class Scope:
         """Return the symbol of an expression, which may be known already."""
         key = (kind, operation, *(id(p) if isinstance(p, Symbol) else p for p in parts))
         if key not in self.expressions:
+            self.program.complex_numbers |= kind == "complex"
             self._check(parts)
             self.expressions[key] = symbol = Symbol(kind, operation, parts, self)
             self.order.append(symbol)
