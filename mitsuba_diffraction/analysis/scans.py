@@ -19,6 +19,7 @@ from ..heights.recipes import Recipe
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.build.build import build_with
+from ..tables.orders import OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
@@ -64,8 +65,8 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
         return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
-def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
-    """Return the BSDF `diffraction` of a table in the variant that is set.
+def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
+    """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
 
@@ -74,11 +75,13 @@ def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
+    from ..plugin.orders.sheet import diffraction_orders
 
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "table.exr"
+        solved = isinstance(table, OrderTable)
+        file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
-        props = mi.Properties("diffraction")
+        props = mi.Properties("diffraction_orders" if solved else "diffraction")
         for name, value in {"table": str(file), **parameters}.items():
             props[name] = value
-        return Diffraction(props)
+        return diffraction_orders(props) if solved else Diffraction(props)

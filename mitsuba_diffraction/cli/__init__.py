@@ -7,6 +7,7 @@ precompute             from heights to a table
 info                   what is in a file
 tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
+orders                 efficiencies of solved orders as a CSV
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 tonemap                a linear EXR to a PNG

@@ -18,6 +18,7 @@ from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Geometry, Spectra
+    from ..tables.orders import OrderTable
 
 _RANGE = (300.0, 830.0)
 
@@ -31,7 +32,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "beside it. Several files are scans of one kind of surface: the CSV has their mean, "
         f"and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
-    options.add_files(parser, "tables, recipes or heights of any format")
+    options.add_files(parser, "tables, also of orders, recipes or heights of any format")
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
         "folder", ".csv",
@@ -156,17 +157,22 @@ def _measured(
     from ..heights.load import notes_line
     from ..optics.colour import LONGEST, SHORTEST
     from ..tables.exr import is_table
+    from ..tables.orders import OrderTable
+    from ..tables.orders.file import is_order_table
     from ..tables.store import loaded_table
 
-    if is_table(file):
+    solved = is_order_table(file)
+    if solved or is_table(file):
         names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
         names = [name for name in names if name != "--wavelength-range"]
         if refused := [*options.used_heights_options(args), *names]:
             raise DiffractionError(
                 f"'{file}' is a table, which has its own; leave {refused[0]} out"
             )
-        table = loaded_table(file)
-        if args.wavelength_range is None:
+        table = OrderTable.load(file) if solved else loaded_table(file)
+        if isinstance(table, OrderTable):
+            lam = _within(table, lam, file)
+        elif args.wavelength_range is None:
             lam = lam[lam >= table.wavelength_range[0]]
     else:
         # Mitsuba loads no table that begins later than the light that it renders
@@ -182,3 +188,20 @@ def _measured(
         geometry.light, geometry.detectors, light_azimuth=geometry.azimuth,
         acceptance=geometry.acceptance, relative=args.relative, wavelengths=lam, progress=bar,
     )  # fmt: skip
+
+
+def _within(table: OrderTable, lam: Any, file: Path) -> Any:
+    """Return the wavelengths that a table of orders has.
+
+    Raises a DiffractionError if it has none of them.
+    """
+    low, high = table.wavelengths
+    inside = lam[(lam >= low) & (lam <= high)]
+    if not len(inside):
+        raise DiffractionError(
+            f"'{file}' has orders of {low:g} to {high:g} nm, and none of {lam[0]:g} to "
+            f"{lam[-1]:g} nm; choose others by --wavelength-range"
+        )
+    if len(inside) < len(lam):
+        say(f"'{file}' has orders of {low:g} to {high:g} nm: other wavelengths are left out")
+    return inside

@@ -112,7 +112,7 @@ def interpolation_error(table: OrderTable, texture: OrderTexture) -> Error:
 
 def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float | int]:
     """Return the constants of `shaders/orders.osl`; lengths in nm but for PERIOD, µm."""
-    low, high = table.wavelengths
+    (low, high), (least, most) = table.wavelengths, table.reach
     height, width = texture.pixels.shape[:2]
     return {
         "PERIOD": table.period,
@@ -121,6 +121,8 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
         "LEAST_C": least_c(table.superstrate),
         "LOW": low,
         "HIGH": high,
+        "LEAST_LIT": least,
+        "MOST_LIT": most,
         "BANDS": table.last_band + 1,
         "TAU": texture.counts.tau,
         "RHO": texture.counts.rho,

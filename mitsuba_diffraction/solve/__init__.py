@@ -5,6 +5,7 @@ Contents
 orders      `solve_orders`: from a profile and a material to a table
 measured    `read_orders`: from efficiencies that were solved or measured elsewhere
 efficiencies  files of efficiencies, CSV and NetCDF, and their conventions
+listing     `list_orders`: a table's efficiencies as such a file
 profiles    one period of the grooves as a polygon; generators and a reader
 materials   refractive index over wavelength, by name or number
 stations    sets of directions with one system matrix

@@ -37,7 +37,7 @@ from .stations import Real
 
 AXES = ("wavelength", "theta", "phi", "order")
 REFLECTED, TRANSMITTED = ("R_s", "R_p"), ("T_s", "T_p")
-_COLUMNS = ("wavelength_nm", "theta_deg", "phi_deg", "order")
+CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
 #: Bytes of a CSV at most: two million lines. NetCDF files may be larger.
@@ -119,11 +119,11 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
     reader = csv.reader(text.splitlines(), delimiter=delimiter)
     names = [name.strip() for name in first.split(delimiter)]
     kinds = _kinds(names, shown, "column")
-    axes = [name for name in _COLUMNS if name != "phi_deg" or name in names]
+    axes = [name for name in CSV_AXES if name != "phi_deg" or name in names]
     if missing := [name for name in axes if name not in names]:
         raise DiffractionError(
             f"{shown} has no column {missing[0]}; the first line must name "
-            f"{', '.join((*_COLUMNS, *kinds))}"
+            f"{', '.join((*CSV_AXES, *kinds))}"
         )
     columns = [names.index(name) for name in (*axes, *kinds)]
     try:
@@ -282,17 +282,29 @@ def _variable(dimensions: Any, values: Any, attributes: Any) -> Variable:
 def _check_axes(axes: Sequence[Real], shown: str) -> None:
     """Refuse numbers that are no wavelengths in nm, angles in degrees, or orders; as `AXES`."""
     wavelengths, theta, phi, orders = axes
+    check_light(wavelengths, theta, phi, shown)
+    whole = (orders == np.round(orders)) & (np.abs(orders) <= 2 * MOST_BANDS)
+    _check_all("order", orders, whole, f"a whole number of at most {2 * MOST_BANDS}", shown)
+
+
+def check_light(wavelengths: Real, theta: Real, phi: Real, shown: str) -> None:
+    """Refuse numbers that are no wavelengths in nm, or angles in degrees.
+
+    shown : source of the numbers, for the message.
+    """
     low, high = WAVELENGTHS
     for name, numbers, allowed, hint in (
         ("wavelength", wavelengths, (wavelengths >= low) & (wavelengths <= high),
          f"{low:g} to {high:g} nm; is the unit right?"),
         ("theta", theta, np.abs(theta) < 90, "between -90° and 90°"),
         ("phi", phi, np.abs(phi) <= 360, "-360° to 360°"),
-        ("order", orders, (orders == np.round(orders)) & (np.abs(orders) <= 2 * MOST_BANDS),
-         f"a whole number of at most {2 * MOST_BANDS}"),
     ):  # fmt: skip
-        if not allowed.all():  # NaN is not allowed either
-            raise DiffractionError(f"{shown}: {name} {numbers[~allowed][0]:g} must be {hint}")
+        _check_all(name, numbers, allowed, hint, shown)
+
+
+def _check_all(name: str, numbers: Real, allowed: NDArray[np.bool_], hint: str, shown: str) -> None:
+    if not allowed.all():  # NaN is not allowed either
+        raise DiffractionError(f"{shown}: {name} {numbers[~allowed][0]:g} must be {hint}")
 
 
 def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:

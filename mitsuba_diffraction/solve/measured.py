@@ -14,7 +14,7 @@ from scipy.spatial import QhullError
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, OrderTable, cells
-from ..tables.orders.table import LARGEST_SUM, Counts, check_outline
+from ..tables.orders.table import LARGEST_SUM, S_AND_P, Counts, check_outline
 from .efficiencies import ROUNDING, Efficiencies, read_efficiencies
 from .stations import Real
 
@@ -111,7 +111,7 @@ def read_orders(
     header: dict[str, Any] = {
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
     }  # fmt: skip
-    table = OrderTable(period, wavelengths, bands, superstrate, header, thin)
+    table = OrderTable(period, wavelengths, bands, superstrate, header, thin, S_AND_P)
     header |= _errors(table, samples)
     if not incomplete and header["reciprocity_error"] > _ONE_WAY:
         warn(

@@ -24,3 +24,24 @@ def test_maps_show_a_table_of_orders(run, tmp_path, monkeypatch):
     refused = run("brdf-map", "grating.nc", "--material", "Al", *flags)
     assert refused.code != 0
     assert "'material' is a parameter of the plugin 'diffraction'" in refused.err
+
+
+def test_orders_are_listed_as_import_reads_them(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    thin_grating(0.6, counts=(2, 2, 1), wavelengths=(500.0, 640.0)).save("grating.nc")
+    assert run("orders", "grating.nc", "--theta=-80:80:10", "--step", 70).code == 0
+    flags = ("--import", "--period", 0.6, "-o", "back.nc")
+    assert run("solve", "grating.csv", *flags).code == 0
+    assert "rising" in run("orders", "grating.nc", "--theta", "80:0:10").err
+    assert "500 to 640 nm" in run("orders", "grating.nc", "--wavelength", "450").err
+
+
+def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    thin_grating(0.6, counts=(2, 2, 1), wavelengths=(420.0, 680.0)).save("grating.nc")
+    assert run("spectrum", "grating.nc", "--step", 40, "--relative", "none").code == 0
+    lines = (tmp_path / "grating-spectrum.csv").read_text().split()
+    first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
+    assert 420 <= first < last <= 680
+    refused = run("spectrum", "grating.nc", "--wavelength-range", 300, 400)
+    assert "420 to 680 nm" in refused.err

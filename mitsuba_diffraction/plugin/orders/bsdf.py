@@ -30,8 +30,9 @@ The table's clear layer (superstrate) is a coat with a flat face: a mirror of th
 width. Light that the face sends back to the grating is summed over all orders and reflections, in
 powers. RGB variants sum f over daylight. Polarised variants have the Mueller matrices of a table of
 `solve --polarised`; with another table they depolarise the light, and warn once. Wavelengths
-outside the table have the efficiencies of the nearest in it. f is reciprocal as far as the table
-is, at the centres of lobes.
+outside the table by less than a tenth of an octave have the efficiencies of the nearest in it;
+other light is not reflected, which is warned of where it is visible. f is reciprocal as far as the
+table is, at the centres of lobes.
 
 A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
 normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
@@ -63,6 +64,7 @@ import mitsuba as mi
 
 from ...errors import warn
 from ...optics.geometry import sigma_of
+from ...tables.orders import OrderTable
 from .. import nesting
 from ..description import Nested, Surface
 from ..directions import Pair, PatchFrame
@@ -119,6 +121,7 @@ class DiffractionOrders(mi.BSDF):
         self.m_flags = nesting.flags_of(components)
         if mi.is_polarized and not self.table.polarised:
             _warn_of_polarisation()
+        _warn_of_wavelengths(self.table)
         check_parameters([self])
         self.derive()
 
@@ -252,7 +255,20 @@ def _lobes_of(read: Parameters) -> Lobes:
     return kind(read.table, read.coherence_width, read.wavelength)
 
 
+#: Visible wavelengths, nm, that a table should reach: eyes see less than 1 % of daylight beyond.
+_SEEN = (410.0, 690.0)
 _warned: list[bool] = []
+
+
+def _warn_of_wavelengths(table: OrderTable) -> None:
+    """Warn of visible light that a table does not reflect."""
+    least, most = table.reach
+    if not mi.is_monochromatic and (least > _SEEN[0] or most < _SEEN[1]):
+        low, high = table.wavelengths
+        warn(
+            f"this table of orders is of {low:g} to {high:g} nm: it reflects no light below "
+            f"{least:.0f} and above {most:.0f} nm; solve it with a wider --wavelength-range"
+        )
 
 
 def _warn_of_polarisation() -> None:

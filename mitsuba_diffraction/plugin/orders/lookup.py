@@ -38,7 +38,7 @@ class Row:
     start : record of port 0.
     channel : j of the incident light.
     channels : number of channels of a side.
-    weights : of the eight corners of a cell.
+    weights : of the eight corners of a cell; 0 beyond the table's wavelengths.
     incident, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
     """
@@ -94,7 +94,7 @@ class OrderLookup:
         self._values = upload(mi.Float16, records.values)
         self._period = 1e3 * table.optical_period
         self._last = float(table.last_band)
-        self._ends = table.wavelengths
+        self._ends, self._reach = table.wavelengths, table.reach
         self._steps = 1e-3 / table.period
         self.index, self._least_c = table.superstrate, least_c(table.superstrate)
         self._parts = records.values.shape[1] // 8
@@ -123,7 +123,8 @@ class OrderLookup:
         ]  # fmt: skip
         kind = mi.UInt32(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
         channels = mi.UInt32(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
-        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
+        lit = (vacuum >= self._reach[0]) & (vacuum <= self._reach[1])
+        cell, weights = mi.UInt32(0), [dr.select(lit, mi.Float(1.0), 0.0)]
         for coordinate, count in zip(places, self._cells, strict=True):
             position = coordinate * float(count)
             lower = index_between(dr.floor(position), 0.0, count - 1.0)
@@ -139,8 +140,8 @@ class OrderLookup:
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
-        lit = mi.UInt32(channel), channels, weights, incident, vacuum, face
-        return Row(kind, cell, start, *lit)
+        light = mi.UInt32(channel), channels, weights, incident, vacuum, face
+        return Row(kind, cell, start, *light)
 
     @staticmethod
     def port(

@@ -122,6 +122,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
             "period": table.period,
             "superstrate": table.superstrate,
             "solved_range": (1e-3 * low, 1e-3 * high),
+            "solved_reach": tuple(1e-3 * end for end in table.reach),
         },
         {"ORDERS": "", **({} if table.superstrate == 1.0 else {"FACE": ""})},
     )
@@ -158,12 +159,13 @@ def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
     daylight = np.diff(daylight_weights(sigma, table.period).cumulative)
     lam = ENDS[0] + (np.arange(len(daylight)) + 0.5) * (ENDS[1] - ENDS[0]) / len(daylight)
     some = np.linspace(*ENDS, _WAVELENGTHS)
+    lit = (some >= table.reach[0]) & (some <= table.reach[1])
     deviation = 1e-3 * lam / (2.0 * np.pi * np.sqrt(2.0) * sigma)
     around = np.linspace(-np.pi, np.pi, AZIMUTHS + 1)  # edges of azimuths
 
     def power(order: int) -> Array:
         """Return the mean efficiency at all wavelengths, as bright as these are."""
-        efficiency = table.efficiency(x, y, some, order)
+        efficiency = lit * table.efficiency(x, y, np.clip(some, *table.reach), order)
         mean = (through[:, None] * efficiency).mean(axis=0)
         if order == 0:
             mean = mean + (1.0 - through).mean()

@@ -15,7 +15,7 @@ file        tables as NetCDF files
 from __future__ import annotations
 
 from .file import load_orders, save_orders
-from .lookup import efficiency, mueller, polarised_efficiency
+from .lookup import efficiency, groove_efficiency, mueller, polarised_efficiency
 from .table import Band, OrderTable
 
 __all__ = ["Band", "OrderTable"]
@@ -23,6 +23,7 @@ __all__ = ["Band", "OrderTable"]
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency
 OrderTable.polarised_efficiency = polarised_efficiency
+OrderTable.groove_efficiency = groove_efficiency
 OrderTable.mueller = mueller
 OrderTable.load = staticmethod(load_orders)
 OrderTable.save = save_orders

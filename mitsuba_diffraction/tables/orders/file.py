@@ -1,12 +1,13 @@
 """Tables of orders as NetCDF files (classic format), which most programs read.
 
 The variable `kind_a_K` holds kind A of band K, with the dimensions `tau_K`, `rho_K`, `w_K`, `j`,
-`q` and `polarisation` (s, p) of `Band.a`; `kind_b_K` holds kind B. The Mueller matrices of a
+`q` and `polarisation` of `Band.a`; `kind_b_K` holds kind B. The Mueller matrices of a
 polarised table are `mueller_a_K` and `mueller_b_K`, with `row` and `column` for `polarisation`.
 Numbers are packed in 16 bits, as the CF conventions have it: efficiency = scale_factor × number.
 Global attributes hold the rest: `period` (µm), `wavelengths` (nm, in vacuum), `superstrate`
-(index), `thin` (1 for a sheet, whose `j` and `q` are ports of `cells`; else left out), `header`
-(JSON), `version`, and `sha256` of all of these and the numbers.
+(index), `thin` (1 for a sheet, whose `j` and `q` are ports of `cells`; else left out), `components`
+(of `polarisation`, "s and p" of imported efficiencies; else left out), `header` (JSON), `version`,
+and `sha256` of all of these and the numbers.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import read_bytes, readable_file
 from ..exr import is_table
-from .table import MOST_NUMBERS, Band, OrderTable
+from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever what the numbers mean changes; files of another version are refused.
 FORMAT_VERSION = 1
@@ -74,8 +75,10 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         file.header = header
         if table.thin:
             file.thin = np.int32(1)
+        if table.components != GROOVES:
+            file.components = table.components
         outline = (table.period, tuple(table.wavelengths), table.superstrate, header)
-        file.sha256 = _checksum(outline, table.thin, packed)
+        file.sha256 = _checksum(outline, table.thin, table.components, packed)
         file.createDimension("polarisation", 2)
         if table.polarised:
             file.createDimension("row", 4)
@@ -153,13 +156,14 @@ def _table(file: Any) -> OrderTable:
     period, superstrate = float(file.period), float(file.superstrate)
     low, high = (float(number) for number in file.wavelengths)
     header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
+    components = getattr(file, "components", GROOVES.encode()).decode("utf-8")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     for name, variable in file.variables.items():
         first, kind, k = name.split("_")
         if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
             raise ValueError(f"{name} claims {variable.shape} numbers")
         packed[int(k), kind + (_MUELLER if first == "mueller" else "")] = variable[:]
-    checksum = _checksum((period, (low, high), superstrate, header), thin, packed)
+    checksum = _checksum((period, (low, high), superstrate, header), thin, components, packed)
     if file.sha256 != checksum.encode():
         raise ValueError("its checksum is that of another one")
     unpacked = {
@@ -169,7 +173,7 @@ def _table(file: Any) -> OrderTable:
         for key, numbers in packed.items()
     }
     bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
-    return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin)
+    return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin, components)
 
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
@@ -180,12 +184,15 @@ def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
 def _checksum(
     outline: tuple[float, tuple[float, ...], float, str],
     thin: bool,
+    components: str,
     packed: dict[tuple[int, str], NDArray[np.int16]],
 ) -> str:
     """Return the checksum of period, wavelengths, superstrate and header, and the numbers."""
     content = hashlib.sha256(repr(outline).encode())
     if thin:
         content.update(b"thin")
+    if components != GROOVES:
+        content.update(components.encode())
     for key in sorted(packed):
         content.update(repr((key, packed[key].shape)).encode())
         content.update(np.ascontiguousarray(packed[key], ">i2").data)

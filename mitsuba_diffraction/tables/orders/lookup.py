@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, warn
 from . import cells
 from .cells import Array, Cell
 from .polarised import ODD, nearest_pure, smooth_elements
-from .table import Band, OrderTable
+from .table import GROOVES, S_AND_P, Band, OrderTable
+
+#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
+_IN_PLANE = 1e-7
+#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
+MIN_ANGLE = 1e-4
 
 
 def efficiency(
@@ -32,7 +37,8 @@ def efficiency(
     ----------
     x, y : direction cosines within the superstrate of the mirror direction of the incident
         light, −(ωi)_x and −(ωi)_y.
-    wavelength : in vacuum, nm.
+    wavelength : in vacuum, nm. Beyond the table's by more than `table.MARGIN` octaves there is no
+        light, which is warned of; within that margin, the nearest wavelength's.
     order : m; order m leaves at x + m λ/(n d) and y.
     from_below : whether the light comes from below a thin sheet.
     transmitted : whether the order leaves on the other side of a thin sheet.
@@ -46,10 +52,8 @@ def efficiency(
     DiffractionError
         If light below is asked for, and the table is that of no sheet.
     """
-    both = polarised_efficiency(
-        table, x, y, wavelength, order, from_below=from_below, transmitted=transmitted
-    )
-    return np.asarray(both.mean(axis=-1))
+    light = (table, x, y, wavelength, order, from_below, transmitted)
+    return np.asarray(_stored(*light).mean(axis=-1))
 
 
 def polarised_efficiency(
@@ -62,10 +66,99 @@ def polarised_efficiency(
     from_below: bool = False,
     transmitted: bool = False,
 ) -> Array:
-    """Return the efficiencies for incident light of s and p polarisation, (…, 2).
+    """Return the efficiencies for incident light of s and of p polarisation, (…, 2).
 
-    Arguments and errors as for `efficiency`.
+    s light has its E across the plane of incidence. Other arguments as for `efficiency`.
+
+    Raises
+    ------
+    DiffractionError
+        Off the planes across and along the grooves, where s and p are coherent sums of the table's
+        components, if a solved table has no Mueller matrices; or as for `efficiency`.
     """
+    stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
+    if table.components == S_AND_P:
+        return stored
+    turned = _turned(x, y)
+    mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
+    difference = half * turned.cosine
+    conical = np.abs(turned.sine) > _IN_PLANE
+    if np.any(conical & (mean > 0.0)):
+        if not table.polarised:
+            raise DiffractionError(
+                "s and p of light off the plane across the grooves need Mueller matrices; solve "
+                "the profile with --polarised, or take groove_efficiency: E or B along the grooves"
+            )
+        difference = difference + turned.sine * mueller(table, x, y, wavelength, order)[..., 0, 2]
+    difference = np.clip(difference, -mean, mean)
+    return np.stack([mean + difference, mean - difference], axis=-1)
+
+
+def groove_efficiency(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    *,
+    from_below: bool = False,
+    transmitted: bool = False,
+) -> Array:
+    """Return the efficiencies of light whose E, or B, lies along the grooves, (…, 2).
+
+    As far as it can: see the axes of `polarised`. In the plane across the grooves they are s and p
+    (TE and TM). Other arguments as for `efficiency`.
+
+    Raises
+    ------
+    DiffractionError
+        For conical light, if the table is imported from efficiencies of s and p; or as for
+        `efficiency`.
+    """
+    stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
+    if table.components == GROOVES:
+        return stored
+    turned = _turned(x, y)
+    mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
+    if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
+        raise DiffractionError(
+            "this table is imported, with s and p; of conical light it lacks the phases from which "
+            "E and B along the grooves would follow"
+        )
+    return np.stack([mean + half * turned.cosine, mean - half * turned.cosine], axis=-1)
+
+
+class _Turned(NamedTuple):
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to that of s polarisation."""
+
+    cosine: Array
+    sine: Array
+
+
+def _turned(x: ArrayLike, y: ArrayLike) -> _Turned:
+    """Return the angle between the axes of incident light by its mirror direction.
+
+    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
+    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
+    """
+    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    along, across = x, -y * np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    squared = along**2 + across**2
+    level = squared < _IN_PLANE**2
+    cosine = np.where(level, 1.0, along**2 - across**2) / np.where(level, 1.0, squared)
+    return _Turned(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
+
+
+def _stored(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    from_below: bool,
+    transmitted: bool,
+) -> Array:
+    """Return the efficiencies of the table's two components, (…, 2)."""
     return _values(
         table, x, y, wavelength, order, from_below, transmitted, lambda band, kind: band.kind(kind),
         clamped,
@@ -120,11 +213,12 @@ def _values(
     x, y, lam, m = np.broadcast_arrays(*(np.asarray(value) for value in (x, y, wavelength, order)))
     shape = x.shape
     x, y, lam = (part.astype(np.float64).ravel() for part in (x, y, lam))
+    lit = _lit(table, lam)
     lam = np.maximum(lam, table.wavelengths[0])  # shorter light may have orders beyond all bands
     cell = cells.to_cell(x, y, lam, table.optical_period)
     w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
     q = cell.channel - m.ravel().astype(np.int64)
-    propagates = (cell.channel >= 0) & (q >= 0) & (q < cell.channels)
+    propagates = lit & (cell.channel >= 0) & (q >= 0) & (q < cell.channels)
     result = np.zeros((len(x), of_kind(table.bands[0], cells.A).shape[-1]))
     for k in np.unique(cell.band):
         for kind in (cells.A, cells.B):
@@ -136,6 +230,20 @@ def _values(
                 port = q[here] + channels * (from_below != transmitted)
                 result[here] = finish(rows)[np.arange(len(here)), port]
     return result.reshape(*shape, result.shape[-1])
+
+
+def _lit(table: OrderTable, wavelength: Array) -> NDArray[np.bool_]:
+    """Whether wavelengths are close enough to the table's; warn of the others."""
+    least, most = table.reach
+    lit = (wavelength >= least) & (wavelength <= most)
+    if not lit.all():
+        low, high = table.wavelengths
+        warn(
+            f"light of {wavelength[~lit][0]:g} nm meets a table of orders of {low:g} to {high:g} "
+            f"nm, which has none below {least:.0f} and above {most:.0f} nm; solve it with a wider "
+            "--wavelength-range"
+        )
+    return np.asarray(lit)
 
 
 def _polynomial(

@@ -22,6 +22,10 @@ LARGEST_SUM = 1.001
 ROUNDING = 2e-3
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
+#: Components of a table's light: E, or B, along the grooves; or s and p, of imported efficiencies.
+GROOVES, S_AND_P = "grooves", "s and p"
+#: Octaves beyond its wavelengths within which a table has its nearest efficiencies, and then none.
+MARGIN = 0.1
 #: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
 MOST_BANDS, MOST_NODES, MOST_NUMBERS = 256, 64, 1 << 27
 
@@ -96,8 +100,9 @@ class OrderTable:
     Attributes
     ----------
     period : µm.
-    wavelengths : shortest and longest, in vacuum, nm. Longer light has the values of the longest
-        wavelength at the same s and K; shorter light those of the shortest, in the same direction.
+    wavelengths : shortest and longest, in vacuum, nm. Light beyond them by less than `MARGIN`
+        has the nearest efficiencies: longer light those of the longest wavelength at the same s
+        and K, shorter light those of the shortest, in the same direction. Other light has none.
     bands : of k = 0, 1, …, `cells.largest_band`.
     superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
         thick to interfere, as the polycarbonate of a CD.
@@ -106,6 +111,7 @@ class OrderTable:
         as a share of the incident light.
     thin : whether the profile is the upper side of a thin sheet, whose lower side is flat. The
         table then has the light on both sides, at the ports of `cells`.
+    components : of the incident light that efficiencies belong to: `GROOVES`, or `S_AND_P`.
 
     Raises
     ------
@@ -120,10 +126,12 @@ class OrderTable:
     superstrate: float = 1.0
     header: Mapping[str, Any] = field(default_factory=dict)
     thin: bool = False
+    components: str = GROOVES
 
     # Set by the package, since look-ups and files build on this class
     efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
     polarised_efficiency: ClassVar[Callable[..., Array]]  #: `lookup.polarised_efficiency`
+    groove_efficiency: ClassVar[Callable[..., Array]]  #: `lookup.groove_efficiency`
     mueller: ClassVar[Callable[..., Array]]  #: matrices of an order: `lookup.mueller`
     load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
@@ -139,6 +147,14 @@ class OrderTable:
             )
         for band in self.bands:
             _check_band(band, self.sides)
+
+        if self.components not in (GROOVES, S_AND_P) or (
+            self.components == S_AND_P and self.polarised
+        ):
+            raise DiffractionError(
+                f"components={self.components!r}: must be {GROOVES!r}, or {S_AND_P!r} without "
+                "Mueller matrices"
+            )
 
     @classmethod
     def mirror(
@@ -165,6 +181,12 @@ class OrderTable:
     def optical_period(self) -> float:
         """Period times the index above it, n d, µm."""
         return self.superstrate * self.period
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Wavelengths between which light has efficiencies, nm; see `MARGIN`."""
+        low, high = self.wavelengths
+        return low * 2.0**-MARGIN, high * 2.0**MARGIN
 
     @property
     def sides(self) -> int:
@@ -235,6 +257,7 @@ class OrderTable:
             "superstrate_index": self.superstrate,
             "thin_sheet": self.thin,
             "polarised": self.polarised,
+            "components": self.components,
             "bands": len(self.bands),
             "nodes": sorted({" x ".join(map(str, band.counts)) for band in self.bands}),
             "mean_albedo": round(self.albedo, 4),

@@ -8,6 +8,7 @@ uniform float last_band;
 uniform float period;            // µm
 uniform float superstrate;       // index of the clear layer over the grooves
 uniform vec2 solved_range;       // shortest and longest wavelength of the table, µm
+uniform vec2 solved_reach;       // ends of the light that it reflects, µm
 
 // Row of efficiencies of one direction and wavelength (Row of plugin/orders/lookup.py).
 vec2 row_incident;               // tangential part of ωi in the patch's frame
@@ -16,6 +17,7 @@ float row_face;                  // share of the light that the layer's face ref
 float row_channel, row_channels;
 int row_tile;
 vec3 row_place;                  // τ, ρ and w
+float row_lit;                   // 0 beyond the table's wavelengths, else 1
 
 #ifdef FACE
 
@@ -43,6 +45,7 @@ void begin_orders(vec3 wi, vec2 rotation)
 void find_row(float wavelength)
 {
     row_wavelength = wavelength;
+    row_lit = step(solved_reach.x, wavelength) * step(wavelength, solved_reach.y);
     wavelength = max(wavelength, solved_range.x);
     vec2 mirror = vec2(-row_incident.x, row_incident.y) / superstrate;
     float optical_period = superstrate * period, c, orders, band, t, r, shortest, longest;
@@ -72,7 +75,7 @@ float efficiency_towards(float q)
     vec2 at = corner + row_place.yx * order_cells.yx + 0.5;
     vec4 four = textureLod(efficiencies, at / vec2(textureSize(efficiencies, 0)), 0.0);
     vec4 apart = abs(w - 3.0 * group - vec4(0.0, 1.0, 2.0, 3.0));
-    return dot(four, max(1.0 - apart, 0.0));
+    return row_lit * dot(four, max(1.0 - apart, 0.0));
 }
 
 // Efficiency of an order of the row; 0 if it does not propagate.

@@ -1,0 +1,105 @@
+"""`mitsuba-diffraction orders`: efficiencies of a table's orders as a CSV."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from pathlib import Path
+
+from ..errors import quoted
+from . import options
+from .options import number_between
+from .report import check_outputs, save_report
+
+#: Values of an option at most.
+_MOST = 10_000
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "orders", run, "efficiencies of solved orders as a CSV",
+        "List the efficiencies of a table's orders, a line for each order that propagates: "
+        "wavelength, direction to the light within the superstrate, order, and the reflected share "
+        "of s and of p light; a thin sheet also has the transmitted shares. "
+        "'solve --import' reads the file back.",
+    )  # fmt: skip
+    parser.add_argument(
+        "table",
+        metavar="TABLE",
+        type=Path,
+        help="of orders (.nc), from 'mitsuba-diffraction solve'",
+    )
+    options.add_output(
+        parser, "the CSV; default: TABLE's name with .csv in the current folder", ".csv"
+    )
+    group = parser.add_argument_group(
+        "the light", "Values, or FIRST:LAST:STEP, several joined by commas."
+    )
+    group.add_argument(
+        "--theta", metavar="DEG", type=_values, default=(0.0,),
+        help="angles of the light from the normal, -90 to 90; e.g. 30, or --theta=-85:85:5; "
+        "default: 0",
+    )  # fmt: skip
+    group.add_argument(
+        "--phi", metavar="DEG", type=_values, default=(0.0,),
+        help="azimuths of the light, from x, across the grooves, towards y; default: 0",
+    )  # fmt: skip
+    chosen = group.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--wavelength", metavar="NM", type=_values, help="wavelengths in vacuum, e.g. 400:700:20"
+    )
+    chosen.add_argument(
+        "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
+        help="between wavelengths, over all of the table; default: 5",
+    )  # fmt: skip
+    group.add_argument(
+        "--polarised", action="store_true",
+        help="shares of s and of p light; default: both are the share of unpolarised light",
+    )  # fmt: skip
+    options.add_json(parser, "the lines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """List the orders, and return the exit code."""
+    import numpy as np
+
+    from ..solve.listing import list_orders
+    from ..tables.orders import OrderTable
+
+    output = args.output or Path(f"{args.table.stem}.csv")
+    check_outputs([output], [args.table], "list of orders")
+    table = OrderTable.load(args.table)
+    low, high = table.wavelengths
+    steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)
+    wavelengths = args.wavelength or np.linspace(low, high, steps + 1)
+    listing = list_orders(table, wavelengths, args.theta, args.phi, polarised=args.polarised)
+    listing.save(output)
+    rows = listing.rows
+    light = "s and p" if args.polarised else "unpolarised light"
+    print(
+        f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
+        f"{len(np.unique(rows[:, 1:3], axis=0))} directions, orders {rows[:, 3].min():.0f} to "
+        f"{rows[:, 3].max():.0f}, {light}"
+    )
+    save_report(args, {"file": str(output), "columns": listing.columns, "lines": rows.tolist()})
+    return 0
+
+
+def _values(text: str) -> tuple[float, ...]:
+    """Return the numbers of an option: values and FIRST:LAST:STEP, joined by commas."""
+    try:
+        return tuple(itertools.chain.from_iterable(map(_some, text.split(","))))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
+            f"{_MOST} of them), got {quoted(text)}"
+        ) from error
+
+
+def _some(text: str) -> list[float]:
+    if ":" not in text:
+        return [float(text)]
+    first, last, step = (float(part) for part in text.split(":"))
+    if not (step > 0.0 and last >= first and (last - first) / step < _MOST):
+        raise ValueError(text)
+    return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
