@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.reference import boundary
 from tests.support.clone import small_clone
 from tests.support.pages import PAGES, blocks
 

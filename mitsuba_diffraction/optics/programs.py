@@ -111,7 +111,7 @@ class Program:
     @property
     def text(self) -> str:
         """Source of all functions."""
-        texts = [function.text for function in self.functions.values()]
+        texts = dict.fromkeys(function.text for function in self.functions.values())
         prelude = [self.dialect.prelude] if self.complex_numbers else []
         return "\n".join([*prelude, *texts])
 

@@ -6,14 +6,20 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...optics.boundary import MODELS, Model, relative_power
-from ...optics.coat import coated_reflectance, cosine_within, refracted, transmittances
+from ...optics.blend import small_slope_weight
+from ...optics.boundary import MODELS, Model, azimuth_cosine
+from ...optics.coat import (
+    coated_reflectance,
+    cosine_within,
+    refracted,
+    relative_power,
+    transmittances,
+)
 from ...optics.colour import encoded_colour
 from ...optics.dialects import GLSL
 from ...optics.display import shown_colour
 from ...optics.fresnel import normal_reflectance, reflectance
-from ...optics.geometry import azimuth_cosine, vcavity
-from ...optics.blend import small_slope_weight
+from ...optics.geometry import vcavity
 from ...optics.orders import (
     cell_wavelengths,
     lobe_falloff,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.boundary import Model
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ...optics.boundary import Model
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
