@@ -103,6 +103,34 @@ def coated_reflectance(face: Number, beneath: Number) -> Number:
     return 1.0 - (1.0 - face) * (1.0 - beneath) * of(less).reciprocal(less)
 
 
+def pair_power(
+    jones: Callable[[Geometry, Index, Heights], Jones] | None,
+    wi: Direction,
+    wo: Direction,
+    index: Index,
+    kappa: Number,
+    variance: Number,
+    came: Powers | None = None,
+    left: Powers | None = None,
+) -> Number:
+    """Return N' of a boundary model for a pair of directions, eq. 5 and 6.
+
+    Parameters
+    ----------
+    jones : of a `boundary.Model`; None of a perfect reflector.
+    wi, wo, index : of the structure, in the coat if it has one.
+    kappa, variance : see `boundary.Heights`.
+    came, left : transmittances of the coat, see `transmitted`; None without a coat.
+    """
+    pair = geometry(wi, wo)
+    if jones is None:
+        return pair.one_plus_dot * pair.one_plus_dot
+    matrix = jones(pair, index, Heights(kappa, variance))
+    if came is not None and left is not None:
+        matrix = transmitted(matrix, pair, index, came, left)
+    return power(matrix)
+
+
 def relative_power(
     jones: Callable[[Geometry, Index, Heights], Jones],
     wi: Direction,
@@ -113,18 +141,7 @@ def relative_power(
     came: Powers | None = None,
     left: Powers | None = None,
 ) -> Number:
-    """Return N' / (1 + ωi·ωo)² of a boundary model, eq. 5 and 6: Kirchhoff's is R(cosθ_half).
-
-    Parameters
-    ----------
-    jones : of a `boundary.Model`.
-    wi, wo, index : of the structure, in the coat if it has one.
-    kappa, variance : see `boundary.Heights`.
-    came, left : transmittances of the coat, see `transmitted`; None without a coat.
-    """
-    pair = geometry(wi, wo)
-    matrix = jones(pair, index, Heights(kappa, variance))
-    if came is not None and left is not None:
-        matrix = transmitted(matrix, pair, index, came, left)
-    edge = of(kappa).maximum(pair.one_plus_dot, 1e-12)  # opposite grazing directions
-    return power(matrix) / (edge * edge)
+    """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
+    # not 0 of opposite grazing directions
+    edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
+    return pair_power(jones, wi, wo, index, kappa, variance, came, left) / (edge * edge)

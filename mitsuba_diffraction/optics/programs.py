@@ -173,7 +173,7 @@ class Scope:
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.dialect.reserved or name == self.name:
+        if name in self.dialect.reserved or name in {self.name, *self.callees}:
             name += "_"
         numbered, n = name, 1
         while numbered in self.taken:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
+from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
 from .orders import interpolation_error, order_constants, order_formulas, order_texture
-from .patch import mean_transmittance, patch_constants, patch_error, patch_textures
+from .patch import mean_transmittance, patch_constants, patch_error, patch_formulas, patch_textures
 from .sockets import (
     Socket,
     array_parameter,
@@ -42,7 +43,7 @@ OSL = Consumer(
         {
             Feature.HEIGHTS, Feature.ORDERS, Feature.MIRROR, Feature.DIELECTRIC, Feature.RARER,
             Feature.CONDUCTOR, Feature.SMALL_SLOPE, Feature.KIRCHHOFF, Feature.HEIGHT_SCALE,
-            Feature.LATERAL_SCALE, Feature.ORIENTATION,
+            Feature.LATERAL_SCALE, Feature.ORIENTATION, Feature.OWN_MODEL,
         }
     ),
     "export the surface without, or render it with Mitsuba",
@@ -189,19 +190,21 @@ def _patch(described: Surface) -> Shader:
     if material is not None and material.index is not None:
         index = material.index(drawn_spectrum().wavelengths)
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
+    model = None if index is None else MODELS[described.model]
+    statistic = table.roughness
+    if model is not None and model.statistic is not None:
+        statistic = model.statistic(statistic)
     arrays = {
         "Eta": np.real(parts),
         "Absorption": np.imag(parts),
-        "Roughness": table.roughness.nodes,
+        "Statistic": statistic.nodes,
         "Order0": textures.order_0,
     }
-    constants = patch_constants(table, textures, described.lateral_scale.number)
-    constants["PERFECT"] = int(index is None)
-    constants["SMALL_SLOPE"] = int(described.model == "small_slope")
+    constants = patch_constants(table, textures, statistic, described.lateral_scale.number)
     constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
         "patch.osl",
-        "",
+        patch_formulas(model),
         constants,
         [array_parameter("float", name, values) for name, values in arrays.items()],
         [
