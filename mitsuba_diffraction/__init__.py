@@ -33,9 +33,9 @@ from __future__ import annotations
 import sys
 
 if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main__ comes last
-    from _mitsuba_diffraction import leave_quietly
+    from _mitsuba_diffraction import prepare
 
-    leave_quietly()
+    prepare()
 
 import importlib
 from importlib.metadata import version

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
+import unicodedata
 import warnings
 from types import FrameType
 
@@ -23,7 +25,7 @@ class DiffractionError(ValueError):
     """
 
     def __init__(self, text: str = "") -> None:
-        super().__init__(shortened(text))
+        super().__init__(shortened(printable(text)))
 
 
 class DiffractionWarning(UserWarning):
@@ -69,9 +71,25 @@ def _cut(text: str, most: int) -> str:
     return f"{text[:half]}...{text[-half:]}"
 
 
+def printable(text: str) -> str:
+    r"""Escape characters that control a terminal: ESC, BEL, bidirectional overrides and the like.
+
+    Line ends and tabs stay. Escapes are JSON's (\u001b), so that JSON keeps its meaning.
+    """
+    if text.isascii() and text.isprintable():
+        return text
+
+    def shown(character: str) -> str:
+        harmless = character.isprintable() or character in "\n\t"
+        blank = unicodedata.category(character) == "Zs"
+        return character if harmless or blank else json.dumps(character)[1:-1]
+
+    return "".join(map(shown, text))
+
+
 def one_line(text: str) -> str:
-    """Replace every run of white space, line ends included, by one blank."""
-    return " ".join(text.split())
+    """Replace every run of white space by one blank, and escape what controls a terminal."""
+    return printable(" ".join(text.split()))
 
 
 def quoted(value: object) -> str:

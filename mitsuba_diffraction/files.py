@@ -1,19 +1,97 @@
 """Input files, looked at before they are opened: every reader of the package goes through here.
 
+`kind_of` alone decides what a file is.
+
 Opening a pipe waits for somebody to write into it, and a device has no end. A name that is not
 UTF-8 cannot be handed to Mitsuba or OpenEXR.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
+from enum import StrEnum
 from pathlib import Path
+from typing import Literal
 
 from .errors import DiffractionError
 
 #: Largest text that is read at once, bytes: recipes, plans and reports are far smaller.
 LARGEST_TEXT = 1_000_000
+#: Attribute of an EXR file that makes it a table; the JSON in it holds everything but coefficients.
+TABLE_ATTRIBUTE = "mitsuba_diffraction"
+#: Attribute that tells tables of orders from other NetCDF files.
+ORDERS_ATTRIBUTE = "mitsuba_diffraction_orders"
+#: Suffixes of mesh files that Mitsuba reads.
+MESHES = (".ply", ".obj", ".serialized")
+#: Suffixes of mesh files that have to be converted first: Mitsuba reads neither STL nor glTF.
+OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
+
+
+class FileKind(StrEnum):
+    """Kind of a file; all but the first five are heights, named by their reader."""
+
+    TABLE = "table"
+    ORDERS = "table of orders"
+    RECIPE = "recipe"
+    MESH = "mesh"
+    SCENE = "scene"
+    IMAGE = "image"
+    EXR = "EXR image"
+    NPY = "array"
+    TEXT = "text"
+    JPEG = "JPEG"
+    INSTRUMENT = "instrument file"
+
+
+# First bytes, a text among the bytes at the beginning, and the kind of the file; attributes of EXR
+# and NetCDF files stand there. Content decides before the suffix does: a misnamed file still loads.
+_BEGINNING = 1 << 16
+_CONTENTS = (
+    (b"\x76\x2f\x31\x01", f"\0{TABLE_ATTRIBUTE}\0string\0".encode(), FileKind.TABLE),
+    (b"\x76\x2f\x31\x01", b"", FileKind.EXR),
+    (b"CDF", ORDERS_ATTRIBUTE.encode(), FileKind.ORDERS),
+    (b"\x89PNG\r\n\x1a\n", b"", FileKind.IMAGE),
+    (b"\x93NUMPY", b"", FileKind.NPY),
+    (b"\xff\xd8\xff", b"", FileKind.JPEG),
+)
+_SUFFIXES = {
+    ".toml": FileKind.RECIPE, ".xml": FileKind.SCENE, ".exr": FileKind.EXR, ".npy": FileKind.NPY,
+    **dict.fromkeys((*MESHES, *OTHER_MESHES), FileKind.MESH),
+    **dict.fromkeys((".png", ".bmp", ".tif", ".tiff"), FileKind.IMAGE),
+    **dict.fromkeys((".txt", ".csv", ".tsv", ".xyz"), FileKind.TEXT),
+}  # fmt: skip
+# Private tags of TIFF files with physical heights: of Park Systems, and JPK's length of a scan.
+_INSTRUMENT_TAGS = {50432, 0x8042}
+
+
+def kind_of(path: str | os.PathLike[str]) -> FileKind:
+    """Return the kind of a file by its content, else by its suffix.
+
+    The suffix alone decides for a file that cannot be read: its reader says why.
+    """
+    content = b""
+    with contextlib.suppress(DiffractionError):
+        content = _beginning(path, _BEGINNING)
+    for begins, attribute, kind in _CONTENTS:
+        if content.startswith(begins) and attribute in content:
+            return kind
+    if content.startswith((b"II*\0", b"MM\0*")):
+        instrument = not _INSTRUMENT_TAGS.isdisjoint(_tiff_tags(Path(path)))
+        return FileKind.INSTRUMENT if instrument else FileKind.IMAGE
+    return _SUFFIXES.get(Path(path).suffix.lower(), FileKind.INSTRUMENT)
+
+
+def _tiff_tags(file: Path) -> list[int]:
+    """Return the tags of a TIFF's first page; an incomplete directory gives zeros."""
+    with file.open("rb") as stream:
+        head = stream.read(8)
+        order: Literal["little", "big"] = "little" if head.startswith(b"II") else "big"
+        stream.seek(int.from_bytes(head[4:], order))
+        count = int.from_bytes(stream.read(2), order)
+        entries = stream.read(12 * count)
+    return [int.from_bytes(entries[n : n + 2], order) for n in range(0, len(entries), 12)]
 
 
 def readable_file(path: str | os.PathLike[str]) -> Path:
@@ -25,6 +103,12 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
         If the file is missing, a folder, a pipe or a device, unreadable or empty, or if its name
         is not UTF-8.
     """
+    _beginning(path, 1)
+    return Path(path)
+
+
+def _beginning(path: str | os.PathLike[str], count: int) -> bytes:
+    """Return the first bytes of a file, `count` at most; errors as in `readable_file`."""
     shown = repr(os.fspath(path))
     check_name(path)
     try:
@@ -33,7 +117,7 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
         if file.is_dir():
             raise DiffractionError(f"{shown} is a folder; name a file in it")
         with file.open("rb") as stream:
-            first = stream.read(1)
+            first = stream.read(count)
     except DiffractionError:
         raise
     except FileNotFoundError as error:
@@ -44,7 +128,23 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
         raise DiffractionError(f"cannot read {shown}: {error}") from error
     if not first:
         raise DiffractionError(f"{shown} is empty (0 bytes)")
-    return file
+    return first
+
+
+def path_within(file: Path, name: str) -> Path:
+    """Return the path of an output that a file names, relative to the file's folder.
+
+    Raises
+    ------
+    DiffractionError
+        If it leads out of the folder: absolute, by "..", or by a link.
+    """
+    path = file.parent / name
+    if not path.resolve().is_relative_to(file.parent.resolve()):
+        raise DiffractionError(
+            f"{str(file)!r}: output: {name!r} is outside the file's folder; name a path in it"
+        )
+    return path
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:

@@ -12,18 +12,38 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from typing import Any, TextIO
+
+from .errors import printable
 
 _one_at_a_time = threading.Lock()
 _programs = 0
 
 
+class _Printable:
+    """Text stream in which nothing controls the terminal: names and headers come from anywhere."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write(printable(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
 @contextlib.contextmanager
 def own_program() -> Iterator[None]:
-    """Mark the streams of the process as ours inside: `without_chatter` keeps them clean."""
+    """Mark the streams of the process as ours inside: `without_chatter` keeps them clean.
+
+    Text for stdout is made `printable`.
+    """
     global _programs
     _programs += 1
     try:
-        yield
+        with contextlib.redirect_stdout(_Printable(sys.stdout)):
+            yield
     finally:
         _programs -= 1
 

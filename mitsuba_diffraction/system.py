@@ -34,6 +34,11 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
+def memory() -> int:
+    """Return the memory of this machine, bytes."""
+    return int(psutil.virtual_memory().total)
+
+
 def process_lives(number: int) -> bool:
     """Return whether a process of this number exists, of any user."""
     try:

@@ -13,8 +13,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.files import MESHES
 from mitsuba_diffraction.scene.parameters import parameters_of
-from mitsuba_diffraction.scene.stage import MESHES, STUDIO
+from mitsuba_diffraction.scene.stage import STUDIO
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
 from tests.support.pages import FENCE, PAGES, blocks, spans, typed

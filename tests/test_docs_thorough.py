@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.optics import boundary
 from tests.support.clone import small_clone
 from tests.support.pages import PAGES, blocks
 
@@ -33,12 +33,9 @@ def inputs(tmp_path_factory) -> Path:
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 @pytest.mark.parametrize("page", [p for p in PAGES if p != "README.md" and blocks(p, "python")])
 def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch, some_variant):
-    from mitsuba_diffraction.plugin import boundary as kernels
-
     monkeypatch.chdir(inputs)
-    for registry in (boundary.MODELS, kernels.MODELS):  # extending.md enters a model
-        monkeypatch.setitem(registry, "level", None)
-        monkeypatch.delitem(registry, "level")
+    monkeypatch.setitem(boundary.MODELS, "dulled", None)  # extending.md enters a model
+    monkeypatch.delitem(boundary.MODELS, "dulled")
     here = [text for text in blocks(page, "python") if DENOISER or "import pyoidn" not in text]
     for text in here:  # one after the other: they read what those before have written
         exec(re.sub(r"\.advance\(\d+\)", ".advance(2)", text), {})  # of many frames two

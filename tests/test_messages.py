@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+import unicodedata
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning, warn
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning, printable, warn
 from tests.support import ROOT
 from tests.support.docstrings import PACKAGE
 
@@ -61,3 +65,20 @@ def test_the_package_warns_through_one_function():
     for file in Path(PACKAGE).rglob("*.py"):
         if file.name != "errors.py":
             assert "warnings.warn(" not in file.read_text("utf-8"), file
+
+
+@given(st.text())
+def test_no_text_controls_the_terminal(text):
+    """Neither ESC, OSC and BEL nor bidirectional overrides; JSON keeps its meaning."""
+    shown = printable(text)
+    kinds = {unicodedata.category(c) for c in shown if c not in "\n\t"}
+    assert not {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"} & kinds
+    assert printable(shown) == shown
+    assert json.loads(printable(json.dumps(text, ensure_ascii=False))) == text
+    error = str(DiffractionError(text))
+    assert error == printable(error)
+
+
+@pytest.mark.parametrize("text", ["µm, κ and ×", "a\nb\tc", "10\u202f000 µm", "鱗"])
+def test_readable_text_stays_as_it_is(text):
+    assert printable(text) == text

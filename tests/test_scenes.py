@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
-from mitsuba_diffraction.tables.orders.file import is_order_table
 from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 
 # the look-alikes are as steep as the real scales, which the package says every time
@@ -60,7 +60,7 @@ def test_its_patch_is_a_recipe(name: str) -> None:
 def test_its_table_has_solved_orders(name: str) -> None:
     defaults = parameters_of(SCENES / f"{name}.xml")
     assert defaults is not None
-    assert is_order_table(SCENES / str(defaults["table"]))
+    assert kind_of(SCENES / str(defaults["table"])) is FileKind.ORDERS
     assert {"spp", "resx", "resy", "table", "coherence_width"} <= set(defaults)
 
 

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionWarning
+from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..heights.load import load_heights
-from ..heights.read import LoadOptions, is_recipe
+from ..heights.read import LoadOptions
 from ..heights.recipes import Recipe
 from ..progress import Progress, silent
 from ..settings import TableSettings
@@ -45,7 +46,7 @@ def read_scan(path: Path, options: LoadOptions, settings: Mapping[str, Any]) -> 
     DiffractionError
         If the file cannot be read, or a setting is not allowed.
     """
-    if not is_recipe(path):
+    if kind_of(path) is not FileKind.RECIPE:
         return Scan([load_heights(path, options)], TableSettings(**settings))
     recipe = Recipe.load(path)
     return Scan(recipe.fields(options), TableSettings(**{**recipe.table, **settings}))

@@ -22,12 +22,12 @@ from ..atomic import atomic_path
 from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..files import readable_file
+from ..files import FileKind, kind_of, readable_file
 from ..heights.coherence import REPEATS, widest_window
-from ..heights.read import is_recipe
 from ..heights.recipes import Recipe
 from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
+from ..tables.build.checks import warnings_of
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .iridescence import WINDOW, diffracted_light
@@ -129,7 +129,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]
         row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
-    row["warnings"] = "; ".join(table.source.get("warnings", ()))
+    row["warnings"] = "; ".join(warnings_of(*scan))
     phi = gratings[0].direction if gratings else 0.0
     # without a material ideal reflection: the effect of the structure alone
     bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
@@ -248,7 +248,7 @@ def run_survey(
 def _files_of(file: Path) -> SceneFiles:
     """Return the scan's files, after a check of the recipe if it is one."""
     files = SceneFiles.from_scene(readable_file(file), {})
-    if is_recipe(file):
+    if kind_of(file) is FileKind.RECIPE:
         Recipe.load(file)
     return files
 

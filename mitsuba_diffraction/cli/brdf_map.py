@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
@@ -291,14 +292,13 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
 
     from ..plugin.bsdf import Diffraction
     from ..plugin.orders.sheet import diffraction_orders
-    from ..tables.orders.file import is_order_table
 
     parameters = surface_parameters(args)
     settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)
-    solved = is_order_table(args.source)
+    solved = kind_of(args.source) is FileKind.ORDERS
     props = mi.Properties("diffraction_orders" if solved else "diffraction")
     source = "table" if solved else "heightfield"
     for name, value in {source: str(args.source), **settings, **parameters}.items():

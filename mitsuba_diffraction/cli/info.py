@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..scene.stage import MESHES, OTHER_MESHES
+from ..files import MESHES, FileKind, kind_of, readable_file
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
@@ -76,28 +76,25 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..files import readable_file
-    from ..heights.read import is_recipe
-    from ..tables.exr import is_table
     from ..tables.orders import OrderTable
-    from ..tables.orders.file import is_order_table
 
     readable_file(file)
-    if is_recipe(file):
+    kind = kind_of(file)
+    if kind is FileKind.RECIPE:
         return _recipe(file, args)
-    if file.suffix.lower() in (*MESHES, *OTHER_MESHES):
+    if kind is FileKind.MESH:
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
-    if file.suffix.lower() == ".xml":
+    if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
             "a scene names: tables, heights (images, NPY, text, instrument files), recipes (TOML) "
             f"and meshes ({', '.join(MESHES)})"
         )
-    if is_table(file):
+    if kind is FileKind.TABLE:
         _refuse_heights_options(args, "a table")
         return _table(file)
-    if is_order_table(file):
+    if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
         return {"kind": "table of orders", **OrderTable.load(file).summary()}
     return _heights(file, args)
@@ -139,11 +136,10 @@ def _draw(args: argparse.Namespace) -> None:
     from ..analysis.pictures import patches_figure
     from ..atomic import atomic_path
     from ..heights.load import load_heights
-    from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
     how = options.load_options(args)
-    if is_recipe(args.file):
+    if kind_of(args.file) is FileKind.RECIPE:
         fields = Recipe.load(args.file).fields(how)
     else:
         fields = [load_heights(args.file, how)]
@@ -162,7 +158,7 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         **field.summary(),
         **_periods(field),
         "window": width_reason(resolved(settings, [field]).width, [field]),
-        "warnings": options.table_warnings(field, settings),
+        "warnings": options.table_warnings([field], settings),
         "limits": options.LIMITS,
     }
 
@@ -188,7 +184,6 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         bar(0, 0, "making heights")
         fields = recipe.fields(options.load_options(args))
     settings = TableSettings(**{**table, **options.table_options(args)})
-    warnings = [line for field in fields for line in options.table_warnings(field, settings)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
@@ -198,7 +193,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "output exists": recipe.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],
         "window": width_reason(resolved(settings, fields).width, fields),
-        "warnings": list(dict.fromkeys(warnings)),
+        "warnings": options.table_warnings(fields, settings),
     }
 
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import NoReturn
 
-from ..errors import DiffractionError, shortened
+from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
 from ..streams import own_program
 from . import (
@@ -64,7 +64,7 @@ class _Parser(argparse.ArgumentParser):
     """Argument parser whose errors shorten the values that they quote."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(shortened(message))
+        super().error(shortened(printable(message)))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -72,7 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for text in sys.argv[1:] if argv is None else argv:
             check_name(text)
-        args = build_parser().parse_args(argv)
+        args, unknown = build_parser().parse_known_args(argv)
+        if unknown:  # of the command, whose usage helps
+            args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     except DiffractionError as error:
         say_error(str(error))
         return FAILED

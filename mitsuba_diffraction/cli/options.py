@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
+from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
 
@@ -323,18 +324,16 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
     from ..heights.load import load_heights
-    from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
-    from ..tables.exr import is_table
 
     options = load_options(args)
     source = args.source
-    if is_table(source):
+    if kind_of(source) is FileKind.TABLE:
         raise DiffractionError(
             f"'{source}' is a table; this needs the heights it was made of, or their recipe"
         )
     settings = table_options(args)
-    if is_recipe(source):
+    if kind_of(source) is FileKind.RECIPE:
         recipe = Recipe.load(source)
         settings = {**recipe.table, **settings}
         patch = recipe.field(options)
@@ -343,25 +342,22 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     return patch, {name: settings[name] for name in TABLE_NAMES if name in settings}
 
 
-def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
-    """List the warnings of a table of these heights, or its refusal if size alone decides."""
-    from ..heights.coherence import resolved, window_warning
-    from ..tables.build.checks import check_window, expected_taps, slow_warning
+def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
+    """List the warnings of a table of these heights, and its refusal if size alone decides."""
+    from ..heights.coherence import resolved
+    from ..tables.build.checks import check_window, warnings_of
 
-    lines = field.validity(settings.wavelength_range)
-    settings = resolved(settings, [field])
     try:
-        check_window(field.extent, settings)
+        check_window(fields[0].extent, resolved(settings, fields))
     except DiffractionError as error:
-        return [*lines, f"{field.name}: {error}"]
-    lines.append(window_warning(settings.width, [field]))
-    lines.append(slow_warning(field, settings.width, expected_taps(field.extent, settings)))
-    return [line for line in lines if line]
+        doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
+        return [*doubts, f"{fields[0].name}: {error}"]
+    return warnings_of(fields, settings)
 
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
     """Return a line on the number of notes on heights and the command that prints them, or ""."""
     from ..heights.load import notes_line
 
-    lines = table_warnings(field, settings)
+    lines = table_warnings([field], settings)
     return notes_line(lines, args.source, load_options(args), settings)

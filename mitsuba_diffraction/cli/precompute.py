@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import warn
+from ..files import FileKind, kind_of
 from ..optics.second_order_change import applies
 from ..system import peak_memory
 from . import options
@@ -46,76 +47,84 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "what is in the table")
 
 
+class _Job(NamedTuple):
+    """Heights of one table, the settings and name of that table, and the files that are read."""
+
+    source: str  # for people
+    read: Callable[[], list[HeightField]]
+    settings: dict[str, Any]  # the recipe's
+    output: Path
+    files: list[Path]
+    of_recipe: bool  # whose folder of tables may be made
+
+
 def run(args: argparse.Namespace) -> int:
     """Build one table, or those of several recipes, and return the exit code."""
-    from ..heights.read import is_recipe
-
-    recipes = [source for source in args.sources if is_recipe(source)]
-    if not recipes:
-        save_report(args, _precompute(args.sources, args))
-        return 0
-    if len(recipes) < len(args.sources):
+    recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
+    if recipes and len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
     if len(recipes) > 1 and args.output is not None:
         args.parser.error("argument -o/--output: one name, but there are several recipes")
-    summaries = [_precompute([recipe], args) for recipe in recipes]
+    if not recipes and len(args.sources) > 1 and args.output is None:
+        args.parser.error("argument -o/--output: name the one table of these files")
+    if recipes:
+        summaries = [_precompute(_recipe_job(recipe, args), args) for recipe in recipes]
+    else:
+        summaries = [_precompute(_files_job(args), args)]
     save_report(args, summaries[0] if len(summaries) == 1 else {"tables": summaries})
     return 0
 
 
-def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
-    """Build one table of a recipe, or of one or several files, and return its summary."""
-    from ..heights.load import load_heights
-    from ..heights.read import is_recipe
+def _recipe_job(file: Path, args: argparse.Namespace) -> _Job:
     from ..heights.recipes import Recipe
-    from ..heights.validity import edge_lines
+
+    recipe, how = Recipe.load(file), options.load_options(args)
+    return _Job(
+        str(file), lambda: recipe.fields(how), dict(recipe.table), args.output or recipe.output,
+        [file, *recipe.sources], args.output is None,
+    )  # fmt: skip
+
+
+def _files_job(args: argparse.Namespace) -> _Job:
+    from ..heights.load import load_heights
+
+    files, how = list(args.sources), options.load_options(args)
+    output = args.output or Path(f"{files[0].stem}.exr")
+    return _Job(
+        ", ".join(map(str, files)), lambda: [load_heights(file, how) for file in files], {},
+        output, files, False,
+    )  # fmt: skip
+
+
+def _precompute(job: _Job, args: argparse.Namespace) -> dict[str, Any]:
+    """Build one table and return its summary."""
     from ..settings import TableSettings
+    from ..tables.build.checks import warnings_of
 
     start = time.perf_counter()
-    how = options.load_options(args)
-    chosen = options.table_options(args)
-    recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
-    inputs = list(sources)
-    if recipe is not None:
-        chosen = {**recipe.table, **chosen}
-        inputs += recipe.sources
-    elif len(sources) > 1 and args.output is None:
-        args.parser.error("argument -o/--output: name the one table of these files")
-    settings = TableSettings(**chosen)
+    settings = TableSettings(**{**job.settings, **options.table_options(args)})
     if (args.workers or args.scheduler) and settings.windows is None:
         args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
-    by_recipe = recipe is not None and args.output is None
-    output = args.output or (recipe.output if recipe else Path(f"{sources[0].stem}.exr"))
-    check_outputs([output], inputs, "table", make_folder=by_recipe)
+    check_outputs([job.output], job.files, "table", make_folder=job.of_recipe)
     with Bar(args) as bar:
-        bar(0, 0, "making heights" if recipe and recipe.generator else "reading heights")
-        if recipe is not None:
-            fields = recipe.fields(how)
-        else:
-            fields = [load_heights(source, how) for source in sources]
-    # Warn before the table is built: who treats the heights will need another one
-    shortest = settings.wavelength_range[0] / 1000
-    # windows are levelled, and fade at their edges
-    cut_out = (field for field in fields if field.cut_out and settings.windows is None)
-    said = [line for field in cut_out for line in edge_lines(field, shortest)]
-    for line in said:
+        bar(0, 0, "making heights")
+        fields = job.read()
+    for line in warnings_of(fields, settings):  # before the minutes that the table takes
         warn(line)
     with Bar(args) as bar:
         table, workers = _built(args, fields, settings, bar)
-        if by_recipe:
-            output.parent.mkdir(parents=True, exist_ok=True)
-        table.save(output)
-    for line in table.source["warnings"]:
-        warn(line)
-    print(f"{', '.join(map(str, sources))} -> {output}")
-    for label, text in _report(fields, table, output, time.perf_counter() - start):
+        if job.of_recipe:
+            job.output.parent.mkdir(parents=True, exist_ok=True)
+        table.save(job.output)
+    print(f"{job.source} -> {job.output}")
+    for label, text in _report(fields, table, job.output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
     if workers:
         print(
             f"  work   {workers['tasks']} tasks of windows, {workers['retries']} given out again, "
             f"{workers['busy']:.1f} s of workers' work"
         )
-    return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
+    return {"file": str(job.output), **table.summary(), **({"workers": workers} if workers else {})}
 
 
 def _built(

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import DiffractionError, quoted
-from ..files import readable_file
+from ..files import MESHES, OTHER_MESHES, readable_file
 from ..scene.parameters import Change, change_of
 from .options import add_mode, whole_number
 
@@ -80,7 +80,7 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
     The scene is then the studio, and default names of outputs follow the mesh: `args.name`.
     """
-    from ..scene.stage import MESHES, OTHER_MESHES, STUDIO
+    from ..scene.stage import STUDIO
 
     args.name, suffix = args.scene, args.scene.suffix.lower()
     if suffix in OTHER_MESHES:

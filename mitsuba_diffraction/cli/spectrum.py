@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
 from ..scene.load import set_variant
 from ..settings import TableSettings
 from . import options
@@ -156,13 +157,13 @@ def _measured(
     from ..analysis.spectra import spectrum
     from ..heights.load import notes_line
     from ..optics.colour import LONGEST, SHORTEST
-    from ..tables.exr import is_table
+    from ..tables.build.checks import warnings_of
     from ..tables.orders import OrderTable
-    from ..tables.orders.file import is_order_table
     from ..tables.store import loaded_table
 
-    solved = is_order_table(file)
-    if solved or is_table(file):
+    kind = kind_of(file)
+    solved = kind is FileKind.ORDERS
+    if solved or kind is FileKind.TABLE:
         names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
         names = [name for name in names if name != "--wavelength-range"]
         if refused := [*options.used_heights_options(args), *names]:
@@ -180,8 +181,9 @@ def _measured(
         how = options.load_options(args)
         asked = options.table_options(args) | {"wavelength_range": span}
         bar(0, 0, f"tabulating {file.name}")
-        table = table_of(read_scan(file, how, asked), bar)
-        if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
+        scan = read_scan(file, how, asked)
+        table = table_of(scan, bar)
+        if line := notes_line(warnings_of(*scan), file, how, TableSettings(**asked)):
             say(line)
     return spectrum(
         bsdf_of(table, **surface_parameters(args)),

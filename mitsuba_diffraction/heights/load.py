@@ -7,11 +7,11 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..files import readable_file
+from ..files import FileKind, kind_of, readable_file
 from ..settings import TableSettings
 from .field import HeightField
 from .lengths import Crop, Height, PixelSize
-from .read import LoadOptions, kind_of, read_heights, treat
+from .read import LoadOptions, read_heights, treat
 from .recipes import Recipe
 
 
@@ -81,7 +81,7 @@ def load(
 def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
     """Read and treat a height field; parameters and errors as in `load`."""
     file = readable_file(path)
-    if kind_of(file) == "recipe":
+    if kind_of(file) is FileKind.RECIPE:
         return Recipe.load(file).field(options)
     return read_heights(file, options)
 

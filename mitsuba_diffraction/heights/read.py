@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import DiffractionError, warn
-from ..files import readable_file
+from ..files import FileKind, kind_of, readable_file
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
 from .formats.grids import read_npy, read_text
-from .formats.images import is_park_tiff, read_exr, read_image
+from .formats.images import read_exr, read_image
 from .formats.instruments import read_instrument
 from .lengths import (
     LONGEST_PIXEL,
@@ -123,20 +123,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "periodic": partial(_choice, name="periodic", choices=("none", *PERIODICS)),
 }
 
-# First bytes of files. Content decides before the suffix does, so that a misnamed file still loads.
-_MAGIC = (
-    (b"\x89PNG\r\n\x1a\n", "image"),
-    (b"II*\0", "tiff"),
-    (b"MM\0*", "tiff"),
-    (b"\x76\x2f\x31\x01", "exr"),
-    (b"\x93NUMPY", "npy"),
-    (b"\xff\xd8\xff", "jpeg"),
-)
-_SUFFIX = {
-    ".png": "image", ".bmp": "image", ".tif": "image", ".tiff": "image", ".exr": "exr",
-    ".npy": "npy", ".txt": "text", ".csv": "text", ".tsv": "text", ".xyz": "text",
-    ".toml": "recipe",
-}  # fmt: skip
+_READERS = {FileKind.IMAGE: read_image, FileKind.NPY: read_npy, FileKind.TEXT: read_text}
 
 # µm; what is a tilt for this wavelength is one for longer ones, nearly.
 _SHORTEST = 0.36
@@ -174,41 +161,23 @@ def _by_default(field: HeightField, option: str) -> HeightField:
     )  # fmt: skip
 
 
-def is_recipe(path: str | os.PathLike[str]) -> bool:
-    """Return whether a path names a recipe: its suffix is .toml."""
-    return Path(path).suffix.lower() == ".toml"
-
-
-def kind_of(file: Path) -> str:
-    """Return the kind of a file by its content, else its suffix: "recipe" or a reader's name."""
-    with file.open("rb") as stream:
-        head = stream.read(8)
-    for magic, kind in _MAGIC:
-        if head.startswith(magic):
-            return ("instrument" if is_park_tiff(file) else "image") if kind == "tiff" else kind
-    if is_recipe(file):
-        return "recipe"
-    return _SUFFIX.get(file.suffix.lower(), "instrument")
-
-
 def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
     """Read the heights of a file; also return whether an instrument wrote it."""
     kind = kind_of(file)
-    if kind == "jpeg":
+    if kind is FileKind.JPEG:
         raise DiffractionError(
             f"{str(file)!r} is a JPEG, whose compression changes heights; export PNG or TIFF "
             "(8- or 16-bit grey) or numbers instead"
         )
-    if kind == "instrument":
-        return read_instrument(file, channel), True
-    if kind == "exr":
+    if kind in (FileKind.EXR, FileKind.TABLE):
         return read_exr(file, None if channel is None else str(channel)), False
+    if kind not in _READERS:
+        return read_instrument(file, channel), True
     if channel is not None:
         raise DiffractionError(
             f"{str(file)!r} has no channels to choose from; leave channel {channel!r} out"
         )
-    reader = {"image": read_image, "npy": read_npy, "text": read_text}[kind]
-    return reader(file), False
+    return _READERS[kind](file), False
 
 
 def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:

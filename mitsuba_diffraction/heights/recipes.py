@@ -26,12 +26,12 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..files import read_text
+from ..files import FileKind, kind_of, path_within, read_text
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
 from .formats import first_line
-from .read import LoadOptions, is_recipe, read_heights, treat
+from .read import LoadOptions, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
@@ -231,7 +231,7 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
             f"{shown}: source: expected a path, or a list of paths, got {source!r}"
         )
     for name in names:
-        if is_recipe(name):
+        if kind_of(file.parent / name) is FileKind.RECIPE:
             raise DiffractionError(f"{shown}: source: {name!r} is a recipe; name a file of heights")
     return tuple(file.parent / name for name in names)
 
@@ -284,4 +284,4 @@ def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
         raise DiffractionError(
             f"{shown}: output: expected a path that ends in .exr, got {output!r}"
         )
-    return file.parent / output
+    return path_within(file, output)

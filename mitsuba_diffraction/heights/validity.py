@@ -37,9 +37,6 @@ FACET = 0.01
 #: seams' share of the light outside the mirror direction, weighted with the angle's squared sine.
 SEAM_SHARE = 0.1
 
-#: Version of the texts, which cached tables store: raise it when a text changes.
-TEXTS_VERSION = 6
-
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
     """Return warnings where a patch leaves the model or its own resolution; empty if it does not.

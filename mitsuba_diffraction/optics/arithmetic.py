@@ -154,19 +154,6 @@ def squared(z: Number) -> Number:
     return z.real * z.real + z.imag * z.imag if is_complex(z) else z * z
 
 
-def one_minus_exp(x: Number) -> Number:
-    """Return 1 − exp(−x), x ≥ 0, without cancellation.
-
-    An arithmetic in double precision has `expm1`; without it, a series near 0 has an error of
-    x⁵/120.
-    """
-    xp = of(x)
-    if hasattr(xp, "expm1"):
-        return -xp.expm1(-x)
-    series = x * xp.fma(x, xp.fma(x, xp.fma(x, -1.0 / 24.0, 1.0 / 6.0), -0.5), 1.0)
-    return xp.where(x < 0.05, series, 1.0 - xp.exp(-x))
-
-
 #: Writes a call of a formula while `programs.Program` writes another; None otherwise.
 emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
 
@@ -182,3 +169,17 @@ def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Resu
         return written
 
     return call
+
+
+@formula
+def one_minus_exp(x: Number) -> Number:
+    """Return 1 − exp(−x), x ≥ 0, without cancellation.
+
+    An arithmetic in double precision has `expm1`; without it, a series near 0 has an error of
+    x⁵/120.
+    """
+    xp = of(x)
+    if hasattr(xp, "expm1"):
+        return -xp.expm1(-x)
+    series = x * xp.fma(x, xp.fma(x, xp.fma(x, -1.0 / 24.0, 1.0 / 6.0), -0.5), 1.0)
+    return xp.where(x < 0.05, series, 1.0 - xp.exp(-x))

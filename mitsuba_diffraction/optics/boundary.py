@@ -145,6 +145,7 @@ def kirchhoff(geometry: Geometry, index: Index) -> Jones:
     return facets(geometry, r_s * one, r_p * one)
 
 
+@formula
 def kirchhoff_power(geometry: Geometry, index: Index) -> Number:
     """Return ½ Σ|J|² of `kirchhoff`, without its turns."""
     if isinstance(index, Filmed):
@@ -192,6 +193,7 @@ def _of_face(geometry: Geometry, came: Face, there: Face) -> Jones:
     )
 
 
+@formula
 def mixed(first: Jones, second: Jones, weight: Number) -> Jones:
     """Return the second matrix, and as much of the first as its weight says."""
     return tuple((a - b) * weight + b for a, b in zip(first, second, strict=True))

@@ -8,9 +8,9 @@ from typing import Any
 import mitsuba as mi
 
 from ..errors import DiffractionError, quoted
+from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..tables.orders import OrderTable
-from ..tables.orders.file import is_order_table
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -66,7 +66,7 @@ def bsdf_dict(
     arguments = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, OrderTable):
         return {"type": ORDERS, "data": OrderData(field), **arguments}
-    if isinstance(field, str | os.PathLike) and is_order_table(field):
+    if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
         return {"type": ORDERS, "table": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):
         return {"type": plugin, "heightfield": os.fspath(field), **arguments}

@@ -12,16 +12,15 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, warn
-from ..files import readable_file
+from ..files import FileKind, kind_of, readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
 from ..heights.load import load_heights, notes_line
-from ..heights.read import LoadOptions, is_recipe, treat
+from ..heights.read import LoadOptions, treat
 from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
-from ..tables.exr import is_table
-from ..tables.orders.file import is_order_table
+from ..tables.build.checks import warnings_of
 from ..tables.store import cached_table, key_of, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
@@ -95,12 +94,13 @@ def table_of_file(
     factors : the factors that are asked for.
     provider : gets the tables of heights.
     """
-    if is_order_table(path):
+    kind = kind_of(path)
+    if kind is FileKind.ORDERS:
         raise DiffractionError(
             f"'{path}' is a table of orders, which the BSDF 'diffraction_orders' has as its table; "
             "change the type of the BSDF, or give heights"
         )
-    if must_be_table or is_table(path):
+    if must_be_table or kind is FileKind.TABLE:
         table = loaded_table(path)
         _check_agreement(path, table, options, asked)
         height_scale = factors.height_scale
@@ -116,7 +116,7 @@ def table_of_file(
                 "the height field instead of the table, or build it with '--height-scale-max "
                 f"{height_scale:.4g}' or more"
             )
-    elif is_recipe(path):
+    elif kind is FileKind.RECIPE:
         recipe = Recipe.load(path)
         table = provider(
             _request(
@@ -154,12 +154,13 @@ def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> He
     DiffractionError
         If it names a table, which does not hold them.
     """
-    if must_be_table or is_table(path):
+    kind = kind_of(path)
+    if must_be_table or kind is FileKind.TABLE:
         raise DiffractionError(
             f"'{path}' is a table and does not hold the heights that it was made of; give the "
             "scene the height field instead"
         )
-    if is_recipe(path):
+    if kind is FileKind.RECIPE:
         return Recipe.load(path).fields(options)[0]
     return load_heights(path, options)
 
@@ -209,7 +210,7 @@ def _request(
         heights = [field.stretched(stretch) for field in load()]
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
         table = build_with(heights, settings)
-        lines = table.source["warnings"]
+        lines = warnings_of(heights, settings)
         if lines and recipe is not None:
             lines = [notes_line(lines, recipe.path, recipe.options, settings)]
         for line in lines:

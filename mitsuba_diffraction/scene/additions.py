@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
 from ..tables.orders import OrderTable
-from ..tables.orders.file import is_order_table
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
 
@@ -190,7 +190,7 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
     file, *parameters = _COMMA.split(text)
     pairs = [parameter.partition("=")[::2] for parameter in parameters]
     values = {name.strip(): _value(value.strip()) for name, value in pairs}
-    names, solved = list(values), is_order_table(file)
+    names, solved = list(values), kind_of(file) is FileKind.ORDERS
     plugin = TRANSMITTING if "thin" in names else REFLECTING
     props = mi.Properties(ORDERS if solved else plugin)
     props["table" if solved else "heightfield"] = str(Path(file).absolute())

@@ -21,6 +21,7 @@ from ..files import readable_file
 from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
+from ..system import memory
 from .parameters import check_parameters, refuse_pipes
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
@@ -43,6 +44,8 @@ _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
 _TAKEN = ("path", "parallel", "optimize")
+# Least memory of a pixel: film, bitmap and one path of a wavefront.
+_BYTES_PER_PIXEL = 128
 # Dr.Jit's names of the backends that need a GPU
 _GPUS = {"cuda": "CUDA", "metal": "Metal"}
 
@@ -188,7 +191,19 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError(
             f"--sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
+    _check_film(sensors[index])
     return sensors[index]
+
+
+def _check_film(sensor: Any) -> None:
+    """Refuse a film whose pictures would exceed the memory of this machine."""
+    width, height = (int(length) for length in sensor.film().crop_size())
+    needed = width * height * _BYTES_PER_PIXEL
+    if needed > memory():
+        raise DiffractionError(
+            f"a picture of {width} x {height} pixels needs some {needed / 1e9:.3g} GB, and this "
+            f"machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most scenes)"
+        )
 
 
 def plain_text(error: BaseException) -> str:

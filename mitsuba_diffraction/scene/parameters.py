@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import DiffractionError, quoted
-from ..files import refuse_pipe
+from ..files import FileKind, kind_of, refuse_pipe
 from ..heights.recipes import LOAD_KEYS
 from ..settings import RECIPE_SETTINGS
 
@@ -85,7 +85,6 @@ def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]
 
 def _walk(scene: Path, values: Mapping[str, str] | None, with_sources: bool) -> list[Path]:
     """List the files that a scene names, with those that recipes among them name if asked."""
-    from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
     defaults = parameters_of(scene, values) or {}
@@ -98,7 +97,7 @@ def _walk(scene: Path, values: Mapping[str, str] | None, with_sources: bool) -> 
         if file in files or not os.path.isfile(file):  # Path.is_file() raises for long names
             continue
         files[file] = None
-        if with_sources and is_recipe(file):
+        if with_sources and kind_of(file) is FileKind.RECIPE:
             waiting += Recipe.load(file).sources
         if file.suffix.lower() != ".xml":
             continue

@@ -8,7 +8,3 @@ from pathlib import Path
 _BROUGHT, _CLONE = Path(__file__).with_name("studio"), Path(__file__).parents[2] / "scenes"
 #: Scene that meshes are put into.
 STUDIO = (_BROUGHT if _BROUGHT.is_dir() else _CLONE) / "own_mesh.xml"
-#: Suffixes of mesh files that Mitsuba reads.
-MESHES = (".ply", ".obj", ".serialized")
-#: Suffixes of mesh files that have to be converted first: Mitsuba reads neither STL nor glTF.
-OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")

@@ -30,8 +30,7 @@ from scipy.io import netcdf_file
 
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
-from ..files import read_bytes, read_text
-from ..tables.orders.file import is_order_table
+from ..files import FileKind, kind_of, read_bytes, read_text
 from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
 from .stations import Real
 
@@ -93,7 +92,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     """
     shown = repr(os.fspath(path))
     head = read_bytes(path)[: len(_BEGINS_HDF5)]
-    if is_order_table(path):
+    if kind_of(path) is FileKind.ORDERS:
         raise DiffractionError(f"{shown} is a table of orders already; use it as it is")
     if head.startswith(b"CDF") or head == _BEGINS_HDF5:
         try:
@@ -125,7 +124,10 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
             f"{shown} has no column {missing[0]}; the first line must name "
             f"{', '.join((*CSV_AXES, *kinds))}"
         )
-    columns = [names.index(name) for name in (*axes, *kinds)]
+    wanted = (*axes, *kinds)
+    if twice := [name for name in wanted if names.count(name) > 1]:
+        raise DiffractionError(f"{shown} has several columns {twice[0]}; keep one")
+    columns = [names.index(name) for name in wanted]
     try:
         next(reader)
         rows = [

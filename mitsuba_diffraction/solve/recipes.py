@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, one_line, quoted
-from ..files import read_text
+from ..files import path_within, read_text
 from ..heights.lengths import number_between
 from ..heights.recipes import SOLVED
 from ..tables.orders.table import WAVELENGTHS
@@ -101,7 +101,7 @@ class SolvedRecipe:
                 number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
                 _settings(content),
-                file.parent / output,
+                path_within(file, output),
             )
         except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error

@@ -22,16 +22,12 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
-from ..files import readable_file
+from ..files import TABLE_ATTRIBUTE, readable_file
 from ..streams import without_chatter
 from .document import TableDescription, document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
-#: First bytes of every EXR.
-EXR_BEGINS = b"\x76\x2f\x31\x01"
-#: The attribute with everything but the coefficients. One string: OpenEXR keeps numbers as floats.
-ATTRIBUTE = "mitsuba_diffraction"
 #: SHA-256 of that string and of all channels, in the order of `_channels`.
 CHECKSUM = "mitsuba_diffraction_sha256"
 
@@ -61,7 +57,7 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
         "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        ATTRIBUTE: text,
+        TABLE_ATTRIBUTE: text,
         CHECKSUM: _checksum(text, channels),
     }
     with atomic_path(path) as temporary:
@@ -80,7 +76,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         If the file is missing, no table, damaged, or of another format version.
     """
     headers = _headers(path)
-    text = headers[0].get(ATTRIBUTE)
+    text = headers[0].get(TABLE_ATTRIBUTE)
     document = _parsed(text, path)
     if document is None:
         raise DiffractionError(
@@ -107,17 +103,6 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         ) from error
 
 
-def is_table(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a table, of any version; False if it cannot be read."""
-    try:
-        with readable_file(path).open("rb") as stream:
-            if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
-                return False
-    except (OSError, DiffractionError):
-        return False  # whoever reads it says why it cannot be
-    return read_document(path) is not None
-
-
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     """Return the JSON attribute of a table's file; None for an EXR image without one.
 
@@ -126,7 +111,7 @@ def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     DiffractionError
         If the file is missing, a folder, or cannot be read as EXR.
     """
-    return _parsed(_headers(path)[0].get(ATTRIBUTE), path)
+    return _parsed(_headers(path)[0].get(TABLE_ATTRIBUTE), path)
 
 
 def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
@@ -136,8 +121,8 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise DiffractionError(
-            f"'{path}' is a damaged table (its attribute '{ATTRIBUTE}' is no JSON); build it again "
-            "with 'mitsuba-diffraction precompute'"
+            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
+            "again with 'mitsuba-diffraction precompute'"
         ) from error
     return document if isinstance(document, dict) else None
 

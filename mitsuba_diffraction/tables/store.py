@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
 from ..errors import DiffractionError, one_line, warn
-from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
@@ -257,7 +256,7 @@ _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 def table_key(digest: str, settings: TableSettings) -> str:
     """Return the key of the table of heights with this digest, built with these settings."""
-    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings))
+    return key_of(FORMAT_VERSION, digest, asdict(settings))
 
 
 def cached_table(

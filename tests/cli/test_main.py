@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shlex
 import subprocess
 import sys
@@ -13,6 +15,7 @@ from mitsuba_diffraction import __version__
 from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from tests.support import ROOT
 from tests.support.systems import posix
 
 
@@ -184,3 +187,66 @@ def test_general_options_have_defaults_and_may_stand_anywhere(name):
     assert (args.debug, args.progress) == (False, None)
     for arguments in (["--no-progress", name, "a"], [name, "a", "--no-progress"]):
         assert parser.parse_args(arguments).progress is False
+
+
+@pytest.mark.parametrize("name", ["export-shader", "info", "tonemap"])
+def test_an_unknown_option_shows_the_usage_of_its_command(run, name):
+    ran = run(name, "a.xml", "--nonsense", "b")
+    assert ran.code == 2
+    assert ran.err.startswith(f"usage: mitsuba-diffraction {name} ")
+    assert "unrecognized arguments: --nonsense" in ran.err
+
+
+@pytest.mark.parametrize("stream", ["--json", "text"])
+def test_names_do_not_control_the_terminal(run, here, heights, stream):
+    hostile = here / "a\x1b]0;b\x07\u202ec.npy"
+    hostile.write_bytes(heights.read_bytes())
+    options = ["--json"] if stream == "--json" else []
+    ran = run("info", hostile, "--pixel-size", "0.08", *options)
+    assert ran.code == 0
+    assert ran.out.isprintable() or not {"\x1b", "\x07", "\u202e"} & set(ran.out)
+    if options:
+        assert json.loads(ran.out)["file"] == str(hostile)
+    line = run("info", here / "a\x1b\u202e.npy").failed_in_one_line()
+    assert "\\x1b" in line
+    assert not {"\x1b", "\u202e"} & set(line)
+
+
+@posix
+def test_a_deleted_working_folder_is_one_line(heights, tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
+    ran = subprocess.run(
+        ["bash", "-c", f"cd '{gone}' && rmdir '{gone}' && {shlex.join(words)}"],
+        capture_output=True, text=True, timeout=120, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert ran.returncode == 1
+    (line,) = ran.stderr.splitlines()
+    assert "current folder does not exist" in line
+
+
+@posix
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
+def test_closed_streams_are_no_error(heights, closed, tmp_path):
+    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
+    command = f"{shlex.join([*words, '--pixel-size', '0.08', '--json', 'a.json'])} {closed}"
+    ran = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert ran.returncode == 0
+    assert "Traceback" not in ran.stderr
+    assert json.loads((tmp_path / "a.json").read_text("utf-8"))["kind"] == "height field"
+
+
+def test_a_failing_import_is_one_line(tmp_path):
+    (tmp_path / "mitsuba.py").write_text("raise ImportError('failed to map segment')")
+    ran = subprocess.run(
+        [sys.executable, "-m", "mitsuba_diffraction", "info", "a.npy"],
+        capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+    )  # fmt: skip
+    assert ran.returncode == 1
+    (line,) = ran.stderr.splitlines()
+    assert "failed to map segment" in line

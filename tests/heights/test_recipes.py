@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,7 @@ pixel_size = 0.1
 coherence_width = 30
 coherence = "patch"
 wavelength_range = [400, 700]
-output = "../out/x.exr"
+output = "out/x.exr"
 """
     recipe = Recipe.load(write(folder, text))
     assert recipe.table == {
@@ -83,7 +84,7 @@ output = "../out/x.exr"
         "coherence": "patch",
         "wavelength_range": (400, 700),
     }
-    assert recipe.output == folder / "../out/x.exr"
+    assert recipe.output == folder / "out/x.exr"
     plain = Recipe.load(write(folder, 'source = "a.npy"'))
     assert plain.table == {}
     assert plain.output == Path("patch.exr")  # in the current folder
@@ -146,6 +147,15 @@ def test_what_does_not_fit_is_named(folder, text, words):
     assert "patch.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert all(word in str(caught.value) for word in words)
+
+
+@pytest.mark.parametrize("output", ["../x.exr", "a/../../x.exr", "/tmp/x.exr", "away/x.exr"])
+def test_an_output_outside_of_the_recipe_s_folder_is_refused(folder, tmp_path_factory, output):
+    with contextlib.suppress(OSError):  # Windows lets few users make links
+        (folder / "away").symlink_to(tmp_path_factory.mktemp("elsewhere"))
+    if (folder / "away").exists() or "away" not in output:
+        with pytest.raises(DiffractionError, match="outside the file's folder"):
+            Recipe.load(write(folder, f'source = "a.npy"\noutput = "{output}"'))
 
 
 def test_what_only_the_heights_can_tell_is_named_too(folder):

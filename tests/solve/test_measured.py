@@ -284,3 +284,10 @@ def test_a_damaged_netcdf_file_is_refused_in_one_line_or_read(small, data):
             assert "\n" not in str(error)
         else:
             assert np.isfinite(table.efficiency(0.1, 0.0, 550.0, 0))
+
+
+def test_a_column_that_stands_twice_is_refused(tmp_path):
+    file = tmp_path / "twice.csv"
+    file.write_text("wavelength_nm,theta_deg,order,R_s,R_s,R_p\n500,0,0,0.5,0.6,0.5\n")
+    with pytest.raises(DiffractionError, match="several columns R_s"):
+        md.read_orders(file, PERIOD)

@@ -18,7 +18,8 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.tables.exr import ATTRIBUTE, CHECKSUM, _checksum
+from mitsuba_diffraction.files import TABLE_ATTRIBUTE
+from mitsuba_diffraction.tables.exr import CHECKSUM, _checksum
 from tests.support import looked_up
 from tests.support.directions import rough_patch
 
@@ -64,7 +65,7 @@ class Contents:
     def __init__(self, path: Path) -> None:
         with OpenEXR.File(str(path), separate_channels=True) as exr:
             self.channels = {name: np.array(c.pixels) for name, c in exr.channels().items()}
-            self.document = json.loads(exr.header()[ATTRIBUTE])
+            self.document = json.loads(exr.header()[TABLE_ATTRIBUTE])
 
     def write(self, path: Path) -> None:
         """A file that nothing but what it says gives away."""
@@ -76,7 +77,7 @@ class Contents:
             "type": OpenEXR.scanlineimage,
             "compression": OpenEXR.ZIP_COMPRESSION,
             "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
-            ATTRIBUTE: text,
+            TABLE_ATTRIBUTE: text,
             CHECKSUM: _checksum(text, ordered),
         }
         OpenEXR.File(header, self.channels).write(str(path))

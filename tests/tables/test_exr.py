@@ -14,7 +14,8 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.tables.exr import ATTRIBUTE, read_document
+from mitsuba_diffraction.files import TABLE_ATTRIBUTE
+from mitsuba_diffraction.tables.exr import read_document
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
 from tests.support.directions import rough_patch
 
@@ -47,10 +48,10 @@ def rewritten(file, change):
     with OpenEXR.File(str(file), separate_channels=True) as exr:
         channels = {name: np.array(c.pixels) for name, c in exr.channels().items()}
         header = dict(exr.header())
-    document = json.loads(header[ATTRIBUTE])
+    document = json.loads(header[TABLE_ATTRIBUTE])
     change(document)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    header[ATTRIBUTE] = json.dumps(document)
+    header[TABLE_ATTRIBUTE] = json.dumps(document)
     OpenEXR.File(header, channels).write(str(file))
 
 
@@ -90,7 +91,7 @@ def test_saving_what_was_loaded_makes_the_same_file(table, tmp_path):
 
 def test_other_programs_find_named_float_channels_and_what_they_mean(saved):
     with OpenEXR.File(str(saved), separate_channels=True) as file:
-        channels, document = set(file.channels()), json.loads(file.header()[ATTRIBUTE])
+        channels, document = set(file.channels()), json.loads(file.header()[TABLE_ATTRIBUTE])
     expansion = document["expansion"]
     assert channels == {
         f"power.{i}.{t}" for i in range(expansion["intervals"]) for t in range(expansion["terms"])

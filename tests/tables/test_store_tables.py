@@ -65,15 +65,6 @@ def test_a_later_process_reads_it_from_disk(folder):
     assert np.array_equal(first.coefficients, second.coefficients)
 
 
-def test_tables_with_texts_of_an_earlier_version_are_built_anew(monkeypatch):
-    build = Builder()
-    build.table()
-    store._tables.clear()
-    monkeypatch.setattr(store, "TEXTS_VERSION", store.TEXTS_VERSION + 1)
-    build.table()
-    assert build.built == 2
-
-
 def test_equal_content_is_found_whatever_it_is_called():
     build = Builder()
     build.table()

@@ -9,6 +9,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from mitsuba_diffraction.tables.build.checks import warnings_of
 from tests.support.directions import lit_pairs, polar, rough_patch
 from tests.support.patches import DEFAULTS, PATCH, WIDTH
 
@@ -61,12 +62,13 @@ def test_height_scale_is_a_factor_on_the_heights():
         assert np.sum(np.abs(value - exact) / factor) <= 1e-4 * np.sum(exact / factor)
 
 
-def test_a_table_remembers_its_source_and_its_warnings():
+def test_a_table_remembers_its_source_and_has_no_warnings_in_it():
     coarse = HeightField(PATCH.heights, 0.2, name="coarse.png")
     table = DiffractionTable.build(coarse, coherence_width=65.0, tolerance=1e-2)
     assert table.source["digest"] == coarse.digest()
     assert table.source["shape"] == [64, 63]
-    warnings = table.source["warnings"]
+    assert "warnings" not in table.source  # which depend on nothing but heights and settings
+    warnings = warnings_of([coarse], table.settings)
     assert any("coherence_width=12 (--coherence-width 12)" in line for line in warnings)
     assert table.source["repeats"]
     assert "repetition" in table.width_text
@@ -74,7 +76,7 @@ def test_a_table_remembers_its_source_and_its_warnings():
     assert all("coarse.png" in line and "\n" not in line for line in warnings)
     gentle = rough_patch((64, 64), (0.08, 0.08), 0.05)
     fitting = DiffractionTable.build(gentle, **DEFAULTS)
-    assert fitting.source["warnings"] == []
+    assert warnings_of([gentle], fitting.settings) == []
     assert fitting.width_text == f"{fitting.coherence_width:g} µm"
 
 

@@ -34,9 +34,6 @@ _DAMAGED = (
     zlib.error,
 )  # fmt: skip
 
-# Private TIFF tag with which Park Systems marks its files.
-_PARK_TAG = 50432
-
 
 def read_image(path: Path) -> RawHeights:
     """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative) or 32-bit float (µm).
@@ -67,17 +64,6 @@ def read_image(path: Path) -> RawHeights:
         raise DiffractionError(f"{shown} is too large: {first_line(error)}") from error
     except _DAMAGED as error:
         raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
-
-
-def is_park_tiff(path: Path) -> bool:
-    """Return whether a TIFF is an instrument file of Park Systems, with heights in private tags."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            with Image.open(path, formats=("TIFF",)) as image:
-                return _PARK_TAG in image.tag_v2  # type: ignore[attr-defined]
-        except (*_DAMAGED, Image.DecompressionBombError):
-            return False  # `read_image` reports the damage
 
 
 def _heights_of(image: Image.Image, shown: str) -> RawHeights:

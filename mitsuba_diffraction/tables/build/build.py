@@ -30,6 +30,7 @@ from .checks import (
     check_units,
     check_window,
     too_wide,
+    warnings_of,
 )
 from .choose import (
     MAX_INTERVALS,
@@ -233,7 +234,7 @@ def build_table(
         height_scale_max, checked("frequency_limit", frequency_limit), windows, second_order,
     )  # fmt: skip
     table = build_with(heights, settings, progress)
-    for line in table.source["warnings"]:
+    for line in warnings_of([heights] if isinstance(heights, HeightField) else heights, settings):
         warn(line)
     return table
 
@@ -244,7 +245,7 @@ def build_with(
     progress: Progress | None = None,
     run: Run = map,
 ) -> DiffractionTable:
-    """Build a table as `build_table`; its `source` has the warnings, which nobody is told here.
+    """Build a table as `build_table`, without its warnings (`checks.warnings_of`).
 
     run : what does the work of windows, as `map` does here.
     """
@@ -353,7 +354,7 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
         settings=settings,
         error=attempt.measured,
         roughness=roughness,
-        source=describe(patches, settings, setting.taps),
+        source=describe(patches, settings),
         slope_ratios=slope_ratios(patches, settings, roughness) if settings.second_order else None,
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import DiffractionError
+from ...heights.coherence import resolved, window_warning
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
@@ -89,6 +90,30 @@ def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple
     """Return the orders (x, y) that a look-up will probably read, for a patch this large, µm."""
     x, y = (sigma_of(settings.width) * 2.0 * np.pi / length for length in extent)
     return taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
+
+
+def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[str]:
+    """Return warnings of a table of these scans; they are no part of the table.
+
+    Heights that are refused have none.
+    """
+    settings, first = resolved(settings, scans), scans[0]
+    if settings.windows is not None:  # levelled and tapered: tilt and edges do not show
+        scans = [
+            HeightField(s.heights, s.pixel_size, name=s.name, periodic=s.periodic) for s in scans
+        ]
+    lines = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
+    try:
+        check_units(scans)
+        if settings.windows is None:
+            check_window(first.extent, settings)
+    except DiffractionError:
+        return []
+    if settings.windows is None:
+        taps = expected_taps(first.extent, settings)
+        lines.append(slow_warning(first, settings.width, taps))
+    lines.append(window_warning(settings.width, scans))
+    return [line for line in dict.fromkeys(lines) if line]
 
 
 def slow_warning(field: HeightField, width: float, taps: tuple[int, int]) -> str:

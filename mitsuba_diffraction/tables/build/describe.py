@@ -1,4 +1,4 @@
-"""Description of the heights in a table: statistics, digest, roughness and warnings."""
+"""Description of the heights in a table: statistics, digest and roughness."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...heights.coherence import repeats, width_reason, window_warning
+from ...heights.coherence import repeats, width_reason
 from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
-from .checks import slow_warning
 from .spectrum import Spectrum
 from .windows import Windows
 
@@ -23,10 +22,8 @@ _PART = 2048
 _GREEN = 550.0  # nm, where the variation between patches is stated
 
 
-def describe(
-    patches: Sequence[HeightField], settings: TableSettings, taps: tuple[int, int]
-) -> dict[str, Any]:
-    """Return statistics, digest and warnings of the patches, as plain data.
+def describe(patches: Sequence[HeightField], settings: TableSettings) -> dict[str, Any]:
+    """Return statistics and digest of the patches, as plain data.
 
     Windows are described by their scans and the standard error of the mean over windows. With
     several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
@@ -35,21 +32,7 @@ def describe(
     windows = patches if isinstance(patches, Windows) else None
     scans = windows.scans if windows else patches
     first, coherence_width = scans[0], settings.width
-    if windows:  # levelled and tapered: tilt and edges of the scans do not show
-        scans = [
-            HeightField(
-                s.heights, s.pixel_size, name=s.name, history=s.history, periodic=s.periodic
-            )
-            for s in scans
-        ]
-    warnings = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
-    small = window_warning(coherence_width, scans)
-    if small:
-        warnings.append(small)
-    slow = slow_warning(first, coherence_width, taps)
-    if slow:
-        warnings.append(slow)
-    source = first.summary() | {"digest": first.digest(), "warnings": warnings}
+    source = first.summary() | {"digest": first.digest()}
     source["window"] = width_reason(coherence_width, scans)
     if repeats(coherence_width, scans):
         source["repeats"] = True

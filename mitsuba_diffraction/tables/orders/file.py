@@ -26,21 +26,14 @@ from scipy.io import netcdf_file
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
-from ...files import read_bytes, readable_file
-from ..exr import is_table
+from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever what the numbers mean changes; files of another version are refused.
 FORMAT_VERSION = 1
 SUFFIX = ".nc"
-#: First bytes of a classic NetCDF file.
-BEGINS = b"CDF"
-#: Attribute that tells these files from other NetCDF files.
-MARK = "mitsuba_diffraction_orders"
 #: Step of the packed efficiencies: 16 bits reach 1.092.
 _STEP = 1.0 / 30_000.0
-#: Bytes at the beginning, among which the mark is: dimensions precede the attributes.
-_HEAD = 1 << 16
 #: Mark of Mueller matrices among packed arrays.
 _MUELLER = " mueller"
 _AGAIN = "solve it again with 'mitsuba-diffraction solve'"
@@ -68,7 +61,7 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
     content = io.BytesIO()
     with netcdf_file(content, "w") as file:
         file.title = "Efficiencies of the orders of a grating"
-        setattr(file, MARK, np.int32(FORMAT_VERSION))
+        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
         file.period, file.period_units = np.float64(table.period), "um"
         file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
         file.superstrate = np.float64(table.superstrate)
@@ -110,11 +103,11 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
         If the file is missing, no table of orders, damaged, or of another version.
     """
     data = read_bytes(path)
-    if not (data.startswith(BEGINS) and MARK.encode() in data[:_HEAD]):
+    if kind_of(path) is not FileKind.ORDERS:
         raise DiffractionError(f"'{path}' is no table of orders; {_advice(Path(path))}")
     try:
         with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
-            version = int(getattr(file, MARK))
+            version = int(getattr(file, ORDERS_ATTRIBUTE))
             if version != FORMAT_VERSION:
                 raise DiffractionError(
                     f"its format version is {version}, this program reads {FORMAT_VERSION}"
@@ -128,22 +121,12 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
         ) from error
 
 
-def is_order_table(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a table of orders, of any version; False if it cannot be read."""
-    try:
-        with readable_file(path).open("rb") as stream:
-            first = stream.read(_HEAD)
-    except (OSError, DiffractionError):
-        return False  # whoever reads it says why it cannot be
-    return first.startswith(BEGINS) and MARK.encode() in first
-
-
 def _advice(path: Path) -> str:
     """Return what to do with a file that is no table of orders."""
-    if path.suffix.lower() == ".toml":
+    if kind_of(path) is FileKind.RECIPE:
         command = f"mitsuba-diffraction solve {shlex.quote(str(path))}"
         return f"run '{command}', and give the table (.nc) that it writes"
-    if is_table(path):
+    if kind_of(path) is FileKind.TABLE:
         return "tables of heights (EXR) belong to the BSDF 'diffraction'"
     return (
         "make one with 'mitsuba-diffraction solve', which also reads efficiencies of other "
@@ -156,6 +139,8 @@ def _table(file: Any) -> OrderTable:
     period, superstrate = float(file.period), float(file.superstrate)
     low, high = (float(number) for number in file.wavelengths)
     header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
+    if not isinstance(content := json.loads(header), dict):
+        raise ValueError("its header is no JSON object")
     components = getattr(file, "components", GROOVES.encode()).decode("utf-8")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     for name, variable in file.variables.items():
@@ -173,7 +158,7 @@ def _table(file: Any) -> OrderTable:
         for key, numbers in packed.items()
     }
     bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
-    return OrderTable(period, (low, high), bands, superstrate, json.loads(header), thin, components)
+    return OrderTable(period, (low, high), bands, superstrate, content, thin, components)
 
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:

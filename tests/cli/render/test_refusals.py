@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import mitsuba as mi
 import pytest
@@ -116,3 +117,15 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(child, scene, output):
 def test_definitions_may_hold_equal_signs():
     args = build_parser().parse_args(["render", "a", "-D", "a=b=c", "-D", "d="])
     assert args.parameters == [("a", "b=c"), ("d", "")]
+
+
+def test_a_picture_beyond_the_memory_is_refused_before_it_is_rendered(run, scene):
+    size = '<integer name="width" value="99999999"/><integer name="height" value="9999"/>'
+    scene.write_text(
+        re.sub(r'<integer name="(width|height)" value="[^"]*"/>', "", SCENE).replace(
+            '<film type="hdrfilm">', f'<film type="hdrfilm">{size}'
+        )
+    )
+    line = run("render", scene, *QUICK).failed_in_one_line()
+    assert "99999999 x 9999 pixels" in line
+    assert "use fewer pixels" in line

@@ -158,3 +158,11 @@ def test_missing_bands_and_absurd_outlines_are_refused():
     for arguments in ({"period": np.nan}, {"period": 500.0}, {"wavelengths": (700.0, 400.0)}):
         with pytest.raises(DiffractionError):
             OrderTable.mirror(**{"period": 0.5, **arguments})
+
+
+def test_a_header_that_is_no_object_is_refused(tmp_path, monkeypatch):
+    file = tmp_path / "list.nc"
+    monkeypatch.setattr("json.dumps", lambda *_, **__: "[1, 2]")  # with a checksum that is right
+    GRATING.save(file)
+    with pytest.raises(DiffractionError, match="header is no JSON object"):
+        OrderTable.load(file)

@@ -1,0 +1,62 @@
+"""Kinds of files: content decides, else the suffix; each file is opened once."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.files import FileKind, kind_of
+from tests.support.orders import thin_grating
+from tests.support.patches import DEFAULTS, PATCH
+
+
+def tiff(tag: int) -> bytes:
+    """A TIFF whose first page has one tag, after its data."""
+    entry = struct.pack("<HHII", tag, 4, 1, 0)
+    return b"II*\0" + struct.pack("<I", 12) + b"data" + struct.pack("<H", 1) + entry + bytes(4)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("a.toml", FileKind.RECIPE), ("a.XML", FileKind.SCENE), ("a.obj", FileKind.MESH),
+        ("a.glb", FileKind.MESH), ("a.png", FileKind.IMAGE), ("a.exr", FileKind.EXR),
+        ("a.csv", FileKind.TEXT), ("a.npy", FileKind.NPY), ("a.spm", FileKind.INSTRUMENT),
+        ("a", FileKind.INSTRUMENT),
+    ],
+)  # fmt: skip
+def test_the_suffix_decides_without_telling_content(tmp_path, name, kind):
+    assert kind_of(tmp_path / name) is kind  # missing
+    (tmp_path / name).write_bytes(b"1 2 3")
+    assert kind_of(tmp_path / name) is kind
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"\x89PNG\r\n\x1a\n", FileKind.IMAGE), (b"\x93NUMPY", FileKind.NPY),
+        (b"\xff\xd8\xff", FileKind.JPEG), (tiff(256), FileKind.IMAGE),
+        (tiff(50432), FileKind.INSTRUMENT), (tiff(0x8042), FileKind.INSTRUMENT),
+        (b"II*\0", FileKind.IMAGE), (b"CDF\1 of others", FileKind.INSTRUMENT),
+    ],
+)  # fmt: skip
+def test_content_decides_before_the_suffix(tmp_path, content, kind):
+    file = tmp_path / "a.jpk"
+    file.write_bytes(content)
+    assert kind_of(file) is kind
+
+
+def test_tables_are_told_from_pictures_and_other_netcdf(tmp_path):
+    DiffractionTable.build(PATCH, **DEFAULTS).save(tmp_path / "table.exr")
+    thin_grating().save(tmp_path / "orders.nc")
+    Image.fromarray(np.zeros((4, 4), np.uint8)).save(tmp_path / "a.tif")
+    for name, kind in [
+        ("table.exr", FileKind.TABLE), ("orders.nc", FileKind.ORDERS), ("a.tif", FileKind.IMAGE),
+    ]:  # fmt: skip
+        content = (tmp_path / name).read_bytes()
+        (tmp_path / "misnamed.toml").write_bytes(content)
+        assert kind_of(tmp_path / name) is kind_of(tmp_path / "misnamed.toml") is kind
