@@ -76,7 +76,7 @@ def shaded(gl: Any, given: Pairs, model: Model, index: complex, coated: bool) ->
 def test_boundary_is_that_of_the_reference(gl: Any, kind: str, coated: bool) -> None:
     index = INDICES[kind]
     found = shaded(gl, PAIRS, MODELS["small_slope"], index, coated)
-    check(found, exact_power(PAIRS, index, coated=coated))
+    check(found, exact_power(PAIRS, index, coated=coated), coated=coated)
 
 
 @pytest.mark.parametrize("kind", ["dielectric", "metal"])
