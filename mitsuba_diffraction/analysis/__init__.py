@@ -4,7 +4,10 @@ Contents
 --------
 maps           BRDF maps over the hemisphere of view directions
 spectra        reflectance spectra as a spectrometer measures them
-spectra_files  CSV and plot of spectra
+spectra_files  CSV, colours and plot of spectra
+spectral_variables  variables of spectra as biologists publish them
+known_wavelengths  wavelengths at which a material and a pigment are known
+crops          crops of one scan
 scans          tables and BSDFs of scans and recipes
 survey         table, map and statistics of many scans
 treatments     options of a survey by patterns of file names

@@ -21,7 +21,7 @@ SHOWN = (0.0, 45.0, 60.0, 75.0)
 #: Polar angles of R + T, degrees.
 PASSED = (0.0, 30.0, 45.0, 60.0, 75.0)
 #: Removed share of the albedo from which on a warning is issued.
-MUCH = 0.05
+WARN_REMOVED = 0.05
 
 
 def energy_summary(table: DiffractionTable) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def energy_warnings(summary: dict[str, Any]) -> list[str]:
         f"with {name}, the model gains energy: up to {100 * energy['taken, largest']:.0f} % of the "
         "light is removed (up to 80° from the normal; energy_conserving=false keeps it)"
         for name, energy in summary.items()
-        if energy["taken, largest"] > MUCH
+        if energy["taken, largest"] > WARN_REMOVED
     ]
     lost = {
         name: 1.0 - energy["conserved over raw where that is at most 1"][0]
@@ -126,5 +126,5 @@ def energy_warnings(summary: dict[str, Any]) -> list[str]:
         f"with {name}, directions that gain nothing lose up to {100 * share:.0f} %, too: strong "
         "orders become propagating between the scale's directions, as on gratings (docs/energy.md)"
         for name, share in lost.items()
-        if share > MUCH
+        if share > WARN_REMOVED
     ]

@@ -14,6 +14,7 @@ of angle θ to, and at −θ on the lamp's side.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,13 +26,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import kirchhoff_factor, wavenumber
-from ..optics.materials import PERFECT, material_named
-from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
-from ..plugin.pigment import pigment_range
 from ..progress import Progress, silent
+from .known_wavelengths import check_material
 
 Reals = NDArray[np.float64]
 
@@ -106,8 +105,10 @@ class Geometry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the detectors' columns, e.g. light30_detector0."""
-        return tuple(f"light{self.light:g}_detector{angle:g}" for angle in self.detectors)
+        """Names of the detectors' columns that R keeps: light30_detectorm10 at −10°."""
+        return tuple(
+            f"light{self.light:g}_detector{angle:g}".replace("-", "m") for angle in self.detectors
+        )
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,7 @@ class Spectra:
     value : (n, detectors), for unpolarised light; 1 is all of what `relative` names.
     s, p : the same for light polarised across and in the plane of incidence, or None.
     error : standard errors of `value` where it is a mean over several surfaces, or None.
+    band : least and largest values over treatments of the heights, or None.
     geometry : angles.
     relative : one of `RELATIVE`.
     """
@@ -131,13 +133,19 @@ class Spectra:
     s: Reals | None = None
     p: Reals | None = None
     error: Reals | None = None
+    band: tuple[Reals, Reals] | None = None
 
-    def columns(self) -> dict[str, Reals]:
+    def names(self, group: str = "") -> list[str]:
+        """Return names of the detectors' columns, with that of a group before them."""
+        words = re.sub(r"[^\w.]", "_", group)
+        return [f"{words}_{name}" if words else name for name in self.geometry.names]
+
+    def columns(self, group: str = "") -> dict[str, Reals]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""
         columns: dict[str, Reals] = {}
         for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
             if values is not None:
-                names = (f"{name}{suffix}" for name in self.geometry.names)
+                names = (f"{name}{suffix}" for name in self.names(group))
                 columns |= dict(zip(names, values.T, strict=True))
         return columns
 
@@ -226,37 +234,6 @@ def check_wavelengths(wavelengths: ArrayLike) -> Reals:
     if lam[0] <= 0.0 or not np.all(np.diff(lam) > 0.0):
         raise DiffractionError("wavelengths must be above 0 nm and increase, e.g. 400, 405, 410")
     return lam
-
-
-def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
-    """Return the wavelengths, nm, between which a material and a pigment beneath it are known.
-
-    Raises a DiffractionError if there is no such material, or the pigment cannot be read.
-    """
-    name = PERFECT if material is None else material_named(material)
-    limits = None
-    if isinstance(name, str) and name != PERFECT:
-        limits = tabulated_range(name)
-        if limits is None:
-            raise DiffractionError(unknown_conductor(name))
-    first, last = limits or (0.0, math.inf)
-    least, most = pigment_range(pigment)
-    return max(first, least), min(last, most)
-
-
-def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
-    """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
-    for name, limits in (
-        ("material", known_range(material)),
-        ("pigment", known_range(None, pigment)),
-    ):
-        if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
-            value = material if name == "material" else pigment
-            raise DiffractionError(
-                f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
-                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
-                "(--wavelength-range)"
-            )
 
 
 def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:

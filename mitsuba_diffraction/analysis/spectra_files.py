@@ -1,40 +1,85 @@
-"""Files of spectra: CSV as the R package pavo reads it, and a plot."""
+"""Files of spectra: CSV as the R package pavo reads it, colours, and a plot."""
 
 from __future__ import annotations
 
 import csv
+import functools
 import io
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..atomic import atomic_path
+from ..errors import DiffractionError
 from ..optics.colour import encode_srgb, linear_srgb, response
 from .spectra import Reals, Spectra
+from .spectral_variables import colours_of
+from .survey_files import write_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+#: Fewest detectors from which on a map of angle and wavelength is drawn beside the curves.
+MAPPED = 8
 
 # Of a curve drawn: the brightest channel of its colour, so that white is grey on white paper.
 _BRIGHTEST = 0.35
 # Ratio of the highest to the lowest curve from which on the axis is logarithmic.
 _APART = 20.0
+_STYLES = ("-", "--", "-.", ":")
+
+#: Spectra by the name of their group; "" without groups.
+Groups = Mapping[str, Spectra]
 
 
-def save_csv(spectra: Spectra, path: str | os.PathLike[str]) -> None:
+def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
+    """Return the spectra at the wavelengths that all of them have."""
+    every = [each for members in groups.values() for each in members]
+    common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
+    if not common.size:
+        raise DiffractionError("the tables have no wavelength in common; build them anew")
+
+    def cut(each: Spectra) -> Spectra:
+        kept = np.isin(each.wavelength, common)
+        s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
+        band = each.band and (each.band[0][kept], each.band[1][kept])
+        value = each.value[kept]
+        return replace(each, wavelength=common, value=value, s=s, p=p, error=error, band=band)
+
+    return {name: [cut(each) for each in members] for name, members in groups.items()}
+
+
+def save_csv(groups: Groups, path: str | os.PathLike[str]) -> None:
     """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
 
     Without comments or units, which `read.csv` would take for data.
     """
-    _write(path, spectra.wavelength, spectra.columns())
+    columns = {k: v for name, each in groups.items() for k, v in each.columns(name).items()}
+    _write(path, next(iter(groups.values())).wavelength, columns)
 
 
-def save_errors(spectra: Spectra, path: str | os.PathLike[str]) -> None:
-    """Write the standard errors of a mean, in the columns of `save_csv`, per cent."""
-    assert spectra.error is not None
-    columns = dict(zip(spectra.geometry.names, spectra.error.T, strict=True))
-    _write(path, spectra.wavelength, columns)
+def save_errors(groups: Groups, path: str | os.PathLike[str]) -> None:
+    """Write the standard errors of means, in the columns of `save_csv`, per cent."""
+    columns: dict[str, Reals] = {}
+    for name, each in groups.items():
+        if each.error is not None:
+            columns |= dict(zip(each.names(name), each.error.T, strict=True))
+    _write(path, next(iter(groups.values())).wavelength, columns)
+
+
+def save_colours(groups: Groups, path: Any) -> None:
+    """Write `spectral_variables.colours_of` of each spectrum, a row each."""
+    rows = [
+        row | {"spectrum": name}
+        for group, each in groups.items()
+        for name, row in zip(each.names(group), colours_of(each), strict=True)
+    ]
+    columns = ("spectrum", "srgb", "hue", "chroma", "B1", "B2", "B3", "S8", "H1", "FWHM")
+    write_table(path, columns, rows)
 
 
 def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
@@ -56,41 +101,85 @@ def colour_of(spectra: Spectra) -> Reals:
     return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
 
 
-def spectra_figure(spectra: Spectra, title: str = "") -> Figure:
-    """Draw spectra over wavelength, each in its own colour, with bands of one standard error."""
+def spectra_figure(groups: Groups | Spectra, title: str = "") -> Figure:
+    """Draw spectra over wavelength, with bands of one standard error or of treatments.
+
+    Each curve has its own colour; of several groups, each group one. From `MAPPED` detectors on a
+    map of angle and wavelength stands beside.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.5, 4.2), dpi=120, layout="constrained")
-    axes = figure.subplots()
-    geometry = spectra.geometry
-    colours = colour_of(spectra)
-    styles = ("-", "--", "-.", ":")
-    for n, (angle, colour) in enumerate(zip(geometry.detectors, colours, strict=True)):
-        values, style = 100.0 * spectra.value[:, n], styles[n % len(styles)]
-        axes.plot(spectra.wavelength, values, style, color=colour, label=f"detector at {angle:g}°")
-        if spectra.error is not None:
-            error = 100.0 * spectra.error[:, n]
-            axes.fill_between(
-                spectra.wavelength, values - error, values + error, color=colour, alpha=0.2, lw=0
-            )
+    if isinstance(groups, Spectra):
+        groups = {"": groups}
+    first = next(iter(groups.values()))
+    geometry = first.geometry
+    mapped = len(geometry.detectors) >= MAPPED
+    figure = Figure(figsize=(12.5 if mapped else 7.5, 4.2), dpi=120, layout="constrained")
+    axes = figure.subplots(1, 1 + mapped, squeeze=False)[0]
+    for number, (name, spectra) in enumerate(groups.items()):
+        _draw(axes[0], name, spectra, f"C{number}" if len(groups) > 1 else None, first)
     against = {
         "white": "reflectance (% of a white standard)",
         "mirror": "reflectance (% of a perfect mirror)",
         "none": "collected (% of the incident light)",
     }
-    axes.set(xlabel="wavelength (nm)", ylabel=against[spectra.relative])
-    highest = 100.0 * np.maximum(spectra.value.max(axis=0), 0.0)
-    if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
-        axes.set_yscale("log")
-        lowest = max(50.0 * float(spectra.value.min()), 1e-2 * highest.min())
-        axes.set_ylim(lowest, 2.0 * highest.max())
-    else:
-        axes.set_ylim(0.0, None)
-    axes.set_title(
-        f"{title}\nlamp at {geometry.light:g}°, azimuth {geometry.azimuth:g}°; cone of "
+    axes[0].set(xlabel="wavelength (nm)", ylabel=against[first.relative])
+    _scale(axes[0], np.concatenate([each.value for each in groups.values()], axis=1))
+    turned = {each.geometry.azimuth for each in groups.values()}
+    azimuth = f"{geometry.azimuth:g}°" if len(turned) == 1 else "of each scan"
+    axes[0].set_title(
+        f"{title}\nlamp at {geometry.light:g}°, azimuth {azimuth}; cone of "
         f"{geometry.acceptance:g}°".strip(),
         fontsize=9,
     )
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.25)
+    axes[0].legend(fontsize=8 if len(geometry.detectors) < MAPPED else 6)
+    axes[0].grid(alpha=0.25)
+    if mapped:
+        _draw_map(figure, axes[1], first, against[first.relative])
     return figure
+
+
+def _draw(axes: Axes, name: str, spectra: Spectra, colour: Any, first: Spectra) -> None:
+    """Draw the curves of one group."""
+    colours = colour_of(spectra)
+    lam = spectra.wavelength
+    for n, angle in enumerate(spectra.geometry.detectors):
+        values, style = 100.0 * spectra.value[:, n], _STYLES[n % len(_STYLES)]
+        drawn = colours[n] if colour is None else colour
+        label = f"{name}, {angle:g}°" if name else f"detector at {angle:g}°"
+        axes.plot(lam, values, style, color=drawn, label=label)
+        bands = []
+        if spectra.error is not None:
+            error = 100.0 * spectra.error[:, n]
+            bands.append((values - error, values + error))
+        if spectra.band is not None:
+            bands.append((100.0 * spectra.band[0][:, n], 100.0 * spectra.band[1][:, n]))
+        for low, high in bands:
+            axes.fill_between(lam, low, high, color=drawn, alpha=0.2, lw=0)
+
+
+def _scale(axes: Axes, value: Reals) -> None:
+    """Set the limits of per cent: linear from 0, or logarithmic where curves are far apart."""
+    highest = 100.0 * np.maximum(value.max(axis=0), 0.0)
+    if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
+        axes.set_yscale("log")
+        lowest = max(50.0 * float(value.min()), 1e-2 * highest.min())
+        axes.set_ylim(lowest, 2.0 * highest.max())
+    else:  # without rounding errors of a curve that is 0
+        axes.set_ylim(0.0, max(1.08 * float(highest.max()), 1e-6))
+
+
+def _draw_map(figure: Figure, axes: Axes, spectra: Spectra, label: str) -> None:
+    """Draw one group's spectra over angle and wavelength."""
+    from matplotlib.colors import LogNorm
+
+    order = np.argsort(spectra.geometry.detectors)
+    angles = np.array(spectra.geometry.detectors)[order]
+    value = 100.0 * spectra.value[:, order]
+    top = max(float(value.max()), 1e-6)
+    norm = LogNorm(1e-4 * top, top) if np.median(value) < top / _APART else None
+    image = axes.pcolormesh(
+        angles, spectra.wavelength, np.maximum(value, 1e-4 * top), norm=norm, shading="nearest"
+    )
+    axes.set(xlabel="detector (degrees)", ylabel="wavelength (nm)")
+    figure.colorbar(image, ax=axes, label=label)

@@ -22,6 +22,7 @@ from typing import Any, Self
 
 from ..atomic import remove_temporaries
 from ..errors import DiffractionWarning, one_line, shortened
+from .wording import worded
 
 PROGRAM = "mitsuba-diffraction"
 
@@ -54,7 +55,7 @@ GRACE = 1.0
 
 def say(text: str) -> None:
     """Print one line on stderr, above a progress bar if there is one."""
-    line = f"{PROGRAM}: {shortened(one_line(text))}"
+    line = f"{PROGRAM}: {shortened(one_line(worded(text)))}"
     if "tqdm" in sys.modules:
         from tqdm import tqdm
 

@@ -46,6 +46,7 @@ from .console import (
 )
 from .options import STDOUT
 from .report import check_writable
+from .wording import speak_for
 
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
@@ -80,6 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
+    speak_for(args.parser)
     with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 

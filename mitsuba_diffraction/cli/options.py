@@ -17,6 +17,7 @@ from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
+from .wording import worded
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -153,10 +154,10 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
     )  # fmt: skip
 
 
-def add_files(parser: argparse.ArgumentParser, kinds: str) -> None:
+def add_files(parser: argparse.ArgumentParser, kinds: str, *, needed: bool = True) -> None:
     """Add the argument FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
     parser.add_argument(
-        "files", metavar="FILE", type=Path, nargs="+",
+        "files", metavar="FILE", type=Path, nargs="+" if needed else "*",
         help=f"{kinds}; folders and patterns of names, too",
     )  # fmt: skip
 
@@ -351,8 +352,8 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
         check_window(fields[0].extent, resolved(settings, fields))
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
-        return [*doubts, f"{fields[0].name}: {error}"]
-    return warnings_of(fields, settings)
+        return [worded(line) for line in (*doubts, f"{fields[0].name}: {error}")]
+    return [worded(line) for line in warnings_of(fields, settings)]
 
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:

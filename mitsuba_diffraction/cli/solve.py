@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "thin", "wavelength_range", "tolerance", "solver",
-    "resolution", "polarised", "jobs", "workers", "scheduler",
+    "resolution", "polarised", "accept", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -73,12 +73,17 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group.add_argument("--wavelength-range", metavar="A,B", type=_pair, help="nm; default: 380,780")
     group.add_argument(
         "--tolerance", metavar="E", type=number_between(1e-4, 0.2),
-        help="mean error between nodes, of the light in all orders but 0; default: 0.01",
+        help="mean error between nodes, of the light in all orders but 0; 95 %% of directions keep "
+        "4 times as much; default: 0.01",
     )  # fmt: skip
     group.add_argument(
-        "--solver", choices=("integral", "coupled"),
-        help="boundary integral (extra solve), or coupled waves, for dielectrics; "
-        "default: integral",
+        "--accept", action="store_true", default=None,
+        help="write a table that misses the tolerance, too, with its error",
+    )  # fmt: skip
+    group.add_argument(
+        "--solver", choices=("auto", "chandezon", "integral", "coupled"),
+        help="Chandezon's method, for slopes; boundary integral (extra solve); coupled waves, for "
+        "dielectrics; default: auto, the first that suits",
     )  # fmt: skip
     group.add_argument(
         "--resolution", metavar="N", type=whole_number(4),
@@ -165,7 +170,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         for field, value in (
             ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
             ("method", args.solver), ("resolution", args.resolution),
-            ("polarised", args.polarised),
+            ("polarised", args.polarised), ("accept", args.accept),
         )
         if value is not None
     }  # fmt: skip
@@ -182,8 +187,13 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     """Solve a recipe on the requested processes; what is done lies beside the output until then."""
     from ..solve.jobs import Jobs
-    from ..solve.orders import solve_orders
+    from ..solve.orders import WORST, solve_orders
 
+    tolerance = recipe.settings.tolerance
+    say(
+        f"tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} in "
+        "95 % of directions"
+    )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
     with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
 

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import re
 import time
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,14 +18,49 @@ from ..settings import TableSettings
 from . import options
 from .brdf_map import add_surface, surface_parameters
 from .console import Bar, mitsuba_warnings, say
-from .options import number_between
+from .options import number_between, whole_number
 from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
-    from ..analysis.spectra import Geometry, Spectra
+    from ..analysis.spectra import Spectra
+    from ..heights.field import HeightField
     from ..tables.orders import OrderTable
 
 _RANGE = (300.0, 830.0)
+# Per cent of the standard below which a spectrum is said to be without light.
+_NOTHING = 1e-3
+# Treatments of edges between which a band is drawn.
+_TREATMENTS = ("smooth", "taper", "none")
+
+
+def angles(text: str) -> list[float]:
+    """Parse a number, or FIRST:LAST:STEP, in degrees."""
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        return numbers
+    if len(numbers) == 3 and numbers[2] > 0.0 and 0.0 <= numbers[1] - numbers[0] <= 180.0:
+        count = int((numbers[1] - numbers[0]) / numbers[2] + 1e-9) + 1
+        if count <= 1000:
+            return [round(numbers[0] + n * numbers[2], 6) for n in range(count)]
+    raise argparse.ArgumentTypeError(
+        f"expected degrees, or FIRST:LAST:STEP such as 0:60:5, got {text!r}"
+    )
+
+
+def azimuth(text: str) -> float | str:
+    """Parse an angle, or auto."""
+    return text if text == "auto" else float(text)
+
+
+def group(text: str) -> tuple[str, str]:
+    """Parse NAME=PATTERN."""
+    name, equals, pattern = text.partition("=")
+    if not (equals and name and pattern):
+        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN, got {text!r}")
+    return name, pattern
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -29,28 +68,46 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "spectrum", run, "spectra as a spectrometer with a fibre measures them",
         "Measure reflectance spectra: a lamp at one angle, detectors that collect cones of "
         "directions in the plane of incidence, a white standard. Writes a CSV in per cent, `wl` "
-        "in nm first and a column for each detector, as the R package pavo reads it, and a plot "
-        "beside it. Several files are scans of one kind of surface: the CSV has their mean, "
-        f"and a second file the standard errors. {options.LIMITS}",
+        "in nm first and a column for each detector, as the R package pavo reads it, a table of "
+        "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
+        f"their mean, and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
-    options.add_files(parser, "tables, also of orders, recipes or heights of any format")
+    options.add_files(parser, "tables, also of orders, recipes or heights", needed=False)
+    parser.add_argument(
+        "--group", metavar="NAME=PATTERN", type=group, action="append", default=[], dest="groups",
+        help="scans of one species, in place of FILE, e.g. --group corn='corn/*.spm'; may be given "
+        "several times: each has its columns, mean and errors",
+    )  # fmt: skip
+    parser.add_argument(
+        "--crops", metavar="N", type=whole_number(2),
+        help="cut each scan into N parts, whose standard errors are the scan's repeatability",
+    )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
         "folder", ".csv",
     )  # fmt: skip
-    group = parser.add_argument_group("the spectrometer")
+    # argparse takes -60:60:5 for an option otherwise
+    parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
+    _add_spectrometer(parser.add_argument_group("the spectrometer"))
+    add_surface(parser.add_argument_group("the surface"))
+    options.add_heights(parser)
+    options.add_json(parser, "the spectra")
+
+
+def _add_spectrometer(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--light", metavar="DEG", type=float, default=30.0,
         help="angle of the lamp from the normal; default: 30",
     )  # fmt: skip
     group.add_argument(
-        "--light-azimuth", metavar="DEG", type=float, default=0.0,
-        help="azimuth of the lamp from the patch's x axis towards y; default: 0",
+        "--light-azimuth", "--azimuth", metavar="DEG", type=azimuth, default=0.0,
+        help="azimuth of the lamp from the patch's x axis towards y, or auto: across the grooves "
+        "of each scan's strongest grating; default: 0",
     )  # fmt: skip
     group.add_argument(
-        "--detector", metavar="DEG", type=float, nargs="+", default=None,
-        help="angles of the detectors from the normal, positive on the far side from the lamp; "
-        "default: where a mirror reflects the lamp to",
+        "--detector", metavar="DEG", type=angles, nargs="+", default=None,
+        help="angles of the detectors from the normal, positive on the far side from the lamp, or "
+        "ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to",
     )  # fmt: skip
     group.add_argument(
         "--acceptance", metavar="DEG", type=float, default=2.0,
@@ -73,52 +130,121 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
         help="between wavelengths; default: 5",
     )  # fmt: skip
-    add_surface(parser.add_argument_group("the surface"))
-    options.add_heights(parser)
-    options.add_json(parser, "the spectra")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure the spectra, and return the exit code."""
     start = time.perf_counter()
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
-    from ..analysis.repeats import scan_files
-
-    files = scan_files(args.files)
-    output = args.output or Path(f"{files[0].stem}-spectrum.csv")
-    written = [output, output.with_suffix(".png")]
-    if len(files) > 1:
-        written.append(output.with_name(f"{output.stem}-errors.csv"))
-    check_outputs(written, files, "spectrum")
+    groups = _groups(args)
+    files = [file for members in groups.values() for file in members]
+    first = next(iter(groups))
+    output = args.output or Path(f"{first or files[0].stem}-spectrum.csv")
+    written = [output, output.with_suffix(".png"), output.with_name(f"{output.stem}-colours.csv")]
+    errors = output.with_name(f"{output.stem}-errors.csv")
+    repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
+    check_outputs([*written, errors] if repeated else written, files, "spectrum")
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis.spectra import Geometry, mean_spectra
-    from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
+    from ..analysis.spectra_files import (
+        on_common_wavelengths,
+        save_colours,
+        save_csv,
+        save_errors,
+        spectra_figure,
+    )  # fmt: skip
     from ..atomic import atomic_path
 
-    detectors = (args.light,) if args.detector is None else tuple(args.detector)
-    geometry = Geometry(args.light, detectors, args.light_azimuth, args.acceptance)
+    detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
+    auto = args.light_azimuth == "auto"
+    geometry = Geometry(
+        args.light, tuple(dict.fromkeys(detectors)), 0.0 if auto else args.light_azimuth,
+        args.acceptance,
+    )  # fmt: skip
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
-        spectra = mean_spectra([_measured(args, file, geometry, lam, bar) for file in files])
+        measured = {
+            name: [s for file in members for s in _measured(args, file, geometry, lam, bar)]
+            for name, members in groups.items()
+        }
+    everything = on_common_wavelengths(measured)
+    if any(s.wavelength.size < lam.size for s in everything[first]):
+        common = everything[first][0].wavelength
+        say(f"columns are from {common[0]:g} nm on, where every table begins")
+    spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
     save_csv(spectra, output)
-    if spectra.error is not None:
-        save_errors(spectra, written[2])
-    title = files[0].name if len(files) == 1 else f"mean of {len(files)} scans"
+    if any(each.error is not None for each in spectra.values()):
+        written.append(errors)
+        save_errors(spectra, errors)
+    save_colours(spectra, written[2])
+    title = _title(groups, args)
     with atomic_path(written[1]) as temporary:
         spectra_figure(spectra, title).savefig(temporary, format="png")
-    lam = spectra.wavelength
+    shown = spectra[first]
+    lam = shown.wavelength
     print(
-        f"{' and '.join(map(str, written))}: {len(detectors)} spectra of {lam.size} wavelengths, "
-        f"{lam[0]:g} to {lam[-1]:g} nm, {title}, {time.perf_counter() - start:.1f} s, {variant}"
+        f"{' and '.join(map(str, written))}: {len(shown.geometry.detectors)} spectra of {lam.size} "
+        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {time.perf_counter() - start:.1f} s, "
+        f"{variant}"
     )
-    columns = {name: values.tolist() for name, values in spectra.columns().items()}
+    for name, each in spectra.items():
+        if 100.0 * each.value.max() < _NOTHING:
+            say(
+                f"{name or title}: every column is below {_NOTHING:g} %: no order of the surface "
+                "enters a detector; try --azimuth auto, across the strongest grating's grooves, or "
+                "a range of detectors (--detector -60:60:5)"
+            )
+    columns = {
+        column: values.tolist()
+        for name, each in spectra.items() for column, values in each.columns(name).items()
+    }  # fmt: skip
     save_report(args, {"files": written, "sources": files, "light": args.light,
-                       "light_azimuth": args.light_azimuth, "detectors": detectors,
+                       "light_azimuth": shown.geometry.azimuth,
+                       "detectors": shown.geometry.detectors,
                        "acceptance": args.acceptance, "relative": args.relative,
                        "wavelengths": lam.tolist(), "spectra": columns})  # fmt: skip
     return 0
+
+
+def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
+    """Return the files of each group by name; without --group of one that has no name.
+
+    Raises a DiffractionError if a group matches no file, or is named twice.
+    """
+    from ..analysis.repeats import sample_of, scan_files
+
+    if bool(args.files) == bool(args.groups):
+        args.parser.error("give files, or groups of them with --group NAME=PATTERN")
+    if args.files:
+        files = scan_files(args.files)
+        samples = list(dict.fromkeys(Path(sample_of(file)).name for file in files))
+        if len(samples) > 1:
+            say(
+                f"the mean is over scans of {len(samples)} names ({', '.join(samples[:4])}); for a "
+                "curve of each: --group NAME=PATTERN"
+            )
+        return {"": files}
+    groups: dict[str, list[Path]] = {}
+    for name, pattern in args.groups:
+        if name in groups:
+            args.parser.error(f"argument --group: {name!r} is given more than once")
+        try:
+            groups[name] = scan_files([Path(pattern)])
+        except DiffractionError as error:
+            raise DiffractionError(f"group {name}: {error}") from error
+    return groups
+
+
+def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
+    """Return what was measured, in words."""
+    first, *others = (file for members in groups.values() for file in members)
+    crops = f", {args.crops} crops each" if others else f", {args.crops} crops"
+    cut = crops if args.crops else ""
+    if "" not in groups:
+        return ", ".join(f"{name} ({len(files)} scans)" for name, files in groups.items()) + cut
+    return (f"mean of {1 + len(others)} scans" if others else first.name) + cut
 
 
 def _wavelengths(args: argparse.Namespace) -> Any:
@@ -137,7 +263,7 @@ def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
 
     Raises a DiffractionError if --wavelength-range names others, or there is no such material.
     """
-    from ..analysis.spectra import check_material, known_range
+    from ..analysis.known_wavelengths import check_material, known_range
 
     if args.wavelength_range is None:
         first, last = known_range(args.material, args.pigment)
@@ -150,41 +276,110 @@ def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
 
 
 def _measured(
-    args: argparse.Namespace, file: Path, geometry: Geometry, lam: Any, bar: Bar
-) -> Spectra:
-    """Measure the spectra of one file."""
-    from ..analysis.scans import bsdf_of, read_scan, table_of
-    from ..analysis.spectra import spectrum
-    from ..heights.load import notes_line
-    from ..optics.colour import LONGEST, SHORTEST
-    from ..tables.build.checks import warnings_of
+    args: argparse.Namespace, file: Path, geometry: Any, lam: Any, bar: Bar
+) -> list[Spectra]:
+    """Measure the spectra of one file, or of its crops."""
     from ..tables.orders import OrderTable
     from ..tables.store import loaded_table
 
     kind = kind_of(file)
-    solved = kind is FileKind.ORDERS
-    if solved or kind is FileKind.TABLE:
-        names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
-        names = [name for name in names if name != "--wavelength-range"]
-        if refused := [*options.used_heights_options(args), *names]:
-            raise DiffractionError(
-                f"'{file}' is a table, which has its own; leave {refused[0]} out"
-            )
-        table = OrderTable.load(file) if solved else loaded_table(file)
-        if isinstance(table, OrderTable):
-            lam = _within(table, lam, file)
-        elif args.wavelength_range is None:
-            lam = lam[lam >= table.wavelength_range[0]]
-    else:
-        # Mitsuba loads no table that begins later than the light that it renders
-        span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
-        how = options.load_options(args)
-        asked = options.table_options(args) | {"wavelength_range": span}
-        bar(0, 0, f"tabulating {file.name}")
-        scan = read_scan(file, how, asked)
-        table = table_of(scan, bar)
-        if line := notes_line(warnings_of(*scan), file, how, TableSettings(**asked)):
-            say(line)
+    if kind is FileKind.ORDERS:
+        return [_of_table(args, OrderTable.load(file), file, geometry, lam, bar)]
+    if kind is FileKind.TABLE:
+        return [_of_table(args, loaded_table(file), file, geometry, lam, bar)]
+    how = options.load_options(args)
+    if args.crops is not None:
+        from ..analysis.crops import crops_of
+
+        return [
+            _of_heights(args, [crop], file, how, geometry, lam, bar)
+            for crop in crops_of(file, how, args.crops)
+        ]
+    from ..analysis.scans import read_scan
+
+    patches = read_scan(file, how, {}).patches
+    spectra = _of_heights(args, patches, file, how, geometry, lam, bar)
+    return [_with_band(args, spectra, patches, file, how, geometry, lam, bar)]
+
+
+def _with_band(
+    args: argparse.Namespace, spectra: Spectra, patches: Sequence[HeightField], file: Path,
+    how: Any, geometry: Any, lam: Any, bar: Bar,
+) -> Spectra:  # fmt: skip
+    """Add the band over treatments where treatment removed as much as it kept, and warn."""
+    import numpy as np
+
+    from ..heights.load import load_heights
+    from ..heights.treatment import treatment_warning
+
+    line = treatment_warning(file, how, patches[0]) if len(patches) == 1 else ""
+    if not line:
+        return spectra
+    say(f"{line}; the band is over periodic={', '.join(_TREATMENTS)}")
+    others = [
+        _of_heights(args, [load_heights(file, replace(how, periodic=name))], file, how, geometry,
+                    lam, bar, quiet=True).value
+        for name in _TREATMENTS
+    ]  # fmt: skip
+    values = np.stack([spectra.value, *others])
+    return replace(spectra, band=(values.min(axis=0), values.max(axis=0)))
+
+
+def _of_table(
+    args: argparse.Namespace, table: Any, file: Path, geometry: Any, lam: Any, bar: Bar
+) -> Spectra:
+    """Measure the spectra of a table."""
+    names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
+    names = [name for name in names if name != "--wavelength-range"]
+    if args.crops is not None:
+        names.append("--crops")
+    if refused := [*options.used_heights_options(args), *names]:
+        raise DiffractionError(f"'{file}' is a table, which has its own; leave {refused[0]} out")
+    if args.light_azimuth == "auto":
+        raise DiffractionError(
+            f"'{file}' is a table, without heights to find gratings in; give --azimuth in degrees"
+        )
+    if kind_of(file) is FileKind.ORDERS:
+        lam = _within(table, lam, file)
+    elif args.wavelength_range is None:
+        lam = lam[lam >= table.wavelength_range[0]]
+    return _spectrum(args, table, geometry, lam, bar)
+
+
+def _of_heights(
+    args: argparse.Namespace, patches: Sequence[HeightField], file: Path, how: Any, geometry: Any,
+    lam: Any, bar: Bar, *, quiet: bool = False,
+) -> Spectra:  # fmt: skip
+    """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
+    from ..analysis.scans import Scan, read_scan, table_of
+    from ..heights.load import notes_line
+    from ..heights.spectra import dominant_periods
+    from ..optics.colour import LONGEST, SHORTEST
+    from ..tables.build.checks import warnings_of
+
+    # Mitsuba loads no table that begins later than the light that it renders
+    span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
+    asked = options.table_options(args) | {"wavelength_range": span}
+    bar(0, 0, f"tabulating {file.name}")
+    scan = Scan(list(patches), read_scan(file, how, asked).settings)
+    table = table_of(scan, bar)
+    line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
+    if line and not quiet and args.crops is None:
+        say(line)
+    if args.light_azimuth == "auto":
+        gratings = dominant_periods(patches[0])
+        geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)
+        if not quiet:
+            found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
+            say(f"{file.name}: azimuth {found}")
+    return _spectrum(args, table, geometry, lam, bar)
+
+
+def _spectrum(args: argparse.Namespace, table: Any, geometry: Any, lam: Any, bar: Bar) -> Spectra:
+    """Measure the spectra of a table's BSDF."""
+    from ..analysis.scans import bsdf_of
+    from ..analysis.spectra import spectrum
+
     return spectrum(
         bsdf_of(table, **surface_parameters(args)),
         geometry.light, geometry.detectors, light_azimuth=geometry.azimuth,

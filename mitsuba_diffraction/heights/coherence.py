@@ -85,8 +85,8 @@ def window_warning(width: float, patches: Sequence[HeightField]) -> str:
         return ""
     fitting = _two_digits(widest)
     return (
-        f"{first.name}: use coherence_width={fitting:g} (--coherence-width {fitting:g}), a larger "
-        "scan, or of whole periods periodic=exact (--periodic exact): the window of "
+        f"{first.name}: use coherence_width={fitting:g}, a larger "
+        "scan, or of whole periods periodic=exact: the window of "
         f"{width:.4g} µm is wider than the patch of {size} µm, whose repetition shows as a grating"
     )
 

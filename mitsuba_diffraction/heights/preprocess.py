@@ -124,9 +124,8 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
         raise DiffractionError(f"{name}: no height is a finite number; the patch is empty")
     if method is None:
         raise DiffractionError(
-            f"{name}: {share} have no height (NaN or masked); fill them, fill={' or '.join(FILLS)} "
-            f"(precompute --fill {FILLS[0]}), or keep a middle without them, crop=W in µm "
-            "(precompute --crop W)"
+            f"{name}: {share} have no height (NaN or masked); fill them, "
+            f"fill={' or fill='.join(FILLS)}, or keep a middle without them: crop, in µm"
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")

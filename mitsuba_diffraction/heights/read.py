@@ -138,7 +138,17 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     file = readable_file(path)
     raw, measured = _read(file, options.channel)
     field = _to_field(raw, file, options)
-    options = replace(options, crop=None)  # `_to_field` crops before it fills gaps
+    # `_to_field` crops before it fills gaps
+    return treated_by_default(field, replace(options, crop=None), measured)
+
+
+def treated_by_default(
+    field: HeightField, options: LoadOptions, measured: bool = False
+) -> HeightField:
+    """Treat a patch; level it and make it periodic by default where tilt or seams would diffract.
+
+    measured : whether an instrument wrote the file; a line then says that it is not levelled.
+    """
     small = field.heights.size <= LARGE  # wider scans are cut into windows, which are levelled
     if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
         field = _by_default(LEVELS["plane"](field), "level")
@@ -262,7 +272,7 @@ def _height_scale(
         )
         raise DiffractionError(
             f"{shown} {unit_stated} for its heights; give height_unit, and pixel_size in µm if "
-            "that is missing, too, for instance --height-unit nm --pixel-size 0.05"
+            "that is missing, too, for instance height_unit=nm pixel_size=0.05"
         )
     return raw.unit, []
 
@@ -275,12 +285,11 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
     )
     lacks, names, values = zip(*(words for missing, *words in known if missing), strict=True)
     examples = dict(zip(names, values, strict=True)).items()
-    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in examples)
-    parameters = " ".join(f"-D {name}={value}" for name, value in examples)
+    options = " ".join(f"{name}={value}" for name, value in examples)
     what = " is an image of grey levels and" if height else ""
     return DiffractionError(
         f"{shown}{what} does not say {' nor '.join(lacks)}; give {' and '.join(names)} in µm, for "
-        f"instance {options} (for a scene that has them as parameters, {parameters})"
+        f"instance {options}"
     )
 
 

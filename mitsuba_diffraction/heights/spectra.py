@@ -27,6 +27,8 @@ LEAST_SHARE = 0.1
 _PROFILE = 0.9
 # Fewer periods than this in a patch cannot be told from its tilt and bending.
 _FEWEST_PERIODS = 2.5
+#: Repeats below which a period is "perhaps" one: chance and a bow that remains look alike.
+FEWEST_CERTAIN = 4.0
 # Fewest periods of a fundamental. A plane that is subtracted from few periods of a grating leaves
 # power below it.
 _FEWEST_FUNDAMENTAL = 1.75
@@ -77,10 +79,15 @@ class Periodicity:
     period: float  # µm, from one groove to the next, across them
     direction: float  # degrees from x towards y across the grooves, −89.5 to 90.5
     share: float  # of the variance of the heights, 0 to 1, without harmonics
+    repeats: float = math.inf  # number of periods in the patch; of a patch that tiles, without end
 
     def __str__(self) -> str:
         degrees = round(self.direction)
-        return f"{self.period:.4g} µm along {degrees}°, {self.share:.0%} of the variance"
+        text = f"{self.period:.4g} µm along {degrees}°, {self.share:.0%} of the variance"
+        if math.isinf(self.repeats):
+            return text
+        perhaps = "perhaps " if self.repeats < FEWEST_CERTAIN else ""
+        return f"{perhaps}{text}, {self.repeats:.2g} repeats"
 
 
 class Periods(NamedTuple):
@@ -88,6 +95,27 @@ class Periods(NamedTuple):
 
     gratings: list[Periodicity]  # the largest share of variance first
     weak: Periodicity | None  # holds less than `LEAST_SHARE`; None if no other peak stands out
+
+
+def seen_slope(field: HeightField, shortest: float) -> float:
+    """Return the RMS slope of frequencies that light can see, up to 2/λ.
+
+    Noise of finer structure than half a wavelength diffracts into no direction, unless it is as
+    high as λ/50, a layer of its own. The windowed spectrum's share below 2/λ scales the slope.
+
+    shortest : shortest wavelength, µm.
+    """
+    central = field.heights[tuple(_central(n) for n in field.shape)]
+    part = HeightField(central, field.pixel_size)
+    fx, fy = frequencies(part)
+    square = fx**2 + fy**2
+    heights = height_spectrum(part)
+    hidden = square > (2.0 / shortest) ** 2
+    if heights[hidden].sum() > (shortest / (50.0 * field.rms_height)) ** 2 * heights.sum():
+        return field.rms_slope
+    power = heights * square
+    total, seen = float(power.sum()), float(power[~hidden].sum())
+    return field.rms_slope * math.sqrt(seen / total) if total > 0.0 else field.rms_slope
 
 
 def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
@@ -130,11 +158,11 @@ def examine_periods(field: HeightField, most: int = 3) -> Periods:
         lowest = lower or peak
         if share < LEAST_SHARE:
             if share >= _LEAST_WEAK:
-                weak.append(_periodicity(lowest.centre, share))
+                weak.append(_periodicity(lowest.centre, share, lowest.repeats))
             left[peak.near] = 0.0
             continue
         if lowest.repeats >= _FEWEST_PERIODS:
-            gratings.append(_periodicity(lowest.centre, min(share, 1.0)))
+            gratings.append(_periodicity(lowest.centre, min(share, 1.0), lowest.repeats))
         left[peak.explained] = spectrum.power[peak.explained] = 0.0
     gratings.sort(key=lambda grating: -grating.share)
     if not gratings and not field.cut_out:
@@ -262,11 +290,11 @@ def _central(count: int) -> slice:
     return slice((count - kept) // 2, (count - kept) // 2 + kept)
 
 
-def _periodicity(frequency: FloatArray, share: float) -> Periodicity:
+def _periodicity(frequency: FloatArray, share: float, repeats: float) -> Periodicity:
     """Convert a frequency (fx, fy) in 1/µm to a period and a direction."""
     direction = math.degrees(math.atan2(frequency[1], frequency[0]))
     direction -= 180.0 * math.ceil((direction - 90.5) / 180.0)  # the same grooves seen from x
-    return Periodicity(float(1.0 / np.hypot(*frequency)), round(direction, 2) + 0.0, share)
+    return Periodicity(float(1.0 / np.hypot(*frequency)), round(direction, 2) + 0.0, share, repeats)
 
 
 def order_powers(field: HeightField, wavelength: float) -> FloatArray:

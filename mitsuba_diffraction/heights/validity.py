@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from .field import HeightField
 from .preprocess import level_plane, plane_of, plane_rise
 from .seams import Seam, seams_of
+from .spectra import seen_slope
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
 #: for sinusoids of keratin and aluminium in light up to 60° from the normal. docs/validation.md has
@@ -51,21 +52,24 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     """
     shortest = min(wavelength_range) / 1000  # µm
     lines = []
+    slope = field.rms_slope
+    if GENTLE_SLOPE < slope <= IMPOSSIBLE_SLOPE:
+        slope = seen_slope(field, shortest)
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
             f"{field.name}: {units_warning(field)}; no surface has an RMS slope of "
             f"{field.rms_slope:.2g}"
         )
-    elif field.rms_slope > STEEP_SLOPE:
+    elif slope > STEEP_SLOPE:
         lines.append(
-            f"{field.name}: do not rely on its colours: RMS slope {field.rms_slope:.2g} is above "
+            f"{field.name}: do not rely on its colours: RMS slope {slope:.2g} is above "
             f"{STEEP_SLOPE:g}, where they differ from rigorous solutions by more than 20 %, on "
             "steeper surfaces completely"
         )
-    elif field.rms_slope > GENTLE_SLOPE:
+    elif slope > GENTLE_SLOPE:
         lines.append(
             f"{field.name}: expect colours to differ from rigorous solutions by 5 to 20 % in light "
-            f"60° from the normal: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}; they "
+            f"60° from the normal: RMS slope {slope:.2g} is above {GENTLE_SLOPE:g}; they "
             "differ by less nearer to the normal, by more at edges and with model='kirchhoff'"
         )
     coarse = max(field.pixel_size)
@@ -107,7 +111,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
         slope_x, slope_y = plane_of(field)
         turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
         lines.append(
-            f"{field.name}: use level=plane (--level plane): the patch is not levelled; its best "
+            f"{field.name}: use level=plane: the patch is not levelled; its best "
             f"plane rises {plane_rise(field):.3g} µm across it and turns the mirror direction by "
             f"{turn:.2g}°"
         )
@@ -121,7 +125,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
             else "with no step between neighbours inside"
         )
         lines.append(
-            f"{field.name}: use periodic=smooth (--periodic smooth): the patch tiles the surface, "
+            f"{field.name}: use periodic=smooth: the patch tiles the surface, "
             f"and its seams, {share:.0%} of the mean-square slope, diffract like a grating; "
             f"opposite edges differ by {worst.step:.3g} µm RMS{levelled}, {compared}"
         )

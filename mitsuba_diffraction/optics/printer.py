@@ -58,7 +58,7 @@ class Printer:
         kinds = list(kinds_of(structure))
         for leaf in leaves:
             self._count(leaf)
-        results = self._results(leaves, kinds) if len(leaves) > 1 else []
+        results = self._results(leaves, kinds, result) if len(leaves) > 1 else []
         self._body(leaves, [name for _, name in results])
         used = [self._all or self._uses.get(id(p), 0) > 0 for p in parameters]
         head = [p for p, u in zip(parameters, used, strict=True) if u]
@@ -85,7 +85,7 @@ class Printer:
             id(part) for s in order if id(s) in kept and id(s) in self._uses for part in s.parts
         }
         ready = [s for s in needed if id(s) in read and id(s) not in kept]
-        stored = [(s.kind, f"pair_{self._scope.take(s.name or 'value')}") for s in ready]
+        stored = [(s.kind, f"pair_{self._scope.take(_name_of(s, 'value'))}") for s in ready]
         first = Printer(self._scope)
         for symbol in ready:
             first._count(symbol)
@@ -134,9 +134,11 @@ class Printer:
         lines += textwrap.wrap(head, _WIDTH, subsequent_indent=" " * (head.index("(") + 1))
         return "\n".join([*lines, "{", *self._lines, "}", ""]).replace(_JOINT, " ")
 
-    def _results(self, leaves: list[Any], kinds: list[str]) -> list[tuple[str, str]]:
-        names = [getattr(leaf, "name", None) or f"result{n}" for n, leaf in enumerate(leaves)]
-        return [(k, self._scope.take(n)) for k, n in zip(kinds, names, strict=True)]
+    def _results(self, leaves: list[Any], kinds: list[str], result: Any) -> list[tuple[str, str]]:
+        fields = getattr(result, "_fields", ())
+        if len(fields) != len(leaves):
+            fields = [_name_of(leaf, f"result{n}") for n, leaf in enumerate(leaves)]
+        return [(k, self._scope.take(n)) for k, n in zip(kinds, fields, strict=True)]
 
     def _count(self, value: Any) -> None:
         """Count the uses of an expression and its parts."""
@@ -168,9 +170,7 @@ class Printer:
         names, declared = [], dict[str, list[str]]()
         results = [s for s in self._scope.order if s.operation == "result" and s.parts[0] is call]
         for symbol in results:
-            name = outputs.get(id(symbol)) or self._scope.take(
-                symbol.name or f"part{symbol.parts[1]}"
-            )
+            name = outputs.get(id(symbol)) or self._scope.take(_name_of(symbol))
             if id(symbol) not in outputs:
                 declared.setdefault(self._dialect.types[symbol.kind], []).append(name)
             self._variables[id(symbol)] = name
@@ -267,6 +267,14 @@ class Printer:
 
     def _ratio(self, divisor: Any) -> str:
         return f"(1.0 / {self.text(divisor, 8)})"
+
+
+def _name_of(value: Any, otherwise: str = "") -> str:
+    """Return the name of a symbol: its variable's, or its function's and a number."""
+    if not isinstance(value, Symbol) or value.operation != "result":
+        return getattr(value, "name", None) or otherwise
+    call, number = value.parts
+    return value.name or f"{call.parts[0]}{number}"
 
 
 def _one(value: Any) -> bool:

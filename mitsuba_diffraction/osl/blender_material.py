@@ -32,6 +32,8 @@ except ModuleNotFoundError:  # `main` says so
 FOLDER = ""
 #: Oldest Blender whose closures and node groups the shader was tested with.
 OLDEST = (5, 0)
+# custom properties of materials and node groups: shader that made them, and the name asked for
+_SHADER, _NAME = "mitsuba_diffraction_shader", "mitsuba_diffraction_name"
 #: Name and axis of each choice of --tangent.
 TANGENTS = {"uv": ("UV_MAP", "Z")} | {f"radial-{axis.lower()}": ("RADIAL", axis) for axis in "XYZ"}
 
@@ -46,8 +48,9 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
     Parameters
     ----------
     folder : exported folder: a shader (`.osl`), its sockets (`.json`) and its textures.
-    name : of the material and its node group; by default that of the shader. A group and a
-        material of that name are rebuilt.
+    name : of the material and its node group; by default that of the shader. Those that this
+        folder made under the name are rebuilt, and those of a folder that is no more; beside any
+        others Blender adds a number to the name.
     tangent : key of `TANGENTS`: direction of the patch's x axis before Rotation. `uv` is along
         the first texture coordinate, `radial-z` runs around the object's z axis.
     """
@@ -58,12 +61,12 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
     scene.render.engine = "CYCLES"
     scene.cycles.shading_system = True
     group = _group(exported, name)
-    material = bpy.data.materials.get(name) or bpy.data.materials.new(name)
+    material = own_data(bpy.data.materials, name, exported["shader"])
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     surface = _node(nodes, "ShaderNodeGroup", (0, 0))
     surface.node_tree = group
-    surface.label, surface.width = name, 240
+    surface.label, surface.width = group.name, 240
     _link_tangent(nodes, links, surface, tangent)
     links.new(surface.outputs[0], _node(nodes, "ShaderNodeOutputMaterial", (320, 0)).inputs[0])
     return material
@@ -125,9 +128,25 @@ def read_folder(folder: Path) -> dict[str, Any]:
     return dict(exported)
 
 
+def own_data(blocks: Any, name: str, shader: Path, *kind: str) -> Any:
+    """Return the data block that an exported shader made under a name, or a new one.
+
+    blocks : materials or node groups of the file; kind : further arguments of a new one.
+    """
+    for block in blocks:
+        made_by = block.get(_SHADER)
+        known = made_by is not None and block.get(_NAME) == name
+        if known and (made_by == str(shader) or not Path(made_by).exists()):
+            break
+    else:
+        block = blocks.new(name, *kind)
+    block[_SHADER], block[_NAME] = str(shader), name
+    return block
+
+
 def _group(exported: dict[str, Any], name: str) -> Any:
     """Return the node group around a script node, with an input for each that artists set."""
-    group = bpy.data.node_groups.get(name) or bpy.data.node_groups.new(name, "ShaderNodeTree")
+    group = own_data(bpy.data.node_groups, name, exported["shader"], "ShaderNodeTree")
     group.nodes.clear()
     group.interface.clear()
     shader = exported["shader"]

@@ -23,7 +23,14 @@ from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
 from .orders import interpolation_error, order_constants, order_formulas, order_texture
-from .patch import mean_transmittance, patch_constants, patch_error, patch_formulas, patch_textures
+from .patch import (
+    energy_texture,
+    mean_transmittance,
+    patch_constants,
+    patch_error,
+    patch_formulas,
+    patch_textures,
+)
 from .sockets import (
     Socket,
     array_parameter,
@@ -43,7 +50,8 @@ OSL = Consumer(
         {
             Feature.HEIGHTS, Feature.ORDERS, Feature.MIRROR, Feature.DIELECTRIC, Feature.RARER,
             Feature.CONDUCTOR, Feature.SMALL_SLOPE, Feature.KIRCHHOFF, Feature.HEIGHT_SCALE,
-            Feature.LATERAL_SCALE, Feature.ORIENTATION, Feature.OWN_MODEL,
+            Feature.LATERAL_SCALE, Feature.ORIENTATION, Feature.ENERGY_SCALE,
+            Feature.OWN_MODEL,
         }
     ),
     "export the surface without, or render it with Mitsuba",
@@ -60,6 +68,16 @@ OSL = Consumer(
         "be solved instead (docs/orders.md)"
     },
 )  # fmt: skip
+
+#: Words of OSL's grammar, in use and kept for later (OSL language specification, section 2).
+_RESERVED = (
+    "and break closure color continue do else emit float for if illuminance illuminate int matrix "
+    "normal not or output point public return string struct vector void while bool case catch char "
+    "class const delete default double enum extern false friend goto inline long new operator "
+    "private protected short signed sizeof static super switch template this throw true try "
+    "typedef uniform union unsigned varying virtual volatile shader surface displacement volume "
+    "light"
+)
 
 _HEAD = "// {surface}; made by mitsuba_diffraction {version}.\n"
 
@@ -123,14 +141,8 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     DiffractionError
         If the surface has features that the shader lacks, or the folder cannot be written.
     """
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise DiffractionError(
-            f"name={quoted(name)} must be letters, digits and underscores, a letter first: it is "
-            "the name of a shader"
-        )
-    described = OSL.described(bsdf)
-    orders = described.orders
-    shader = _patch(described) if orders is None else _orders(described, orders)
+    shader = shader_of(OSL.described(bsdf))
+    check_name(name, shader)
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -144,8 +156,8 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     for key, pixels in shader.textures.items():
         _save_texture(files[key], pixels)
     textures = [
-        Socket(key, key.removesuffix("File") + " Texture", "string", file.resolve().as_posix(),
-               "File of the export, beside the shader")
+        Socket(key, key.removesuffix("File") + " Texture", "string", file.name,
+               "File of the export, beside the shader; the script in Blender sets its path")
         for key, file in files.items()
     ]  # fmt: skip
     sockets = [*shader.sockets, *textures]
@@ -166,6 +178,31 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     if script.is_file():
         _save_text(path / SCRIPT, script.read_text(encoding="utf-8"))
     return exported
+
+
+def check_name(name: str, shader: Shader) -> None:
+    """Refuse a name that a shader cannot have.
+
+    Raises
+    ------
+    DiffractionError
+        If it is no identifier, or a word of OSL or of the shader's source.
+    """
+    allowed = "letters, digits and underscores, a letter first"
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise DiffractionError(f"name={quoted(name)} must be {allowed}: it is the name of a shader")
+    source = re.sub("//.*", "", _source(shader, shader.sockets, ""))
+    if name in _RESERVED.split() or re.search(rf"\b{name}\b", re.sub('"[^"]*"', "", source)):
+        raise DiffractionError(
+            f"name='{name}' is a word of the Open Shading Language or of the shader's source; "
+            f"choose another of {allowed}, for example 'my_{name}'"
+        )
+
+
+def shader_of(described: Surface) -> Shader:
+    """Return the shader of a surface that `OSL` shows."""
+    orders = described.orders
+    return _patch(described) if orders is None else _orders(described, orders)
 
 
 def _orders(described: Surface, table: OrderTable) -> Shader:
@@ -201,6 +238,10 @@ def _patch(described: Surface) -> Shader:
         "Order0": textures.order_0,
     }
     constants = patch_constants(table, textures, statistic, described.lateral_scale.number)
+    files: dict[str, NDArray[Any]] = {"PowersFile": textures.powers, "DrawsFile": textures.draws}
+    if (energy := energy_texture(described)) is not None:
+        constants |= energy.constants
+        files["EnergyFile"] = energy.pixels
     constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
         "patch.osl",
@@ -212,7 +253,7 @@ def _patch(described: Surface) -> Shader:
             height_socket(described.height_scale.number, table.height_scale_max),
             *common_sockets(described.orientation.number),
         ],
-        {"PowersFile": textures.powers, "DrawsFile": textures.draws},
+        files,
         f"patch of {table.source.get('name', 'heights')}, {described.text}",
         patch_error(table, textures),
     )
@@ -236,7 +277,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
         folder.joinpath(file).read_text(encoding="utf-8") for file in ("common.osl", shader.source)
     )
     own = own.replace("SHADER(PARAMETERS)", f"{name}(\n    " + ",\n    ".join(parameters) + "\n)")
-    head = _HEAD.format(surface=shader.surface, version=version("mitsuba_diffraction"))
+    head = _HEAD.format(surface=one_line(shader.surface), version=version("mitsuba_diffraction"))
     return "\n".join([head + "\n".join(lines), "", common, shader.formulas, own])
 
 

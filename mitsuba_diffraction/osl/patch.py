@@ -14,6 +14,8 @@ from ..optics.coat import pair_power
 from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
 from ..optics.programs import Program
+from ..plugin.description import Surface
+from ..tables.directional import FINE, SHARE
 from ..tables.powers import order_0_power
 from ..tables.table import DiffractionTable
 
@@ -53,6 +55,42 @@ class PatchTextures(NamedTuple):
     scale: float
     rows: int
     order_0: NDArray[np.float64]
+
+
+class EnergyTexture(NamedTuple):
+    """Scales of energy over directions.
+
+    Attributes
+    ----------
+    pixels : (polar + 1, azimuthal + 1, 4) float32 on `FINE`, the first column repeated at the end;
+        channels are the scales of the two height scales `nodes`, and two of 0.
+    nodes : the surface's height scale, and the largest of its table.
+    """
+
+    pixels: NDArray[np.float32]
+    nodes: tuple[float, float]
+
+    @property
+    def constants(self) -> dict[str, float | int]:
+        """Constants of `shaders/patch.osl`."""
+        return {
+            "ENERGY_POLAR": FINE.polar,
+            "ENERGY_AZIMUTHAL": FINE.azimuthal,
+            "ENERGY_SHARE": SHARE,
+            "ENERGY_HEIGHT": self.nodes[0],
+            "ENERGY_MOST": self.nodes[1],
+        }
+
+
+def energy_texture(described: Surface) -> EnergyTexture | None:
+    """Tabulate the scales of energy at two height scales; None where all are 1."""
+    nodes = described.height_scale.number, float(described.patch.height_scale_max)
+    pages = [described.energy_scale(node) for node in nodes]
+    if all(page is None for page in pages):
+        return None
+    values = [FINE.ones if page is None else page for page in pages]
+    scales = np.stack([np.pad(page, [(0, 0), (0, 1)], mode="wrap") for page in values], axis=-1)
+    return EnergyTexture(np.pad(scales, [(0, 0), (0, 0), (0, 2)]).astype(np.float32), nodes)
 
 
 def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:

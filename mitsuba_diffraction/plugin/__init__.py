@@ -29,6 +29,7 @@ directions      a pair of directions in the patch's frame, and how V-shaped groo
 power           the diffracted power at single wavelengths
 lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
+loops           sums in a loop inside a kernel, which derivatives pass
 series          series in κ: weights of a bin's terms, and order 0
 rgb             power and look-up in the RGB variants' colours
 window_positions  where on the patch the window sits at a point of the surface

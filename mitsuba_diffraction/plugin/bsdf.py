@@ -48,11 +48,12 @@ lateral_scale : float or texture ∂ [1]
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
     channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to the largest factor loaded, or 1. A table
-    serves factors up to 1. Scales of energy follow it (docs/holograms.md).
-lateral_scale_max : float [of a bitmap]
-    Largest factor of such a texture, above which factors are clipped. Required unless the texture
-    is a bitmap.
+    same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
+    to 1. Scales of energy follow it (docs/holograms.md).
+lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
+    Largest factor of a texture, above which factors are clipped; required unless the texture is a
+    bitmap. Or the largest value that a number may change to: give 1.5 × lateral_scale to optimise
+    a period in both directions. Tables grow with its square.
 height_scale : float or texture ∂ [1]
     Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
     a mesh attribute of one channel, for worn and fresh places.
@@ -180,6 +181,10 @@ N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckm
 1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
 
 Denoisers that ask for an albedo get the reflectance at normal incidence, nested BSDF included.
+
+Derivatives pass through renderings backward and forward, for all parameters marked ∂. A function
+that `dr.freeze` records must give `mi.render` a seed of type `mi.UInt32`: a plain number becomes
+part of the recording.
 
 The BSDF `diffraction_mix` blends several such surfaces by weights (docs/own-scene.md).
 

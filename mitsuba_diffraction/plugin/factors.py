@@ -115,6 +115,7 @@ class LateralScale:
     Parameters
     ----------
     factor : a number, a texture, or None where the scene has no lateral_scale.
+    most : largest value that a number may change to; None for the number itself.
 
     Attributes
     ----------
@@ -123,9 +124,9 @@ class LateralScale:
     changeable : what `traverse` exposes.
     """
 
-    def __init__(self, factor: float | VaryingFactor | None) -> None:
+    def __init__(self, factor: float | VaryingFactor | None, most: float | None = None) -> None:
         largest = 1.0 if factor is None else largest_of(factor)
-        self.of_table = max(1.0, largest)
+        self.of_table = max(1.0, largest if most is None else most)
         self.varying = factor if isinstance(factor, VaryingFactor) else None
         self._number: Bounded | None = None
         self.changeable: tuple[Changeable, ...] = ()
@@ -189,13 +190,35 @@ def read_factor(props: Properties, limits: FactorLimits) -> float | VaryingFacto
     most = number(props, largest, math.nan) if largest in props else None
     if isinstance(texture, mi.Texture):
         return VaryingFactor(texture, most, limits)
-    if most is not None:
+    if most is not None and limits is HEIGHT:
         raise DiffractionError(f"{largest} is for a {name} that is a texture")
     factor = number(props, name, 1.0)
     if not max(limits.least, LEAST_SCALE) <= factor <= limits.most:
         bounds = f"at least {limits.least:g}" if limits.least else "above 0"
         raise DiffractionError(f"{name}={factor:g} must be {bounds} and at most {limits.most:g}")
     return factor
+
+
+def read_lateral(props: Properties) -> LateralScale:
+    """Return a scene's lateral_scale; without it, kernels have no operation for it.
+
+    Raises
+    ------
+    DiffractionError
+        With the parameter, its value and what is allowed.
+    """
+    name, largest = LATERAL.name, f"{LATERAL.name}_max"
+    factor = read_factor(props, LATERAL) if name in props else None
+    if largest not in props or isinstance(factor, VaryingFactor):
+        return LateralScale(factor)
+    if factor is None:
+        raise DiffractionError(f"{largest} is for a {name}; give both, or none")
+    most = number(props, largest, math.nan)
+    if not factor <= most <= LATERAL.most:
+        raise DiffractionError(
+            f"{largest}={most:g} must be at least {name}, {factor:g}, and at most {LATERAL.most:g}"
+        )
+    return LateralScale(factor, most)
 
 
 def largest_of(factor: float | VaryingFactor) -> float:
@@ -206,5 +229,5 @@ def largest_of(factor: float | VaryingFactor) -> float:
 def _lateral_refusal(most: float, factor: float) -> str:
     return (
         f"lateral_scale={factor:g} is outside what the table serves, {LATERAL.least:g} to "
-        f"{most:g}; load the plugin anew with that lateral_scale"
+        f"{most:g}; load the plugin anew with that lateral_scale_max"
     )

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +21,8 @@ from ..errors import DiffractionError
 from ..tables.layout import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
-from .memory import index_between, packet_size, read_packets, upload
+from .loops import sum_of
+from .memory import index_between, packet_size, read_packets, upload, zero_packets
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import Window
@@ -32,9 +35,6 @@ _LONGEST_RATIOS = 6
 _SHALLOW = 30.0
 #: Dr.Jit's indices are 32 bits wide.
 _MOST_PACKETS = 2**31
-
-#: The weight of a tap, by its number.
-Weight = Callable[[Float], Float]
 
 _uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable]] = (
     weakref.WeakKeyDictionary()
@@ -81,27 +81,26 @@ class DeviceTable:
         interval, weights, order_0 = self.series.at(kappa)
 
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
-        first, weight_x, weight_y = self._place(x, y, interval)
-        weights_x = [weight_x(n) for n in range(grid.taps[0])]
+        first, across, along = self._place(x, y, interval)
 
         lobe_x, lobe_y = grid.exponents
         lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
 
         if windows:
-            total = self._over_windows(first, (x, y), weights_x, weight_y, weights, windows)
+            total = self._over_windows(first, across, along, weights, windows)
             parts = [
                 dr.fma(lobe, c, part * self._inverse_scale)
                 for c, part in zip(order_0, total, strict=True)
             ]
             result = dr.square(parts[0]) + dr.square(parts[1])
         elif self.record.components == 2 and not grid.coherent:
-            total = self._over_taps(
-                first, weights_x, weight_y, lambda packets: self._squares(packets, weights)
-            )[0]
+            nothing = [mi.Float(0.0)]
+            total = self._over_taps(first, across, along, nothing, self._squares, weights)[0]
             power = sum((dr.square(c) for c in order_0), mi.Float(0.0))
             result = dr.fma(lobe, power, total * self._inverse_scale**2)
         else:
-            packets = self._over_taps(first, weights_x, weight_y, lambda packets: packets)
+            nothing = zero_packets(self.record.numbers)
+            packets = self._over_taps(first, across, along, nothing, lambda packets, _: packets, [])
             parts = [
                 dr.fma(lobe, c, inner(part, weights) * self._inverse_scale)
                 for c, part in zip(order_0, self._components(packets), strict=True)
@@ -132,114 +131,94 @@ class DeviceTable:
             return dr.square(parts[0]) + dr.square(parts[1])
         return dr.maximum(parts[0], 0.0)
 
-    def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Weight, Weight]:
-        """Index of the first bin read at (x, y) in bins; weights along x and y as functions."""
+    def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
+        """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
         grid = self.grid
-        column, weight_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
-        row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1], self._looped)
-        return grid.index(interval, row, column), weight_x, weight_y
+        column, across = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
+        row, along = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
+        return grid.index(interval, row, column), across, along
 
     def _over_taps(
         self,
         first: Index,
-        weights_x: list[Float],
-        weight_y: Weight,
-        of: Callable[[list[Packet]], list[Float]],
-    ) -> list[Float]:
-        """Σ over the taps of their Gaussian weights times of(packets)."""
-        rows, columns_a_row = self.grid.taps[1], self.grid.shape[1]
+        across: Gaussians,
+        along: Gaussians,
+        nothing: list[Packet],
+        of: Callable[[list[Packet], list[Float]], list[Packet]],
+        inputs: list[Float],
+    ) -> list[Packet]:
+        """Add to `nothing` the taps' Gaussian weights times of(packets, inputs)."""
 
-        def row_sum(start: Index, columns: range) -> list[Float]:
-            total: list[Float] = []
+        def add_row(
+            start: Index, columns: range, weight: Float, inputs: Any, total: list[Packet]
+        ) -> list[Packet]:
+            weights_x, others = inputs
+            row: list[Packet] = []
             for i in columns:
-                values = of(self.read(start + i))
-                if not total:
-                    total = [v * weights_x[i] for v in values]
+                values = of(self.read(start + i), others)
+                if not row:
+                    row = [v * weights_x[i] for v in values]
                 else:
-                    total = [dr.fma(v, weights_x[i], t) for v, t in zip(values, total, strict=True)]
-            return total
+                    row = [dr.fma(v, weights_x[i], t) for v, t in zip(values, row, strict=True)]
+            return [dr.fma(p, weight, t) for p, t in zip(row, total, strict=True)]
 
-        if self._looped:
-            every = range(self.grid.taps[0])
-            start = (mi.UInt32(0), first, [p * 0.0 for p in row_sum(first, every)])
-            _, _, total = dr.while_loop(
-                start,
-                lambda j, index, total: j < rows,
-                lambda j, index, total: (
-                    j + 1,
-                    index + columns_a_row,
-                    [
-                        dr.fma(p, weight_y(mi.Float(j)), t)
-                        for p, t in zip(row_sum(index, every), total, strict=True)
-                    ],
-                ),
-            )
-            return total
-        total = []
-        for j, columns in enumerate(self.grid.tapped()):
-            row = row_sum(first + j * columns_a_row, columns)
-            if not total:
-                total = [p * weight_y(j) for p in row]
-            else:
-                total = [dr.fma(p, weight_y(j), t) for p, t in zip(row, total, strict=True)]
-        return total
+        return self._over_rows(first, along, add_row, (across.all(), inputs), nothing)
 
     def _over_windows(
         self,
         first: Index,
-        position: tuple[Float, Float],
-        weights_x: list[Float],
-        weight_y: Weight,
+        across: Gaussians,
+        along: Gaussians,
         weights: list[Float],
         windows: Sequence[Window],
-    ) -> Rotation:
+    ) -> list[Float]:
         """Σ over windows and taps of amplitudes turned by exp(−i q·x): real, imaginary part.
 
-        position : (x, y) in bins; weights : of the terms.
+        weights : of the terms.
         """
-        rows, columns_a_row = self.grid.taps[1], self.grid.shape[1]
-        across = [_along(window.steps[0], weights_x) for window in windows]
 
         def add_row(
-            start: Index, columns: range, weight: Float, phases: list[Rotation], total: Rotation
-        ) -> Rotation:
+            start: Index, columns: range, phases: list[Rotation], inputs: Any, total: list[Float]
+        ) -> list[Float]:
+            steps, weights = inputs
             sums: list[Rotation] = [(mi.Float(0.0), mi.Float(0.0))] * len(windows)
             for i in columns:
                 parts = self._components(self.read(start + i))
                 value = inner(parts[0], weights), inner(parts[1], weights)
-                sums = [_turned(value, x[i], row) for x, row in zip(across, sums, strict=True)]
-            for row, (cos, sin) in zip(sums, phases, strict=True):
-                total = _turned(row, (cos * weight, sin * weight), total)
+                sums = [_turned(value, x[i], row) for x, row in zip(steps, sums, strict=True)]
+            for row, phase in zip(sums, phases, strict=True):
+                total = [*_turned(row, phase, total)]
             return total
 
-        def next_row(phases: list[Rotation]) -> list[Rotation]:
-            pairs = zip(phases, windows, strict=True)
-            return [_summed(phase, window.steps[1]) for phase, window in pairs]
+        steps = [_along(window.steps[0], across.all()) for window in windows]
+        phases = Phases.of(windows, across, along)
+        nothing = [mi.Float(0.0), mi.Float(0.0)]
+        return self._over_rows(first, phases, add_row, (steps, weights), nothing)
 
-        x, y = (_first_bin(p, taps) for p, taps in zip(position, self.grid.taps, strict=True))
-        phases = []
-        for window in windows:
-            turns = dr.fma(x, window.turn.x, y * window.turn.y)
-            sin, cos = dr.sincos((turns - dr.round(turns)) * (2.0 * dr.pi))
-            phases.append((cos * window.weight, sin * window.weight))
-        total = (mi.Float(0.0), mi.Float(0.0))
-        if self._looped:
-            every = range(self.grid.taps[0])
-            state = (mi.UInt32(0), first, phases, total)
-            return dr.while_loop(
-                state,
-                lambda j, index, phases, total: j < rows,
-                lambda j, index, phases, total: (
-                    j + 1,
-                    index + columns_a_row,
-                    next_row(phases),
-                    add_row(index, every, weight_y(mi.Float(j)), phases, total),
-                ),
-            )[3]
-        for j, columns in enumerate(self.grid.tapped()):
-            total = add_row(first + j * columns_a_row, columns, weight_y(j), phases, total)
-            phases = next_row(phases)
-        return total
+    def _over_rows(
+        self,
+        first: Index,
+        factors: Gaussians | Phases,
+        add_row: Callable[[Index, range, Any, Any, list[Any]], list[Any]],
+        inputs: Any,
+        total: list[Any],
+    ) -> list[Any]:
+        """Add all rows of taps to a total: add_row(first bin, columns, factor, inputs, total)."""
+        columns_a_row = self.grid.shape[1]
+        if not self._looped:
+            rows = zip(self.grid.tapped(), factors.all(), strict=True)
+            for j, (columns, factor) in enumerate(rows):
+                total = add_row(first + j * columns_a_row, columns, factor, inputs, total)
+            return total
+
+        every = range(self.grid.taps[0])
+
+        def body(j: Index, inputs: Any, total: list[Any]) -> list[Any]:
+            factors, others = inputs
+            factor = factors.at(mi.Float(j))
+            return add_row(first + j * columns_a_row, every, factor, others, total)
+
+        return sum_of(self.grid.taps[1], body, (factors, inputs), total)
 
     def _components(self, packets: list[Packet]) -> list[Sequence[Float]]:
         """The terms of each component, from packets that hold one component after the other."""
@@ -251,34 +230,102 @@ class DeviceTable:
         return [dr.fma(real, real, dr.square(imaginary))]
 
 
-def _taps(
-    position: Float, last: int, taps: int, exponent: float, looped: bool = False
-) -> tuple[Index, Weight]:
-    """Array index of the first tap, and the weight of tap n as a function.
+@dataclass
+class Gaussians:
+    """Weights exp(−e(Δ − n)²) of taps n = 0, 1, 2 …
 
-    looped : whether the function must accept Dr.Jit variables, not only numbers.
+    Attributes
+    ----------
+    offset : Δ, the position from the first tap on, in bins.
+    first : bin of the first tap.
+    count, exponent : number of taps, and e.
     """
-    first = _first_bin(position, taps)
+
+    offset: Float
+    first: Float
+    count: int
+    exponent: float
+
+    def at(self, n: Float | int) -> Float:
+        """Return the weight of tap n."""
+        return dr.exp2(_log2(self.exponent) * dr.square(self.offset - n))
+
+    def all(self) -> list[Float]:
+        """Return the weights of all taps."""
+        if self.count > _LONGEST_RATIOS or self.exponent * (0.5 * self.count) ** 2 > _SHALLOW:
+            return [self.at(n) for n in range(self.count)]
+        # their ratios are a geometric series
+        weights = [self.at(0)]
+        ratio = dr.exp2(_log2(self.exponent) * dr.fma(-2.0, self.offset, 1.0))
+        while len(weights) < self.count:
+            weights.append(weights[-1] * ratio)
+            ratio = ratio * math.exp(-2.0 * self.exponent)
+        return weights
+
+
+@dataclass
+class Phases:
+    """Rotations of rows of taps by the windows' positions, times the rows' weights.
+
+    Attributes
+    ----------
+    rows : weights of the rows.
+    start, step : of each window, turns of the first tap and from one row to the next.
+    rotation : of each window, the step's (cos, sin).
+    weight : of each window.
+    """
+
+    rows: Gaussians
+    start: list[Float]
+    step: list[Float]
+    rotation: list[Rotation]
+    weight: list[Float]
+
+    @classmethod
+    def of(cls, windows: Sequence[Window], across: Gaussians, along: Gaussians) -> Phases:
+        """Make the phases of windows, for taps along both axes."""
+        return cls(
+            along,
+            [dr.fma(across.first, w.turn.x, along.first * w.turn.y) for w in windows],
+            [w.turn.y for w in windows],
+            [w.steps[1] for w in windows],
+            [w.weight for w in windows],
+        )
+
+    def at(self, n: Float | int) -> list[Rotation]:
+        """Return the rotations of row n."""
+        row, rotations = self.rows.at(n), []
+        for start, step, weight in zip(self.start, self.step, self.weight, strict=True):
+            sin, cos = _sincos(start + dr.round(-start) + step * n)
+            rotations.append((cos * (weight * row), sin * (weight * row)))
+        return rotations
+
+    def all(self) -> list[list[Rotation]]:
+        """Return the rotations of all rows."""
+        phases = []
+        for start, weight in zip(self.start, self.weight, strict=True):
+            sin, cos = _sincos(start)
+            phases.append((cos * weight, sin * weight))
+        rotations = []
+        for row in self.rows.all():
+            rotations.append([(cos * row, sin * row) for cos, sin in phases])
+            phases = [_summed(p, step) for p, step in zip(phases, self.rotation, strict=True)]
+        return rotations
+
+
+def _sincos(turns: Float) -> tuple[Float, Float]:
+    return dr.sincos((turns - dr.round(turns)) * (2.0 * dr.pi))
+
+
+def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index, Gaussians]:
+    """Array index of the first tap at a position in bins, and the weights of all taps."""
+    first = dr.floor(position if taps % 2 == 0 else position + 0.5) + first_tap(taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = mi.UInt32(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
-    offset = position - first
-    if looped or taps > _LONGEST_RATIOS or exponent * (0.5 * taps) ** 2 > _SHALLOW:
-        return index, lambda n: dr.exp2(_log2(exponent) * dr.square(offset - n))
-    # exp(−e(Δ − n)²) of n, n + 1, …: their ratios are a geometric series
-    weights = [dr.exp2(_log2(exponent) * dr.square(offset))]
-    ratio = dr.exp2(_log2(exponent) * dr.fma(-2.0, offset, 1.0))
-    while len(weights) < taps:
-        weights.append(weights[-1] * ratio)
-        ratio = ratio * math.exp(-2.0 * exponent)
-    return index, weights.__getitem__
+    return index, Gaussians(position - first, first, taps, exponent)
 
 
-def _first_bin(position: Float, taps: int) -> Float:
-    """The bin of the first tap."""
-    return dr.floor(position if taps % 2 == 0 else position + 0.5) + first_tap(taps)
-
-
-def _turned(value: Rotation, angle: Rotation, total: Rotation) -> Rotation:
+def _turned(value: Rotation, angle: Rotation, total: Sequence[Float]) -> Rotation:
     """total + value·exp(−i angle), an angle given by (cos, sin), maybe times a weight."""
     (x, y), (cos, sin) = value, angle
     return dr.fma(x, cos, dr.fma(y, sin, total[0])), dr.fma(y, cos, dr.fma(-x, sin, total[1]))

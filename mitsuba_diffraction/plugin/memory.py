@@ -62,6 +62,12 @@ def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True)
     ]
 
 
+def zero_packets(floats: int) -> list[Packet]:
+    """Return the packets of `read_packets` with zeros in them."""
+    size = packet_size(floats) if dr.is_jit_v(mi.Float) else floats
+    return [dr.zeros(mi.ArrayXf, (size, 1)) for _ in range(floats // size)]
+
+
 def read_record(source: Buffer, index: Index, floats: int, active: Mask = True) -> list[Float]:
     """Gather the floats of the record with this index; see `read_packets`."""
     return [x for packet in read_packets(source, index, floats, active) for x in packet]

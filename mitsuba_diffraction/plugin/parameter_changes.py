@@ -59,8 +59,9 @@ class Bounded:
         self, name: str, value: float, low: float, high: float, message: Callable[[float], str]
     ) -> None:
         self.value: Float = mi.Float(value)
-        self.high = high
-        self._name, self._low, self._message = name, low, message
+        # bounds to the precision of values: 1.1 is above 1.1 in single precision
+        self._low, self.high = (float(np.float32(bound)) for bound in (low, high))
+        self._name, self._message = name, message
         self.keep()
 
     def refusal(self) -> str | None:

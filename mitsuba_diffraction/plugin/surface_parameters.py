@@ -19,7 +19,7 @@ from ..optics.materials import index_at_sodium
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .dictionary import ORDERS, PLUGINS
-from .factors import HEIGHT, LATERAL, LateralScale, VaryingFactor, largest_of, read_factor
+from .factors import HEIGHT, LateralScale, VaryingFactor, largest_of, read_factor, read_lateral
 from .llvm import require_loaded_llvm
 from .pigment import pigment_bsdf
 from .properties import choice, flag, kind_of, number
@@ -130,8 +130,7 @@ def read_surface(
         With the parameter, its value and the choices.
     """
     height_scale = read_factor(props, HEIGHT)
-    # Without it, kernels have no operation for it
-    lateral = LateralScale(read_factor(props, LATERAL) if LATERAL.name in props else None)
+    lateral = read_lateral(props)
     # κ grows by the index, as if heights did
     largest = largest_of(height_scale) * optical
     table, heights = _table(props, largest, lateral.of_table, provider, second_order)

@@ -10,6 +10,7 @@ profiles    one period of the grooves as a polygon; generators and a reader
 materials   refractive index over wavelength, by name or number
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
+chandezon   solver: coordinates that follow slopes
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
 nodes       choice of the numbers of nodes

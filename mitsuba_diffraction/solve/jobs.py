@@ -22,6 +22,7 @@ import numpy as np
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
 from ..progress import Progress, silent
+from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
@@ -33,9 +34,12 @@ from .stations import Complex, Grating, Real, Solver
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
     "integral": IntegralSolver,
     "coupled": CoupledWaves,
+    "chandezon": Chandezon,
 }
+#: Choice of the solver by the grating, see `method_for`.
+AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
-MOST_RESOLUTION = {"integral": 1000, "coupled": 200}
+MOST_RESOLUTION = {"integral": 1000, "coupled": 200, "chandezon": 250}
 # Threads that libraries of linear algebra start in each process, which would compete for the cores
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -59,9 +63,16 @@ class Problem:
         if self.resolution > MOST_RESOLUTION[self.method]:
             raise DiffractionError(
                 f"{self.grating.profile.name} would be solved at resolution {self.resolution}, and "
-                f"{self.method} solves up to {MOST_RESOLUTION[self.method]}: check that its "
-                "lengths are in µm; it may be too deep, or too rough, for the shortest wavelength"
+                f"--solver {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
+                "its lengths are in µm; it may be too deep, or too rough, for the shortest "
+                "wavelength; slopes may be solved by --solver chandezon"
             )
+
+
+def method_for(grating: Grating) -> str:
+    """Return the solver for a grating: Chandezon's method for slopes, else the integral method."""
+    sloped = not (grating.is_perfect or grating.thin or refused(grating.profile))
+    return "chandezon" if sloped else "integral"
 
 
 def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
@@ -72,8 +83,11 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     DiffractionError
         If there is no such method.
     """
+    if method == AUTO:
+        method = method_for(grating)
     if method not in METHODS:
-        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+        known = ", ".join((AUTO, *METHODS))
+        raise DiffractionError(f"solver {method!r} is unknown; choose one of {known}")
     content = hashlib.sha256(
         repr(
             ("amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin)
@@ -124,8 +138,9 @@ def solve_place(problem: Problem, place: Place) -> Solved:
         raise
     except (ValueError, np.linalg.LinAlgError) as error:  # numbers that are not finite
         raise DiffractionError(
-            f"{problem.method} cannot solve {grating.profile.name} ({one_line(str(error))}); check "
-            "that its line neither touches nor nearly touches itself"
+            f"--solver {problem.method} cannot solve {grating.profile.name} "
+            f"({one_line(str(error))}); check that its line neither touches nor nearly touches "
+            "itself"
         ) from error
     if grating.thin:
         values = np.sqrt(sheet_efficiencies(values, station))

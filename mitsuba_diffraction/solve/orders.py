@@ -10,19 +10,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError, quoted, warn
 from ..heights.lengths import count_between, number_between
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
-from ..tables.orders.table import Counts, check_outline
-from .jobs import MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
+from ..tables.orders.table import MOST_NODES, Counts, check_outline
+from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import FEWEST, MOST, Line, Place, count_for, lines
 from .profiles import Profile
 from .resolution import (
+    Chosen,
     chosen_resolution,
     coarsest,
     energy_error,
+    finer_problem,
+    places_to_test,
     reciprocity_error,
     resolution_error,
 )
@@ -35,6 +38,10 @@ WAVELENGTHS = (380.0, 780.0)
 TOLERANCE = 0.01
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
 WORST = 4.0
+#: Times that a table which misses its tolerance gets more nodes, and their factor.
+REFINEMENTS, _FINER = 2, 1.4
+#: Times that the resolution is raised, if solutions at nodes have light from nothing.
+_RAISED = 3
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
@@ -56,13 +63,20 @@ class Measured(NamedTuple):
 
     mean : of the light in all orders but 0, which the table has too much or too little in an order.
     most : the same of a direction, which 95 % of them keep.
+    bands : of each band, from k = 0, as a share of all light.
     polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the same light (½‖M‖ is the
         efficiency); None without them.
     """
 
     mean: float
     most: float
+    bands: Real
     polarised: float | None
+
+    def within(self, tolerance: float) -> bool:
+        """Whether the table keeps a tolerance on average, and `WORST` of it in 95 %."""
+        mean = max(self.mean, self.polarised or 0.0)
+        return mean <= tolerance and self.most <= WORST * tolerance
 
 
 @dataclass(frozen=True)
@@ -72,17 +86,20 @@ class Settings:
     Attributes
     ----------
     wavelengths : shortest and longest, in vacuum, nm.
-    tolerance : mean error of interpolation, of the light in all orders but 0.
-    method : one of `jobs.METHODS`.
+    tolerance : mean error of interpolation, of the light in all orders but 0; 95 % of directions
+        keep `WORST` times as much.
+    method : one of `jobs.METHODS`, or "auto": Chandezon's for slopes, else the integral method.
     resolution : points on the boundary, or harmonics; None chooses by convergence.
     polarised : whether the table has Mueller matrices.
+    accept : whether a table that misses the tolerance is returned, with a warning.
     """
 
     wavelengths: tuple[float, float] = WAVELENGTHS
     tolerance: float = TOLERANCE
-    method: str = "integral"
+    method: str = AUTO
     resolution: int | None = None
     polarised: bool = False
+    accept: bool = False
 
     def __post_init__(self) -> None:
         number_between(self.tolerance, "tolerance", 1e-4, 0.2)
@@ -117,7 +134,7 @@ def solve_orders(
     ------
     DiffractionError
         If an argument is out of its range, the solver is not installed or does not converge, or the
-        measured error of the table is above the tolerance.
+        measured error of the table is above the tolerance after two refinements.
     """
     if not isinstance(profile, Profile):
         raise DiffractionError(
@@ -137,40 +154,89 @@ def solve_orders(
     grating = Grating(profile, substance, superstrate, how.wavelengths, thin)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
-    coarse = replace(problem, resolution=how.resolution or coarsest(problem))
-    counts = _counts(coarse, work, bands, how, tell)
     if how.resolution is None:
-        problem, solver_error = chosen_resolution(problem, work, bands, how.tolerance / 2)
+        chosen = chosen_resolution(problem, work, places_to_test(bands), how.tolerance / 2)
     else:
-        solver_error = resolution_error(problem, work, bands)
-    places = [p for band in bands for p in _places(band, counts[band])]
-    _announce(tell, "solving", problem, work, places)
-    solved = work.amplitudes(problem, places, "solving orders")
+        chosen = Chosen(problem, resolution_error(problem, work, places_to_test(bands)))
+    problem = chosen.problem
+    coarse = problem
+    if how.resolution is None and problem.method == "integral":  # others cost about the same
+        coarse = replace(problem, resolution=coarsest(problem))
+    counts = _counts(coarse, work, bands, how, tell)
     header: dict[str, Any] = {
-        "solver": solver_of(problem).name,
         "material": grating.material.name,
         "profile": profile.name,
-        "reciprocity_error": _reciprocity(problem, work, bands),
-        "solver_error": solver_error,
+        "solver_error": chosen.error,
         "tolerance": how.tolerance,
     }
-    if thin:
-        header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
-    made = tuple(_band(k, counts[k], solved, how.polarised, grating.sides) for k in bands)
-    table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
-    error = measured_error(table, problem, work)
-    mean = max(error.mean, error.polarised or 0.0)
-    if mean > how.tolerance or error.most > WORST * how.tolerance:
-        raise DiffractionError(
-            f"the table misses {mean:.2%} of the light in its orders on average and "
-            f"{error.most:.2%} in 5 % of directions, at tolerance {how.tolerance:g}; use a larger "
-            "tolerance, or fewer wavelengths"
-        )
+    for refinement in range(REFINEMENTS + 1):
+        problem, solved = _solved_at_nodes(problem, counts, work, tell)
+        header |= {
+            "solver": solver_of(problem).name,
+            "reciprocity_error": _reciprocity(problem, work, bands),
+        }
+        if thin:
+            header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
+        made = tuple(_band(k, counts[k], solved, how.polarised, grating.sides) for k in bands)
+        table = OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
+        error = measured_error(table, problem, work)
+        if error.within(how.tolerance) or refinement == REFINEMENTS:
+            break
+        counts = _refined_counts(counts, error.bands)
     header |= {"error_mean": error.mean, "error_worst": error.most}
     header["processor_seconds"] = round(work.processor_seconds, 1)
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
-    return OrderTable(profile.period, how.wavelengths, made, superstrate, header, thin)
+    if not error.within(how.tolerance):
+        _refuse_or_warn(error, how)
+    return table
+
+
+def _refuse_or_warn(error: Measured, how: Settings) -> None:
+    """Refuse a table that misses its tolerance, or warn if it is accepted."""
+    mean = max(error.mean, error.polarised or 0.0)
+    text = (
+        f"the table misses {mean:.2%} of the light in its orders on average (tolerance "
+        f"{how.tolerance:.2%}) and {error.most:.2%} in 5 % of directions (tolerance "
+        f"{WORST * how.tolerance:.2%})"
+    )
+    if not how.accept:
+        raise DiffractionError(
+            f"{text}; --accept writes it as it is, without solving again; or use a larger "
+            "tolerance, or fewer wavelengths"
+        )
+    warn(text)
+
+
+def _solved_at_nodes(
+    problem: Problem,
+    counts: Mapping[int, Counts],
+    jobs: Jobs,
+    announce: Callable[[Estimate], None],
+) -> tuple[Problem, dict[Place, Complex]]:
+    """Solve all nodes, at a higher resolution if solutions have light from nothing."""
+    places = [place for band in counts for place in _places(band, counts[band])]
+    for _ in range(_RAISED):
+        _announce(announce, "solving", problem, jobs, places)
+        solved = jobs.amplitudes(problem, places, "solving orders")
+        excess = max(float(_powers(values).sum(axis=2).max()) for values in solved.values())
+        if excess <= MOST_EXCESS:
+            return problem, solved
+        problem = finer_problem(problem)
+    raise DiffractionError(
+        f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
+        "use another --solver, a higher --resolution, or a smoother profile"
+    )
+
+
+def _refined_counts(counts: Mapping[int, Counts], missed: Real) -> dict[int, Counts]:
+    """Return more nodes for the bands that miss most: at least a mean band's share."""
+    return {
+        k: Counts(*(n if n == 1 else min(int(np.ceil(_FINER * n)), MOST_NODES) for n in of_band))
+        if missed[k] >= missed.mean()
+        else of_band
+        for k, of_band in counts.items()
+    }
 
 
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
@@ -207,6 +273,7 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     return Measured(
         float(missed.sum() / light.sum()),
         float(np.quantile(missed / np.maximum(light, floor), 0.95)),
+        np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
         float(turned / light.sum()) if table.polarised else None,
     )
 
@@ -315,11 +382,6 @@ def _band(
         at_nodes = functools.partial(_at_nodes, band, kind, counts, solved, sides)
         values = at_nodes(_powers)
         total = values.sum(axis=-2, keepdims=True)
-        if total.max() > MOST_EXCESS:
-            raise DiffractionError(
-                f"efficiencies of a solution sum to {total.max():.4g}; use a higher "
-                "resolution, or a smaller tolerance"
-            )
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
             matrices.append(at_nodes(lambda amplitudes: mueller_of(_limited(amplitudes))))

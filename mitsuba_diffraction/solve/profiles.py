@@ -36,7 +36,8 @@ class Profile:
 
     Attributes
     ----------
-    x, z : (n,) µm, from left to right; x begins at 0 or above and ends at `period` at most.
+    x, z : (n,) µm, from left to right; x begins at 0 or above and ends at `period` at most. Points
+        beyond, of ridges that lean over the next period, are shifted by `_begun_elsewhere`.
     period : µm.
     name : for people.
 
@@ -65,6 +66,10 @@ class Profile:
         if not (np.isfinite(x).all() and np.isfinite(z).all()):
             raise DiffractionError(f"{self.name}: all x and z must be finite numbers")
         slack = 1e-6 * self.period
+        if (x.min() < -slack or x.max() > self.period + slack) and np.ptp(x) < 2.0 * self.period:
+            x, z = _begun_elsewhere(x, z, self.period)
+            object.__setattr__(self, "x", x)
+            object.__setattr__(self, "z", z)
         if x.min() < -slack or x.max() > self.period + slack:
             raise DiffractionError(
                 f"{self.name}: x runs from {x.min():g} to {x.max():g} µm, but one period is 0 to "
@@ -114,6 +119,8 @@ class Profile:
         x, z = self.closed
         if (np.diff(x) >= 0).all():
             return False
+        # a ridge may lean into the next period
+        x, z = np.append(x, x[1:] + self.period), np.append(z, z[1:])
         if len(self.x) > 1000:  # n² pairs; gratinglab would take hours
             raise DiffractionError(
                 f"{self.name}: an undercut line may have 1000 points, this one has {len(self.x)}"
@@ -216,6 +223,18 @@ def polygon(points: ArrayLike, period: float) -> Profile:
     if array.ndim != 2 or array.shape[1] != 2:
         raise DiffractionError(f"profile: expected points (n, 2), x and z in µm, got {array.shape}")
     return Profile(array[:, 0], array[:, 1], period, f"polygon of {len(array)} points")
+
+
+def _begun_elsewhere(x: Real, z: Real, period: float) -> tuple[Real, Real]:
+    """Begin a periodic line at the point from which it keeps within a period, moved to x ≥ 0.
+
+    It stays as it is if no point is such: then one period is not all that it covers.
+    """
+    for first in range(1, len(x)):
+        begun = np.append(x[first:], x[:first] + period)
+        if np.ptp(begun) <= period:
+            return begun - begun.min(), np.append(z[first:], z[:first])
+    return x, z
 
 
 def _depth(name: str, depth: float) -> float:

@@ -35,16 +35,17 @@ class Chosen(NamedTuple):
 
 
 def chosen_resolution(
-    problem: Problem, jobs: Jobs, bands: Sequence[int], tolerance: float
+    problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float
 ) -> Chosen:
     """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
+
+    places : where resolutions are compared, such as `test_places`.
 
     Raises
     ------
     DiffractionError
         If it does not converge.
     """
-    places = _test_places(bands)
     coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")
     for _ in range(_MOST):
@@ -58,16 +59,16 @@ def chosen_resolution(
             return Chosen(coarse, error)
         coarse, values = fine, finer
     raise DiffractionError(
-        f"{problem.method} does not converge on {problem.grating.profile.name}: at resolution "
-        f"{coarse.resolution} the last step changed {error:.2%} of the light, sums over orders are "
-        f"above 1 by {max(excess, 0.0):.2%}, and reversed light differs by {one_way:.2%}; smooth "
-        "the profile, use a larger tolerance, or set the resolution"
+        f"--solver {problem.method} does not converge on {problem.grating.profile.name}: at "
+        f"resolution {coarse.resolution} the last step changed {error:.2%} of the light, sums over "
+        f"orders are above 1 by {max(excess, 0.0):.2%}, and reversed light differs by "
+        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another --solver, or set "
+        "the resolution"
     )
 
 
-def resolution_error(problem: Problem, jobs: Jobs, bands: Sequence[int]) -> float:
-    """Return the share of the light that the next resolution changes."""
-    places = _test_places(bands)
+def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
+    """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
     return _refined(problem, values, jobs, places).error
 
@@ -82,13 +83,18 @@ def _refined(
     problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
 ) -> _Refined:
     """Solve at the next resolution, and compare."""
-    fine = replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+    fine = finer_problem(problem)
     finer = jobs.solve(fine, places, "choosing the resolution")
     missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
     return _Refined(fine, finer, missed / sum(float(finer[p].sum()) for p in places))
 
 
-def _test_places(bands: Sequence[int]) -> list[Place]:
+def finer_problem(problem: Problem) -> Problem:
+    """Return the problem at the next resolution."""
+    return replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+
+
+def places_to_test(bands: Sequence[int]) -> list[Place]:
     """Return places where resolutions are compared; resonances of metals lie in low bands."""
     some = sorted({*bands[:2], bands[len(bands) // 2], bands[-1]})
     return [
@@ -103,14 +109,15 @@ def reciprocity_error(solved: Mapping[Place, Real], sides: int) -> float:
     """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
 
     They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
-    light of one channel, summed over the outgoing ones.
+    light of one channel, summed over the outgoing ones; 0 without such places.
     """
     differences = [
         np.abs(values - reversed_light(values, sides))
         for place, values in solved.items()
         if place.tau == 0.5
     ]
-    return max(float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in differences)
+    sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in differences)
+    return max(sums, default=0.0)
 
 
 def energy_error(solved: Iterable[Real]) -> float:
@@ -126,7 +133,7 @@ def coarsest(problem: Problem) -> int:
     index = grating.material.index(lam)
     dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
     waves = float((1e3 * dense / lam).max())  # per µm
-    if problem.method == "coupled":
+    if problem.method in ("coupled", "chandezon"):
         return int(np.ceil(profile.period * grating.superstrate * 1e3 / low)) + _HARMONICS
     sides = 2.0 if profile.corners else 1.0
     points = _POINTS_PER_WAVELENGTH * sides * profile.length * waves

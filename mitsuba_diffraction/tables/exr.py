@@ -81,13 +81,13 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     if document is None:
         raise DiffractionError(
             f"'{path}' is an EXR image but no table; make one of it with "
-            f"'mitsuba-diffraction precompute {path} -o OUT.exr', or give it as heightfield"
+            "DiffractionTable.build, or give it as heightfield"
         )
     version = document.pop("version", None)
     if version != FORMAT_VERSION:
         raise DiffractionError(
             f"'{path}' is a table of format version {quoted(version)}, this program reads version "
-            f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
+            f"{FORMAT_VERSION}; build it again with DiffractionTable.build"
         )
     try:
         description = parse_document(document)
@@ -99,7 +99,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
-            "'mitsuba-diffraction precompute'"
+            "DiffractionTable.build"
         ) from error
 
 
@@ -122,7 +122,7 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     except (ValueError, RecursionError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
-            "again with 'mitsuba-diffraction precompute'"
+            "again with DiffractionTable.build"
         ) from error
     return document if isinstance(document, dict) else None
 
@@ -203,5 +203,5 @@ def _read(
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "
-            "give an .exr written by 'mitsuba-diffraction precompute'"
+            "give an .exr written by DiffractionTable.save"
         ) from error

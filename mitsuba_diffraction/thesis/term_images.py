@@ -39,9 +39,9 @@ class TermImages(DeviceTable):
         """Sum the orders under the window, dimensionless (`tables.lookup.window_sum`)."""
         grid, expansion = self.grid, self.expansion
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
-        first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
+        first, across, along = self._place(x, y, mi.UInt32(0))
         weights = [
-            (grid.index(0, row, column), weight_x(column) * weight_y(row))
+            (grid.index(0, row, column), across.at(column) * along.at(row))
             for row in range(grid.taps[1])
             for column in range(grid.taps[0])
         ]

@@ -159,8 +159,8 @@ def test_means_have_standard_errors_and_files_have_columns(tmp_path):
     assert mean.value == pytest.approx(0.75, rel=1e-5)
     assert mean.error == pytest.approx(0.25, rel=1e-5)
     assert mean_spectra([white]) is white
-    save_csv(mean, tmp_path / "s.csv")
-    save_errors(mean, tmp_path / "e.csv")
+    save_csv({"": mean}, tmp_path / "s.csv")
+    save_errors({"": mean}, tmp_path / "e.csv")
     rows = np.genfromtxt(tmp_path / "s.csv", delimiter=",", names=True)
     assert rows.dtype.names[:2] == ("wl", "light30_detector30")
     assert rows["wl"] == pytest.approx(LAM)

@@ -70,6 +70,9 @@ def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
         (["--acceptance", "0"], "acceptance"),
         (["--light-azimuth", "1000"], "1000"),
         (["--material", "Al", "--wavelength-range", "800", "900"], "885.6 nm"),
+        (["--material", "kerratin"], "keratin"),
+        (["--pigment", "none.csv"], "none.csv"),
+        (["--crops", "400"], "crops=400"),
     ],
 )
 def test_impossible_geometries_are_one_line(run, scans, here, arguments, named):
@@ -87,3 +90,53 @@ def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here
         assert ran.code == 1
         (line,) = ran.err.splitlines()
         assert str(source) in line
+
+
+def test_groups_have_columns_errors_and_colours_each(run, scans, here):
+    ran = run("spectrum", "--group", f"a b={scans / 'scan0.npy'}", "--group", f"both={scans}",
+              *PIXEL, *QUICK, "--detector", "-20:20:20", "-o", "g.csv")  # fmt: skip
+    assert ran.code == 0, ran.err
+    names = read("g.csv").dtype.names
+    angles = ("m20", "0", "20")
+    expected = [f"{name}_light30_detector{a}" for name in ("a_b", "both") for a in angles]
+    assert names == ("wl", *expected)
+    assert read("g-errors.csv").dtype.names == ("wl", *expected[3:])
+    colours = (here / "g-colours.csv").read_text("utf-8").splitlines()
+    assert colours[0].startswith("spectrum,srgb,hue,chroma,B1,B2,B3,S8,H1")
+    assert [line.split(",")[0] for line in colours[1:]] == expected
+
+
+def test_crops_of_a_scan_have_errors_and_auto_turns_the_lamp(run, scans, here):
+    ran = run("spectrum", scans / "scan0.npy", "--pixel-size", "0.05", *QUICK, "--azimuth", "auto",
+              "--detector", "0", "-o", "c.csv", "--light", "20")  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert "azimuth across 1.6 µm along 0°" in ran.err
+    field = gratings.sinusoidal(period=1.6, depth=0.03, periods=40, rows=64)
+    np.save(here / "wide.npy", np.tile(field.heights[:64, :128], (1, 1)))
+    ran = run("spectrum", "wide.npy", *PIXEL, *QUICK, "--crops", "2", "-o", "c.csv")
+    assert ran.code == 0, ran.err
+    assert "c-errors.csv" in os.listdir(here)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--group", "a=none*.npy"], "group a: no file matches"),
+        (["--group", "a"], "NAME=PATTERN"),
+        ([], "give files"),
+        (["scans", "--detector", "5:1:1"], "5:1:1"),
+        (["scans", "--azimuth", "north"], "north"),
+    ],
+)
+def test_groups_and_ranges_that_are_none_are_one_line(run, scans, arguments, named):
+    ran = run("spectrum", *arguments)
+    assert ran.code != 0
+    assert named in ran.err.splitlines()[-1]
+
+
+def test_samples_that_are_averaged_are_said(run, scans, here):
+    (scans / "scan1.npy").rename(scans / "other1.npy")
+    ran = run("spectrum", scans, *PIXEL, *QUICK)
+    assert ran.code == 0, ran.err
+    assert "2 names" in ran.err
+    assert "--group" in ran.err

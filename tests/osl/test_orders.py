@@ -87,11 +87,23 @@ def test_document_names_files_and_sockets(tmp_path, some_variant):
 
 
 def test_sheets_are_refused(tmp_path, some_variant):
-    with pytest.raises(DiffractionError, match="sheet"):
+    with pytest.raises(DiffractionError, match="light that goes through, which OSL cannot show"):
         md.osl.export(mi.load_dict(md.bsdf_dict(thin_grating(thin=True))), tmp_path)
 
 
-@pytest.mark.parametrize("name", ["", "1cd", "a b", "../cd"])
+def test_folder_is_no_part_of_what_is_written(tmp_path, some_variant):
+    folder = tmp_path / 'z", float Evil = 1, string Q = "'
+    exported = md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), folder, "cd")
+    for file in (exported.shader, exported.document):
+        text = file.read_text(encoding="utf-8")
+        assert "Evil" not in text
+        assert str(tmp_path) not in text
+    assert 'string OrdersFile = "cd_orders.exr"' in exported.shader.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "name", ["", "1cd", "a b", "../cd", "if", "while", "md_lobe", "PERIOD", "mix", "Starts"]
+)
 def test_name_must_be_that_of_a_shader(tmp_path, some_variant, name):
     with pytest.raises(DiffractionError, match="name="):
         md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), tmp_path, name)

@@ -3,18 +3,40 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.osl.patch import DRAWS_WIDTH, interpolated, patch_textures, powers_at
+from mitsuba_diffraction.osl.export import OSL
+from mitsuba_diffraction.osl.patch import (
+    DRAWS_WIDTH,
+    energy_texture,
+    interpolated,
+    patch_textures,
+    powers_at,
+)
+from mitsuba_diffraction.plugin.description import Energy, Quantity, Surface
+from mitsuba_diffraction.tables.directional import FINE
 from tests.support.patches import DEEP, DEFAULTS, PATCH
 
+
+def scale_of(height_scale):
+    """A smooth scale of energy, lower for deeper heights."""
+    theta, phi = np.meshgrid(FINE.theta, FINE.phi, indexing="ij")
+    return (1 - 0.3 * height_scale * theta / 2 * (1 + 0.2 * np.cos(phi))).astype(np.float32)
+
+
+ENERGETIC = Surface(
+    md.DiffractionTable.build(PATCH, **DEFAULTS, height_scale_max=1.5), "mirror", 4.5,
+    Quantity(0.0), energy=Energy(scale_of, lambda height_scale: None),
+)  # fmt: skip
 TABLE = md.DiffractionTable.build(DEEP, **DEFAULTS)
 TEXTURES = patch_textures(TABLE)
 
@@ -62,6 +84,32 @@ def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=True))
     with pytest.warns(md.DiffractionWarning, match="second_order"):
         md.osl.export(bsdf, tmp_path)
+
+
+def test_boundary_models_that_the_shader_lacks_are_refused(some_variant):
+    described = replace(mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS)).describe(), model="level")
+    with pytest.raises(DiffractionError, match=r"model='level'.*OSL.*kirchhoff"):
+        OSL.check(described)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(0.0, 0.5 * np.pi), st.floats(-np.pi, np.pi), st.floats(0.0, 1.5))
+def test_scales_of_energy_are_those_of_the_description(theta, phi, height_scale):
+    """The look-up of shaders/patch.osl, at the nodes of its height scales and between them."""
+    pages = {0.0: FINE.ones, 1.0: scale_of(1.0), 1.5: scale_of(1.5)}
+    expected = [FINE.interpolation(theta, phi)(page) for page in pages.values()]
+    energy = energy_texture(ENERGETIC)
+    constants = energy.constants
+    row = (1 - np.sqrt(max(1 - 2 / np.pi * theta, 0))) / constants["ENERGY_SHARE"]
+    row = min(row, 1.0) * constants["ENERGY_POLAR"]
+    column = phi / (2 * np.pi) % 1.0 * constants["ENERGY_AZIMUTHAL"]
+    nodes = (
+        map_coordinates(energy.pixels[..., 0], [[row], [column]], order=1),
+        map_coordinates(energy.pixels[..., 1], [[row], [column]], order=1),
+    )
+    heights = [0.0, constants["ENERGY_HEIGHT"], constants["ENERGY_MOST"]]
+    read = np.interp(height_scale, heights, [1.0, nodes[0][0], nodes[1][0]])
+    assert read == pytest.approx(np.interp(height_scale, list(pages), expected), abs=1e-5)
 
 
 def test_other_plugins_are_refused(tmp_path, some_variant):

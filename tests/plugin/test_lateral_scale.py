@@ -190,7 +190,9 @@ def test_numbers_change_up_to_the_largest_loaded(mono):
             {"lateral_scale": {"type": "checkerboard", "color0": 0.0}, "lateral_scale_max": 1.0},
             "the texture's factors go from 0",
         ),
-        ({"lateral_scale": 1.2, "lateral_scale_max": 2.0}, "for a lateral_scale that is a texture"),
+        ({"lateral_scale": 1.2, "lateral_scale_max": 1.1}, "must be at least lateral_scale, 1.2"),
+        ({"lateral_scale_max": 1.1}, "give both, or none"),
+        ({"height_scale": 1.2, "height_scale_max": 2.0}, "for a height_scale that is a texture"),
     ],
 )
 def test_factors_that_mean_nothing_are_refused(mono, parameters, said):
@@ -206,6 +208,26 @@ def test_tables_serve_no_larger_factors_than_1(mono, tmp_path):
     mi.load_dict(plugin | {"lateral_scale": 0.9})
     said = refusal(lambda: mi.load_dict(plugin | {"lateral_scale": 1.1}))
     assert "give the height field instead of the table" in said
+
+
+@pytest.mark.parametrize("factor", [1.1, 1.2, 1.6, 1.7, 2.2])
+def test_numbers_above_1_load(mono, factor):
+    """Their double is below their single precision, or above it."""
+    assert mi.traverse(load(lateral_scale=factor))["lateral_scale"] == mi.Float(factor)
+
+
+def test_a_number_goes_up_to_its_largest_factor_and_has_the_values_of_one_loaded_there(mono):
+    wide = load(lateral_scale=0.9, lateral_scale_max=1.4)
+    parameters = mi.traverse(wide)
+    parameters["lateral_scale"] = mi.Float(1.4)
+    parameters.update()
+    loaded = load(lateral_scale=1.4)
+    wi, wo, _ = pairs()
+    values = [evaluated(bsdf, wi, wo, 550.0) for bsdf in (wide, loaded)]
+    assert np.array_equal(*values)
+    parameters["lateral_scale"] = mi.Float(1.41)
+    with pytest.raises(DiffractionError, match="lateral_scale_max"):
+        parameters.update()
 
 
 def test_a_mesh_attribute_that_is_not_positive_is_refused(mono):

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.solve import orders
 from mitsuba_diffraction.solve.jobs import Jobs, problem_of
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.nodes import count_for
 from mitsuba_diffraction.solve.orders import Settings, measured_error, solve_orders
-from mitsuba_diffraction.solve.profiles import Profile, lamellar, read_profile, sinusoidal
+from mitsuba_diffraction.solve.profiles import Profile, lamellar, polygon, read_profile, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import cells
 
@@ -89,6 +92,38 @@ def test_a_line_is_read_with_its_undercut(tmp_path):
     assert len(profile.x) == 4
     assert profile.depth == pytest.approx(0.1)
     assert (np.diff(profile.x) < 0).any()
+
+
+def test_a_ridge_that_leans_over_the_next_period_is_moved():
+    leaning = polygon([(0, 0), (0.5, 0), (0.9, 0.3), (1.2, 0.3), (0.9, 0)], 1.0)
+    np.testing.assert_allclose(leaning.x, [0, 0.4, 0.7, 0.4, 0.5])
+    np.testing.assert_allclose(leaning.z, [0, 0.3, 0.3, 0, 0])
+    with pytest.raises(DiffractionError, match="crosses itself"):
+        polygon([(0, 0), (0.5, 0.1), (0.9, 0.3), (1.45, 0.02), (0.9, 0)], 1.0)
+
+
+def test_a_table_that_misses_its_tolerance_is_refined_or_accepted(monkeypatch):
+    monkeypatch.setattr(orders, "REFINEMENTS", 0)
+    monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
+    with pytest.raises(DiffractionError, match=r"5 % of directions .tolerance 0.40%.*--accept"):
+        solve_orders(PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3))
+    with pytest.warns(md.DiffractionWarning, match="on average"):
+        coarse = solve_orders(
+            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
+        )
+    monkeypatch.setattr(orders, "REFINEMENTS", 1)
+    with pytest.warns(md.DiffractionWarning, match="on average"):
+        finer = solve_orders(
+            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
+        )
+    assert finer.header["error_mean"] < coarse.header["error_mean"]
+
+
+def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_the_integral_method():
+    aluminium = material_of("Al", SETTINGS.wavelengths)
+    for profile, method in ((PROFILE, "chandezon"), (lamellar(0.5, 0.05), "integral")):
+        grating = Grating(profile, aluminium, 1.0, SETTINGS.wavelengths)
+        assert problem_of(grating, "auto", 0).method == method
 
 
 @pytest.mark.parametrize(

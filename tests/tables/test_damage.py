@@ -176,7 +176,6 @@ def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path, used):
         lambda d: d.update(spacing=[0.0, 1.0]),
         lambda d: d.update(order_0=[[[1e30]]]),
         lambda d: d.update(coherence_width=1e300),
-        lambda d: d["source"].update(warnings="one"),
     ],
 )
 def test_what_would_read_outside_or_fill_memory_is_refused_at_once(file, tmp_path, change):

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import zoom
 
 from mitsuba_diffraction import DiffractionTable, gratings
-from mitsuba_diffraction.tables.build.spectrum import NEAR
+from mitsuba_diffraction.tables.build.spectrum import GLOSSY_RADIUS
 
 from . import pages
 from .pages import exit_code
@@ -77,13 +77,13 @@ def agreement(
     """
     kappa = 4 * np.pi / WAVELENGTH
     axis = np.linspace(-0.7, 0.7, DIRECTIONS) * kappa
-    close = np.linspace(-NEAR, NEAR, DIRECTIONS) / whole.sigma
+    close = np.linspace(-GLOSSY_RADIUS, GLOSSY_RADIUS, DIRECTIONS) / whole.sigma
     error = windowed.source["windows"]["standard_error"]
     result = {}
     for name, along in (("glossy", close), ("colours", axis)):
         qx, qy = np.meshgrid(along, along)
         distance = np.hypot(qx, qy)
-        inside = distance * whole.sigma <= NEAR
+        inside = distance * whole.sigma <= GLOSSY_RADIUS
         part = inside if name == "glossy" else ~inside & (distance <= kappa)
         windows, exact = (t.window_sum(qx[part], qy[part], kappa) for t in (windowed, whole))
         result[name] = float(np.abs(windows - exact).sum() / exact.sum()), error[name]

@@ -30,7 +30,6 @@ second_order_factor  second order as the factor that tables hold
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them
-chandezon        rigorous solver: coordinates that follow the grooves
 published        solvers beside printed efficiencies
 littrow          a grating that its maker measured
 statistics       checks with random surfaces, and windows at random places

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.solve.chandezon import Chandezon
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import Profile
 
 from .cases import PIXELS
-from .chandezon import Chandezon
 from .model import efficiencies
 from .published import light_of
 

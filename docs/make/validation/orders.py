@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.solve.chandezon import Chandezon
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of
@@ -26,7 +27,6 @@ from mitsuba_diffraction.solve.stations import Grating, Solver, Station
 from mitsuba_diffraction.tables.orders import cells
 
 from .cases import PIXELS
-from .chandezon import Chandezon
 from .model import efficiencies
 from .published import light_of
 

@@ -16,7 +16,7 @@ from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
 from ...progress import Progress
-from ...tables.build.spectrum import NEAR
+from ...tables.build.spectrum import GLOSSY_RADIUS
 from . import hemisphere
 from .result import Bands, BrdfMap, Light
 
@@ -115,7 +115,7 @@ def brdf_map(
         cosine=cosine,
         illuminant=illuminant,
         samples=samples,
-        lobe=0.0 if sigma is None else NEAR / (sigma * float(wavenumber(bands.high))),
+        lobe=0.0 if sigma is None else GLOSSY_RADIUS / (sigma * float(wavenumber(bands.high))),
     )
 
 

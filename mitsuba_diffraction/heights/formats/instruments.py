@@ -105,7 +105,7 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Ch
     if len(channels) > 1:
         note += f", the {'first' if len(heights) > 1 else 'only'} height channel among {listed}"
     if len(heights) > 1:
-        note += "; channel (precompute --channel) chooses another"
+        note += "; channel chooses another"
     return _Choice(heights[0], note)
 
 

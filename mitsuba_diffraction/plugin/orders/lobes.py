@@ -6,9 +6,8 @@ lobe's integral over directions is its order's efficiency, but for what lies bey
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import drjit as dr
@@ -21,6 +20,7 @@ from ...optics.orders import lobe_falloff, lobe_peak, order_lobe, wavenumber_ste
 from ...tables.orders import OrderTable
 from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..directions import Pair
+from ..loops import sum_of
 from ..memory import index_between, read_record, upload
 from ..sampling import BELOW_ONE, invert
 from ..types import Colour, Context, Float, Index, Interaction, Mask, Spectrum, Vector2f
@@ -28,10 +28,6 @@ from .lookup import OrderLookup, Row, order_lookup
 
 #: Mask of lanes whose ωo lies below a sheet; None without a sheet.
 Below = Mask | None
-#: Efficiency and probability of an order, from wavelength and order.
-Shares = Callable[[Float, Float], tuple[Float, Float]]
-#: Term of a sum: from its number and the sums, the next number and the sums with it added.
-Term = Callable[[Index, list[Float]], tuple[Index, list[Float]]]
 
 #: Squared distance from a lobe's centre, in units of its width, beyond which it is 0.
 _FAR = 18.0
@@ -67,6 +63,14 @@ class Lit(NamedTuple):
     value: Float
     peak: Float
     terms: list[tuple[Float, Float, Float]]
+
+
+@dataclass
+class Incidence:
+    """Incident light in the patch's frame: tangential part and cosine of ωi."""
+
+    incident: Vector2f
+    cos_i: Float
 
 
 class Draw(NamedTuple):
@@ -220,10 +224,10 @@ class DaylightLobes(_Window):
     def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
         """See `Lobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
-        # before the loops: a cached property that a loop computed would belong to it
-        shares = functools.partial(self._shares, pair.incident, pair.cos_i, below)
-        total = self._zeroth(shares, radius)
-        total = [a + b for a, b in zip(total, self._others(shares, pair.uv, radius), strict=True)]
+        light = Incidence(pair.incident, pair.cos_i)
+        total = self._zeroth(light, below, radius)
+        others = self._others(light, below, pair.uv, radius)
+        total = [a + b for a, b in zip(total, others, strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
         return Reflected(mi.Color3f(*colours), dr.detach(density))
 
@@ -246,33 +250,29 @@ class DaylightLobes(_Window):
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 
     def _shares(
-        self,
-        incident: Vector2f,
-        cos_i: Float,
-        below: Mask | None,
-        wavelength: Float,
-        order: Float,
+        self, light: Incidence, below: Below, wavelength: Float, order: Float
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
-        row = self.lookup.row(incident, cos_i, wavelength)
+        row = self.lookup.row(light.incident, light.cos_i, wavelength)
         share, total = self.lookup.order(row, order, True, below), self.lookup.total(row)
         return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _LEAST))
 
-    def _zeroth(self, shares: Shares, radius: Float) -> list[Float]:
+    def _zeroth(self, light: Incidence, below: Below, radius: Float) -> list[Float]:
         """Sum order 0 over wavelengths, for red, green, blue and the density."""
         longest = dr.square(2e3 * math.pi * self.sigma / ENDS[1])
         count = dr.select(radius * longest < _FAR, mi.UInt32(self._wavelengths), mi.UInt32(0))
 
-        def body(n: Index, sums: list[Float]) -> tuple[Index, list[Float]]:
+        def add(n: Index, inputs: tuple[Incidence, Float], sums: list[Float]) -> list[Float]:
+            light, radius = inputs
             node = read_record(self._order_0, n, 8)
             peak = lobe_peak(2e3 * math.pi * dr.rcp(node[CHANNELS]), self.sigma)
-            value, share = shares(node[CHANNELS], mi.Float(0.0))
+            value, share = self._shares(light, below, node[CHANNELS], mi.Float(0.0))
             lobe = peak * dr.exp(-math.pi * radius * peak)
-            return n + 1, _added(sums, node, lobe, value, share)
+            return _added(sums, node, lobe, value, share)
 
-        return self._loop(count, self._wavelengths, body)
+        return sum_of(count, add, (light, radius), [mi.Float(0.0)] * CHANNELS)
 
-    def _others(self, shares: Shares, uv: Vector2f, radius: Float) -> list[Float]:
+    def _others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
         """Sum all other orders, for red, green, blue and the density."""
         u, v = uv.x, uv.y
         unit = 2.0 * math.pi / self.period
@@ -295,16 +295,18 @@ class DaylightLobes(_Window):
         upper_share = dr.clip(place - lower, 0.0, 1.0)
         scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
 
-        def body(n: Index, sums: list[Float]) -> tuple[Index, list[Float]]:
+        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
+            light, (step, aside, upper_share, scale) = inputs
             m = first + mi.Float(n)
             k = m * step
             weights = self._weights(k, mi.UInt32(lower), upper_share)
             wavelength = 2e3 * math.pi * dr.rcp(k)
-            value, share = shares(wavelength, dr.mulsign(m, u))
+            value, share = self._shares(light, below, wavelength, dr.mulsign(m, u))
             lobe = scale * dr.exp(-aside * dr.square(m))
-            return n + 1, _added(sums, weights, lobe, value, share)
+            return _added(sums, weights, lobe, value, share)
 
-        return self._loop(count, most, body)
+        inputs = light, [step, aside, upper_share, scale]
+        return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
 
     def _weights(self, k: Float, row: Index, share: Float) -> list[Float]:
         """Interpolate the smoothed weights of a wavenumber."""
@@ -320,11 +322,6 @@ class DaylightLobes(_Window):
             )
             for c in range(CHANNELS)
         ]
-
-    def _loop(self, count: Index, most: int, body: Term) -> list[Float]:
-        sums = [mi.Float(0.0) for _ in range(CHANNELS)]
-        state = (mi.UInt32(0), sums)
-        return list(dr.while_loop(state, lambda n, _: n < count, body, max_iterations=most)[1])
 
 
 def _added(

@@ -29,7 +29,7 @@ from .sections import Sections, packed_array, packed_mesh, packed_parts, section
 SAMPLES = 256
 
 _FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # wavelengths of monochromatic light, nm
-_NEAR = float(np.cos(np.radians(3.0)))  # lights within this angle of a direction move with it
+_MIN_COSINE = float(np.cos(np.radians(3.0)))  # lights within this angle of a direction move with it
 
 
 def packed_light(
@@ -88,7 +88,7 @@ def _owner(light: Light, lights: Sequence[Light]) -> int:
         if not other.name.endswith(light.name) or light.place[3] != other.place[3]:
             continue
         a, b = (x.place[:3] / np.linalg.norm(x.place[:3]) for x in (light, other))
-        if light.place[3] or float(a @ b) > _NEAR:
+        if light.place[3] or float(a @ b) > _MIN_COSINE:
             return number
     return -1
 

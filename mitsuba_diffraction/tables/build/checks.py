@@ -49,7 +49,7 @@ def check_patches(patches: Sequence[HeightField], settings: TableSettings) -> No
             raise build_error(
                 f"'{patch.name}' is {patch.extent[0]:.6g} × {patch.extent[1]:.6g} µm, but "
                 f"'{patches[0].name}' is {patches[0].extent[0]:.6g} × {patches[0].extent[1]:.6g} "
-                "µm; crop them to one size (crop, --crop)"
+                "µm; crop them to one size (crop)"
             )
 
 
@@ -121,8 +121,8 @@ def slow_warning(field: HeightField, width: float, taps: tuple[int, int]) -> str
     if taps[0] * taps[1] <= SLOW:
         return ""
     return (
-        f"{field.name}: average over windows (windows=auto, precompute --windows auto), or crop "
-        f"the heights (crop={width:g}, --crop {width:g}): the patch of {field.extent[0]:.4g} × "
+        f"{field.name}: average over windows, windows=auto, or crop "
+        f"the heights, crop={width:g}: the patch of {field.extent[0]:.4g} × "
         f"{field.extent[1]:.4g} µm is so much larger than the coherence width of {width:g} µm that "
         f"every look-up reads {taps[0]}×{taps[1]} orders, and rendering will be slow"
     )
@@ -135,8 +135,8 @@ def too_wide(
     width = settings.width
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
-        f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it (windows=auto, "
-        f"precompute --windows auto), or crop the heights (crop={width:g}, --crop {width:g})"
+        f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it, windows=auto, "
+        f"or crop the heights, crop={width:g}"
     )
 
 
@@ -167,6 +167,6 @@ def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
     if size > MAX_BYTES:
         raise build_error(
             f"it would take {size / 1e9:.1f} GB ({bins:.3g} orders of {expansion.intervals}×"
-            f"{terms} terms); use a smaller or shallower patch (crop, --crop), a larger tolerance, "
+            f"{terms} terms); use a smaller or shallower patch (crop), a larger tolerance, "
             "or a longer shortest wavelength"
         )

@@ -15,7 +15,7 @@ from ..expansion import Expansion, principal_functions
 from ..layout import Grid
 from .error import alternate
 from .powers import Spectra
-from .spectrum import NEAR, Spectrum
+from .spectrum import GLOSSY_RADIUS, Spectrum
 
 #: Fills an array (nodes, …) with what is expanded, of all bins at the nodes of an interval, one
 #: after the other; gives order 0's.
@@ -113,7 +113,7 @@ def _near(grid: Grid, components: int) -> NDArray[np.int64]:
         step * np.arange(-last, last + 1) for step, last in zip(grid.steps, grid.last, strict=True)
     )
     distance = np.hypot(x, y[:, None])
-    rows, columns = np.nonzero((distance <= NEAR) & (distance > 0.0))
+    rows, columns = np.nonzero((distance <= GLOSSY_RADIUS) & (distance > 0.0))
     bins = rows * len(x) + columns
     return np.asarray((bins[:, None] * components + np.arange(components)).ravel())
 

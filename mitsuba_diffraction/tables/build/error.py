@@ -26,7 +26,7 @@ from ..expansion import Expansion
 from ..layout import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
 from .powers import Spectra
-from .spectrum import NEAR
+from .spectrum import GLOSSY_RADIUS
 
 #: A part that vanishes at some κ is compared with this share of its largest value.
 FLOOR = 1e-3
@@ -78,7 +78,7 @@ class ErrorMeter:
         self._tapped = list(zip(*tapped, strict=True))
         x, y = np.meshgrid(axes[0], axes[1])
         reached = (x / grid.radius[0]) ** 2 + (y / grid.radius[1]) ** 2 <= 1.0
-        self._near = reached & (np.hypot(x * grid.steps[0], y * grid.steps[1]) <= NEAR)
+        self._near = reached & (np.hypot(x * grid.steps[0], y * grid.steps[1]) <= GLOSSY_RADIUS)
         self._far = reached & ~self._near
 
     def series(

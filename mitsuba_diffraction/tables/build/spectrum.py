@@ -17,7 +17,7 @@ from ...heights.field import HeightField
 Tapers = tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]
 
 #: Radius of the bins counted as the glossy reflection, in units of 1/σ.
-NEAR = 3.0
+GLOSSY_RADIUS = 3.0
 
 _SMALL = 1 << 16  # pixels
 _ROWS = 64  # rows (or columns) a task: large enough for the FFT, small enough to stay in cache

@@ -28,7 +28,7 @@ from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber
 from ...settings import TableSettings
 from ..table import build_error
-from .spectrum import NEAR, Spectrum
+from .spectrum import GLOSSY_RADIUS, Spectrum
 
 #: Width of a window, in coherence widths, of `windows="auto"`.
 AUTO = 2.0
@@ -198,7 +198,7 @@ class Windows(Sequence[HeightField]):
             squares = squares + their_squares + np.square(change) * (more * (count - more) / count)
         error = np.sqrt(squares / (count - 1) * self.variance_factor)
         y, x = (q * np.arange(-n, n + 1) for q, n in zip(bins, last, strict=True))
-        near = np.hypot(x, y[:, None]) <= NEAR / sigma
+        near = np.hypot(x, y[:, None]) <= GLOSSY_RADIUS / sigma
         return {
             name: float(error[part].sum() / mean[part].sum()) if part.any() else 0.0
             for name, part in (("glossy", near), ("colours", ~near))

@@ -45,10 +45,10 @@ from ..table import DiffractionTable
 from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
-from .transport import Light, Orders, Transport
+from .transport import Orders, ScatteredLight, Transport
 
 #: Where order 0 has less of the light, it is not scaled.
-FAINT = 1e-4
+MIN_ORDER_0 = 1e-4
 
 
 @dataclass(frozen=True)
@@ -136,17 +136,19 @@ class Surface:
         s = page(conservation.scale, conservation.scale_below)
         return light.sent(self._ones, self._ones), light.sent(c, s)
 
-    def _lights(self, wavelengths: Real, theta: Real, phi: Real) -> list[Callable[[], Light]]:
+    def _lights(
+        self, wavelengths: Real, theta: Real, phi: Real
+    ) -> list[Callable[[], ScatteredLight]]:
         """Makers of the light of wavelengths (nm) from polar angles (t,) and azimuths (p,), rad.
 
         Light is made when it is needed: it takes up to 100 MB.
         """
         here = self._grid.interpolation(theta[:, None], phi)
 
-        def make(paths: list[Path], wavelength: float) -> Light:
+        def make(paths: list[Path], wavelength: float) -> ScatteredLight:
             directions = theta, phi, self._grid
             sent = [Transport(self.orders, path, wavelength, *directions) for path in paths]
-            return Light(sent, here)
+            return ScatteredLight(sent, here)
 
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
@@ -159,13 +161,13 @@ class Surface:
         albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
         return DirectionalTable(wavelengths, np.stack(albedos))
 
-    def _solved(self, light: Light) -> tuple[Array, Array]:
+    def _solved(self, light: ScatteredLight) -> tuple[Array, Array]:
         """Find c and s at the grid's directions."""
         if self._both_sides:
             return self._balanced(light), self._ones
         return self._ones, self._limited(light)
 
-    def _limited(self, light: Light) -> Array:
+    def _limited(self, light: ScatteredLight) -> Array:
         """Find s of a reflector at the grid's directions."""
         settings = self._settings
         # part of a lobe is below the horizon there, and would ask for any s
@@ -174,7 +176,7 @@ class Surface:
         aim = np.minimum(kernel(self._ones), np.float32(settings.target))
         return scaled(kernel, aim, largest[:, None], settings.sweeps)
 
-    def _balanced(self, light: Light) -> Array:
+    def _balanced(self, light: ScatteredLight) -> Array:
         """Find c at the grid's directions, such that R + T is 1."""
         settings, most = self._settings, self._settings.largest**2
         others, zeroth = light.others(self._ones), light.order_0(self._ones)
@@ -182,11 +184,11 @@ class Surface:
             return self._ones
         aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
         c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
-        c = np.where(zeroth > FAINT, c, np.float32(1.0))
+        c = np.where(zeroth > MIN_ORDER_0, c, np.float32(1.0))
         # what lies within one row, as a lobe at the critical angle, is left to itself
         return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
-    def _lowered(self, light: Light, c: Array, s: Array) -> tuple[Array, Array]:
+    def _lowered(self, light: ScatteredLight, c: Array, s: Array) -> tuple[Array, Array]:
         """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""
         settings = self._settings
         if self._both_sides:
@@ -195,7 +197,7 @@ class Surface:
             def order_0_excess(c: Array) -> Array:
                 zeroth = light.at_directions(c) * light.order_0(c)
                 factor = np.minimum(zeroth / room, settings.largest**2)
-                return np.where(zeroth > FAINT, factor, np.float32(1.0))
+                return np.where(zeroth > MIN_ORDER_0, factor, np.float32(1.0))
 
             c = lowered(c, order_0_excess, settings.passes)
         middle = c.mean(axis=0)

@@ -15,7 +15,7 @@ from ..directional import Array, Real
 Floats = NDArray[np.floating[Any]]
 
 #: Least sum that is scaled.
-_LEAST = np.float32(1e-6)
+_MIN_SUM = np.float32(1e-6)
 
 
 def scaled(
@@ -28,9 +28,9 @@ def scaled(
     """
     s = np.ones_like(aim, np.float32)
     # series of few terms may sum to less than 0 where next to nothing is reflected
-    aim = np.maximum(aim, _LEAST)
+    aim = np.maximum(aim, _MIN_SUM)
     for _ in range(sweeps):
-        s = s * np.sqrt(aim / np.maximum(s * transport(s), _LEAST))
+        s = s * np.sqrt(aim / np.maximum(s * transport(s), _MIN_SUM))
         s = np.minimum(s, largest).astype(np.float32)
     return s
 

@@ -202,7 +202,7 @@ class Transport:
 
 
 @dataclass(frozen=True)
-class Light:
+class ScatteredLight:
     """Light of one wavelength that a surface sends on from directions (t, p) of each side.
 
     Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).

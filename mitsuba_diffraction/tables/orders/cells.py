@@ -54,7 +54,7 @@ A, B = 0, 1
 #: nobody sees it (1e-5).
 LEAST_ALONG = 3e-3
 #: Least width of a kind or y-range, against division by 0: rounding in double precision.
-_LEAST = 1e-12
+_MIN_WIDTH = 1e-12
 
 
 class Cell(NamedTuple):
@@ -108,7 +108,7 @@ def to_cell(x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, optical_period: f
     x, y, lam = np.broadcast_arrays(
         *(np.asarray(value, np.float64) for value in (x, y, wavelength))
     )
-    cell = order_cell(x, y, 1e3 * optical_period / lam, math.inf, _LEAST)
+    cell = order_cell(x, y, 1e3 * optical_period / lam, math.inf, _MIN_WIDTH)
     channel = np.where(np.abs(x / cell.c) > 1.0, -1, cell.channel).astype(np.int64)
     return Cell(
         cell.band.astype(np.int64), np.where(cell.kind_a, A, B), channel,
@@ -136,7 +136,7 @@ def from_cell(
     p = np.asarray(channel) + f
     lam = np.asarray(wavelength, np.float64)
     c = np.minimum(big_k * lam / (2e3 * optical_period), 1.0)
-    s = np.clip(1.0 - 2.0 * p / np.maximum(big_k, _LEAST), -1.0, 1.0)
+    s = np.clip(1.0 - 2.0 * p / np.maximum(big_k, _MIN_WIDTH), -1.0, 1.0)
     return Conditions(*np.broadcast_arrays(s * c, np.sqrt(1.0 - c * c), lam))
 
 
@@ -164,7 +164,7 @@ def w_of(
     """Return w of a wavelength in vacuum (nm); wavelengths outside the table get 0 or 1."""
     low, high = _ends(k_continuous, wavelengths, optical_period)
     lam = np.asarray(wavelength, np.float64)
-    return np.asarray(wavelength_coordinate(lam, low, high, _LEAST))
+    return np.asarray(wavelength_coordinate(lam, low, high, _MIN_WIDTH))
 
 
 def largest_band(wavelengths: tuple[float, float], optical_period: float) -> int:
@@ -191,7 +191,7 @@ def interpolation(count: int, at: ArrayLike) -> Array:
     places = np.asarray(at, np.float64)[..., None]
     angles = np.pi * (np.arange(count) + 0.5) / count
     distance = places - nodes(count)
-    exact = np.abs(distance) < _LEAST
+    exact = np.abs(distance) < _MIN_WIDTH
     weights = (-1.0) ** np.arange(count) * np.sin(angles) / np.where(exact, 1.0, distance)
     weights = np.where(exact.any(axis=-1, keepdims=True), exact, weights)
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))

@@ -27,7 +27,7 @@ CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 
 #: Share of the light that a totally reflecting face sends back: trapped light would never end.
 _TRAPPED = 1.0 - 1e-4
 #: Least transmittance in probabilities, so that no order that leaves has none.
-_LEAST = 1e-3
+_MIN_TRANSMITTANCE = 1e-3
 
 
 class Corners(NamedTuple):
@@ -132,7 +132,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     back = _TRAPPED * (1.0 - through)
     repeated = np.eye(len(channels)) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
-    return Rows(within, within * np.maximum(through, _LEAST)[..., None, :])
+    return Rows(within, within * np.maximum(through, _MIN_TRANSMITTANCE)[..., None, :])
 
 
 class _Grid(NamedTuple):

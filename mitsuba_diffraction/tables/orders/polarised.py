@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
-_LEAST = 1e-12
+_MIN_AMPLITUDE = 1e-12
 
 
 def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
@@ -60,7 +60,7 @@ def nearest_pure(matrices: Array, efficiency: Array) -> Array:
     largest = np.diagonal(coherency, axis1=1, axis2=2).real.argmax(axis=1)
     vector = np.einsum("nab,nb->na", coherency, coherency[lanes, :, largest])
     power = 0.5 * np.sum(np.abs(vector) ** 2, axis=1)
-    scale = np.sqrt(np.maximum(efficiency.ravel(), 0.0) / np.maximum(power, _LEAST**2))
+    scale = np.sqrt(np.maximum(efficiency.ravel(), 0.0) / np.maximum(power, _MIN_AMPLITUDE**2))
     vector *= scale[:, None]
     pairs = vector[:, :, None] * vector[:, None, :].conj()
     return np.asarray((pairs.reshape(-1, 16) @ _MATRIX).real.reshape(matrices.shape))

@@ -17,7 +17,7 @@ from ...heights.field import HeightField
 from ...optics.geometry import wavenumber
 from ...progress import Progress
 from ...tables.build.checks import TAPS_SHARE
-from ...tables.build.spectrum import NEAR
+from ...tables.build.spectrum import GLOSSY_RADIUS
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
@@ -219,5 +219,5 @@ def method_map(
         cosine=cosine,
         illuminant="D65",
         samples=samples,
-        lobe=NEAR / (method.sigma * float(wavenumber(bands.high))),
+        lobe=GLOSSY_RADIUS / (method.sigma * float(wavenumber(bands.high))),
     )

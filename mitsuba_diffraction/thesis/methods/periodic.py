@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import DiffractionError
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
-from ...tables.build.spectrum import NEAR
+from ...tables.build.spectrum import GLOSSY_RADIUS
 from ...tables.lookup import Kernel, weighted_sum
 from ...tables.table import DiffractionTable
 from .method import SPECULAR_WAVELENGTH, Array, FullSpectrum, Gain, Method, UniformMethod
@@ -74,7 +74,7 @@ class OrdersOnly(Method):
         self.name, self.full, self.periods, self.weighting = name, full, periods, weights
         self.sigma, self.wavelength_range = full.sigma, full.wavelength_range
         longest = float(wavenumber(full.wavelength_range[1]))
-        self.specular = NEAR / (full.sigma * longest) if specular is None else specular
+        self.specular = GLOSSY_RADIUS / (full.sigma * longest) if specular is None else specular
         if not 0.0 <= self.specular < 2.0:
             raise DiffractionError(f"specular={self.specular:g} must be at least 0 and below 2")
         self._step = float(np.diff(full.wavelengths).max())

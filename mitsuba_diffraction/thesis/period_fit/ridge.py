@@ -38,7 +38,7 @@ _AGREES = 1.15
 # Half width of order 0's lobe in units of 1/σ: beyond it exp(−25), 1e-11, of its power is left.
 _ORDER_0 = 5.0
 # Light this much weaker than the brightest order is the tail of the window, not a maximum.
-_FAINT = 1e-12
+_MIN_RELATIVE = 1e-12
 # Number of periods that are tried, evenly spaced in frequency.
 _LINES = 4000
 
@@ -195,7 +195,7 @@ def ridge_of(
     inner = np.clip(peak, 1, response.angles.size - 2)
     around = np.stack([values[rows, inner + shift] for shift in (-1, 0, 1)])
     good = (peak == inner) & np.all(around >= 0.0, axis=0)
-    good &= around[1] > _FAINT * response.values.max(initial=0.0)
+    good &= around[1] > _MIN_RELATIVE * response.values.max(initial=0.0)
     before, middle, after = np.log(np.where(good & np.all(around > 0.0, axis=0), around, 1.0))
     bend = before - 2.0 * middle + after
     curved = bend < 0.0  # methods that sample few wavelengths may be 0 at the neighbours

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from docs.make.validation import littrow
-from docs.make.validation.chandezon import Chandezon
 from docs.make.validation.published import PUBLISHED, light_of
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.solve.chandezon import Chandezon
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.reference import screen_power
-from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
+from mitsuba_diffraction.tables.build.error import FLOOR, GLOSSY_RADIUS, alternate, worst
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -28,7 +28,7 @@ def measured(table, kappas, seed):
     x, y = np.meshgrid(np.arange(-jx, jx + 1), np.arange(-jy, jy + 1))
     reached = (x / rx) ** 2 + (y / ry) ** 2 <= 1.0
     x, y = x[reached], y[reached]
-    near = np.hypot(x * table.grid.steps[0], y * table.grid.steps[1]) <= NEAR
+    near = np.hypot(x * table.grid.steps[0], y * table.grid.steps[1]) <= GLOSSY_RADIUS
     errors, sums = [], []
     for kappa in kappas:
         qx = (x + rng.uniform(-0.5, 0.5, x.size)) * table.spacing[0]

@@ -1,4 +1,4 @@
-"""Rigorous solutions of sloped gratings by Chandezon's method, in coordinates that follow them.
+"""Efficiencies of sloped gratings by Chandezon's method, in coordinates that follow them.
 
 The surface is r(u) = (X, Z), and points are r(u) + v d with a constant direction d. A vertical d is
 the method of Chandezon, Dupuis, Cornet and Maystre 1982 (J. Opt. Soc. Am. 72, 839); a tilted d also
@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
-from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.solve.profiles import Profile
-from mitsuba_diffraction.solve.stations import Station
+from ..errors import DiffractionError
+from .profiles import Profile
+from .stations import Real, Station
 
 Complex = NDArray[Any]
-Real = NDArray[np.float64]
 
 # Samples of a period, from which Fourier coefficients are taken
 _SAMPLES = 8192
@@ -35,6 +34,8 @@ _SAMPLES = 8192
 _AT_EDGES = 0.02
 # Sides must turn by less: d lies above all of them
 _WIDEST = np.radians(175.0)
+# Straight sides of a profile with edges at most: each needs some hundred samples
+_MOST_SIDES = 32
 
 
 class Chandezon:
@@ -48,17 +49,18 @@ class Chandezon:
     Raises
     ------
     DiffractionError
-        If grooves have vertical walls on both sides, or are undercut.
+        If grooves have vertical walls on both sides, are undercut, or have too many edges.
     """
 
     def __init__(self, profile: Profile, harmonics: int) -> None:
         self.period, self.harmonics = profile.period, harmonics
+        if reason := refused(profile):
+            raise DiffractionError(
+                f"{profile.name} {reason}, which Chandezon's method cannot solve; use --solver "
+                "integral"
+            )
         x, z = profile.closed
         angles = np.arctan2(np.diff(z), np.diff(x))
-        if np.ptp(angles) > _WIDEST:
-            raise DiffractionError(
-                f"{profile.name} has walls on both sides, which Chandezon's method cannot solve"
-            )
         middle = 0.5 * (angles.min() + angles.max())
         self._curve = curve = _smooth(x, z) if profile.corners == 0 else _with_edges(x, z)
         #: J and B of the samples.
@@ -76,10 +78,13 @@ class Chandezon:
         Raises
         ------
         DiffractionError
-            If the material is a perfect conductor.
+            If the material is a perfect conductor, or a thin sheet.
         """
-        if station.indices is None:
-            raise DiffractionError("Chandezon's method needs a material with an index")
+        if station.indices is None or station.thin:
+            raise DiffractionError(
+                "Chandezon's method solves reflection by a material with an index; use --solver "
+                "integral for perfect conductors and thin sheets"
+            )
         k = np.pi * station.extent / self.period
         first = station.channels // 2 - self.harmonics
         numbers = np.arange(first, first + 2 * self.harmonics + 1)
@@ -133,6 +138,16 @@ class Chandezon:
             columns.append([_coefficients(values)[frequencies] for values in (wave, normal)])
         shape = (len(places), 2, len(alpha))
         return _Waves(*np.array(columns, complex).reshape(shape).transpose(1, 2, 0))
+
+
+def refused(profile: Profile) -> str:
+    """Return the reason why the method cannot solve a profile; "" if it can."""
+    x, z = profile.closed
+    if np.ptp(np.arctan2(np.diff(z), np.diff(x))) > _WIDEST:
+        return "has walls on both sides, or an undercut"
+    if profile.corners == 0:
+        return "" if (np.diff(x) > 0).all() else "has a vertical or overhanging side"
+    return f"has edges and over {_MOST_SIDES} sides" if len(profile.x) > _MOST_SIDES else ""
 
 
 class _Curve(NamedTuple):

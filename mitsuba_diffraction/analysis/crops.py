@@ -1,0 +1,62 @@
+"""Crops of one scan, whose differences are the scan's own repeatability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import DiffractionError
+from ..files import FileKind, kind_of
+from ..heights.field import HeightField
+from ..heights.load import load_heights
+from ..heights.read import LoadOptions, treated_by_default
+
+#: Fewest pixels of a crop along a side.
+FEWEST_PIXELS = 32
+
+
+def crops_of(path: Path, options: LoadOptions, count: int) -> list[HeightField]:
+    """Return crops of equal size, side by side, each treated as a scan of its own.
+
+    path : heights of any format; options : how they are read and treated.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is a recipe, or the crops have fewer than `FEWEST_PIXELS` a side.
+    """
+    if kind_of(path) is FileKind.RECIPE:
+        raise DiffractionError(f"'{path}' is a recipe; --crops is for files of heights")
+    raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
+    whole = load_heights(path, raw)
+    treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)
+    return [treated_by_default(part, treatment) for part in _parts(whole, count)]
+
+
+def cropped(fields: Sequence[HeightField], side: float) -> list[HeightField]:
+    """Return the central squares of `side`, µm, of fields that are wider."""
+    from ..heights.preprocess import crop
+
+    return [crop(field, (side, side)) if min(field.extent) > side else field for field in fields]
+
+
+def _parts(whole: HeightField, count: int) -> list[HeightField]:
+    """Cut a field into `count` equal rectangles, nearly square."""
+    width, height = whole.extent
+    columns = min(count, max(1, math.ceil(math.sqrt(count * width / height) - 1e-9)))
+    rows = math.ceil(count / columns)
+    ny, nx = whole.shape[0] // rows, whole.shape[1] // columns
+    if min(nx, ny) < FEWEST_PIXELS:
+        most = (whole.shape[0] // FEWEST_PIXELS) * (whole.shape[1] // FEWEST_PIXELS)
+        raise DiffractionError(
+            f"crops={count}: crops of {nx} x {ny} pixels are smaller than {FEWEST_PIXELS} a side; "
+            f"{whole.name} has {whole.shape[1]} x {whole.shape[0]}, enough for {max(most, 0)}"
+        )
+    result = []
+    for n in range(count):
+        row, column = divmod(n, columns)
+        heights = whole.heights[row * ny : (row + 1) * ny, column * nx : (column + 1) * nx]
+        line = f"crop {n + 1} of {count}"
+        result.append(whole.changed(heights, line, cut_out=True, periodic=False))
+    return result

@@ -1,0 +1,46 @@
+"""Wavelengths at which a surface is known: its material, its pigment, and the tables of a mean."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError
+from ..optics.materials import PERFECT, material_named
+from ..plugin.conductors import tabulated_range, unknown_conductor
+from ..plugin.pigment import pigment_range
+
+Reals = NDArray[np.float64]
+
+
+def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
+    """Return the wavelengths, nm, between which a material and a pigment beneath it are known.
+
+    Raises a DiffractionError if there is no such material, or the pigment cannot be read.
+    """
+    name = PERFECT if material is None else material_named(material)
+    limits = None
+    if isinstance(name, str) and name != PERFECT:
+        limits = tabulated_range(name)
+        if limits is None:
+            raise DiffractionError(unknown_conductor(name))
+    first, last = limits or (0.0, math.inf)
+    least, most = pigment_range(pigment)
+    return max(first, least), min(last, most)
+
+
+def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
+    """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
+    for name, limits in (
+        ("material", known_range(material)),
+        ("pigment", known_range(None, pigment)),
+    ):
+        if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
+            value = material if name == "material" else pigment
+            raise DiffractionError(
+                f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
+                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
+                "(--wavelength-range)"
+            )

@@ -1,0 +1,32 @@
+"""Sums in loops inside a Dr.Jit kernel, which derivatives pass in both directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from .types import Index
+
+
+def sum_of(
+    count: Index | int, add: Callable[[Index, Any, Any], Any], inputs: Any, total: Any
+) -> Any:
+    """Return a total of `count` terms.
+
+    Parameters
+    ----------
+    add : function of the number of a term, the inputs and the total, which returns the total with
+        that term added. All that derivatives are wanted for must come by `inputs`: Dr.Jit drops
+        derivatives of what a loop's body takes from elsewhere, without a word.
+    """
+    state = mi.UInt32(0), inputs, total
+    # -1: Dr.Jit's reverse mode of sums, which stores nothing
+    return dr.while_loop(
+        state,
+        lambda n, *_: n < count,
+        lambda n, inputs, total: (n + 1, inputs, add(n, inputs, total)),
+        max_iterations=-1,
+    )[2]

@@ -1,0 +1,50 @@
+"""Derivatives of renderings with respect to every parameter of every plugin."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import pytest
+
+import mitsuba_diffraction as md
+from tests.support.orders import thin_grating
+from tests.support.rendered import PIGMENT, SURFACES, check, plate
+from tests.support.variants import runs
+
+pytestmark = pytest.mark.thorough
+
+WIDTHS = (3.0, 6.0, 12.0, 65.0)
+VARIANTS = ("llvm_ad_mono", "llvm_ad_rgb", "llvm_ad_spectral")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("mitsuba_variant", VARIANTS)
+def test_every_parameter_has_the_derivative_of_differences(mitsuba_variant, name, width):
+    if not runs(mitsuba_variant):
+        pytest.skip(f"Dr.Jit has no device for {mitsuba_variant}")
+    if name == "places" and mitsuba_variant == "llvm_ad_rgb":
+        pytest.skip("RGB variants have no windows that follow places")
+    mi.set_variant(mitsuba_variant)
+    check(plate(name, width), SURFACES[name][1])
+
+
+@pytest.mark.parametrize("mitsuba_variant", VARIANTS)
+@pytest.mark.parametrize("thin", [False, True])
+def test_solved_orders_have_the_derivatives_of_differences(mitsuba_variant, thin):
+    mi.set_variant(mitsuba_variant)
+    own = {} if thin else {"beneath": PIGMENT}
+    at = {"orientation": 20.0} | ({} if thin else {"nested.reflectance.value": 0.4})
+    check(md.bsdf_dict(thin_grating(thin=thin), coherence_width=6.0, **own), at, spp=256)
+
+
+@pytest.mark.parametrize("mitsuba_variant", VARIANTS)
+def test_a_mix_has_the_derivatives_of_differences(mitsuba_variant):
+    mi.set_variant(mitsuba_variant)
+    mix = {
+        "type": "diffraction_mix",
+        "back": plate("metal", 6.0),
+        "belly": plate("pigment", 12.0),
+        "weight_back": 0.4,
+    }
+    own = {"back.orientation": 20.0, "back.lateral_scale": 1.5, "belly.orientation": 40.0}
+    check(mix, {"weight_back": 0.4, "belly.eta": 1.5, **own})

@@ -1,0 +1,141 @@
+"""Derivatives of a rendering against differences with the same random numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.support.lanes import lanes
+
+GRATING = md.gratings.sinusoidal(1.6, 0.2, periods=3, pixels_per_period=20)
+PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
+PIXELS = 8
+#: Half the step of differences, relative to a parameter's value, below the steps in which
+#: coefficients follow an index (0.01).
+STEP = 1e-3
+#: The same for angles, degrees.
+DEGREES = 0.02
+
+#: Surfaces by what they show: plugin's parameters, and the values to take derivatives at.
+SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+    "metal": (
+        {"eta": 0.9, "k": 6.0, "lateral_scale": 2.0},
+        {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 1.5, "eta.value": 0.9,
+         "k.value": 6.0},
+    ),
+    "pigment": (
+        {"int_ior": 1.5, "beneath": PIGMENT},
+        {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5, "nested.reflectance.value": 0.4},
+    ),
+    "coat": (
+        {"material": "Al", "coat_ior": 1.5},
+        {"orientation": 20.0, "height_scale": 0.9, "coat_eta": 1.5},
+    ),
+    "film": (
+        {"eta": 0.9, "k": 6.0, "film_ior": 2.0, "film_thickness": 200.0},
+        {"orientation": 20.0, "height_scale": 0.9, "film_thickness": 200.0, "film_eta": 2.0,
+         "film_k": 0.05},
+    ),
+    "patch": (
+        {"material": "none", "coherence": "patch", "lateral_scale": 1.0},
+        {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 0.9},
+    ),
+    "places": (
+        {"material": "none", "coherence": "surface", "uv_scale": 3.0, "lateral_scale": 1.0},
+        {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 0.9},
+    ),
+    "dielectric": (
+        {"plugin": "diffraction_dielectric", "lateral_scale": 1.0},
+        {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 0.9, "eta": 1.5},
+    ),
+    "sheet": (
+        {"plugin": "diffraction_dielectric", "thin": True},
+        {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5},
+    ),
+}  # fmt: skip
+
+
+def scene(bsdf: dict[str, Any]) -> Any:
+    """A plate that a lamp on either side lights, sampled by its lamps alone."""
+    lamps = {
+        f"lamp{n}": {
+            "type": "sphere",
+            "center": [-2, -1, z],
+            "radius": 0.7,
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 10.0}},
+        }
+        for n, z in enumerate((5, -4))
+    }
+    origin = mi.ScalarTransform4f().look_at(origin=[0.8, 0.2, 3.0], target=[0, 0, 0], up=[0, 1, 0])
+    film = {
+        "type": "hdrfilm",
+        "width": PIXELS,
+        "height": PIXELS,
+        "rfilter": {"type": "box"},
+        "pixel_format": "luminance" if mi.is_monochromatic else "rgb",
+    }
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+            "sensor": {"type": "perspective", "fov": 30, "to_world": origin, "film": film},
+            "plate": {"type": "rectangle", "bsdf": bsdf},
+            **lamps,
+        }
+    )
+
+
+def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
+    """Compare derivatives, backward and forward, with differences of the same random numbers."""
+    # look-ups of colours bend between their bins: their kinks average out
+    spp = 16 * spp if mi.is_rgb else spp
+    loaded = scene(bsdf)
+    parameters = mi.traverse(loaded)
+    keys = {name: f"plate.bsdf.{name}" for name in at}
+    # a weight for each pixel: what moves within the picture counts
+    weights = mi.TensorXf(lanes(np.random.default_rng(3).random(PIXELS**2)), (PIXELS, PIXELS, 1))
+
+    def weighted(
+        values: dict[str, float], seeds: tuple[int, int] = (2, 1), ad: bool = False
+    ) -> Any:
+        for name, value in values.items():
+            parameters[keys[name]] = type(parameters[keys[name]])(value)
+            if ad:
+                dr.enable_grad(parameters[keys[name]])
+        parameters.update()
+        # derivatives are taken with the random numbers of seed_grad
+        image = mi.render(loaded, parameters, spp=spp, seed=seeds[0], seed_grad=seeds[1])
+        return dr.sum(image * weights, axis=None)
+
+    def number(value: Any) -> float:
+        return float(np.array(value).ravel()[0])
+
+    dr.backward(weighted(at, (1, 2), ad=True))
+    backward = {name: number(dr.grad(parameters[key])) for name, key in keys.items()}
+    total = weighted(at, (1, 2), ad=True)
+    for key in keys.values():
+        dr.set_grad(parameters[key], 1.0)
+    dr.enqueue(dr.ADMode.Forward, *(parameters[key] for key in keys.values()))
+    dr.traverse(dr.ADMode.Forward)
+    # one pass with all parameters: the sum of their derivatives, to rounding
+    largest = max(map(abs, backward.values()))
+    assert number(dr.grad(total)) == pytest.approx(sum(backward.values()), abs=2e-3 * largest)
+
+    for name, value in at.items():
+        step = DEGREES if name.endswith("orientation") else STEP * value
+        ends = [number(weighted(at | {name: value + sign * step})) for sign in (1.0, -1.0)]
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        # single precision of the sums
+        noise = 1e-6 * abs(ends[0]) / step
+        assert backward[name] == pytest.approx(difference, rel=0.05, abs=noise), name
+
+
+def plate(name: str, width: float, **more: Any) -> dict[str, Any]:
+    """A surface of the table above, without scales of energy, which bend at their nodes."""
+    own = {"energy_conserving": False, "coherence_width": width, "tolerance": 1e-3}
+    return md.bsdf_dict(GRATING, **(own | SURFACES[name][0] | more))
