@@ -45,11 +45,11 @@ FILM_STEP = 0.01
 THICKNESS_STEP = 5.0
 #: Step of a height scale over which the slope of g is taken. g bends by less than 1e-3 of its slope
 #: over it, and single precision leaves four digits of the difference.
-NEAR = 2.0**-9
+SLOPE_STEP = 2.0**-9
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
-MUCH = 0.05
+WARNED_EXCESS = 0.05
 
 
 class EnergyModel:
@@ -97,7 +97,7 @@ class EnergyModel:
             # g costs little at any height scale: its slope is taken there, and not from nodes of s,
             # on both sides of which it differs by some per cent
             height_scale = scales.height_scale
-            near = [height_scale, height_scale + (NEAR if scales.differentiable else 0.0)]
+            near = [height_scale, height_scale + (SLOPE_STEP if scales.differentiable else 0.0)]
             around = nodes if scales.varies else near
             self._mean.update([self._mean_gain(node) for node in around], around, scales)
         if not (self.conserving or beneath):
@@ -117,7 +117,7 @@ class EnergyModel:
         albedo = conserved[0].albedo
         assert albedo is not None  # of a reflector
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
-        if largest > 1.0 + MUCH:
+        if largest > 1.0 + WARNED_EXCESS:
             self._warned = True
             warn(
                 f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "

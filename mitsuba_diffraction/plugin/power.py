@@ -13,8 +13,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
+from .device_table import device_table
 from .directions import Pair, TablePoint
-from .lookup import device_table
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .transmission.crossing import Crossing

@@ -76,7 +76,7 @@ class Session:
         return self
 
     def __exit__(self, *_: object) -> None:
-        from ...plugin.bsdf import Diffraction
+        from ...plugin.diffraction import Diffraction
 
         mi.register_bsdf("diffraction", Diffraction)
         _one_at_a_time.release()
@@ -152,7 +152,7 @@ def described_table(bsdf: BSDF) -> DiffractionTable:
 
 def _kind(session: Session) -> type[BSDF]:
     """The plugin of the current variant; a subclass that records, where the session does."""
-    from ...plugin.bsdf import Diffraction
+    from ...plugin.diffraction import Diffraction
 
     if not session.recording:
         return Diffraction

@@ -95,8 +95,8 @@ from .crossing import (
     Sides,
     Turned,
 )
+from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
-from .parameters import read_parameters
 
 _LEAST_SHARE = 0.1
 

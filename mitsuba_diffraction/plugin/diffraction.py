@@ -225,11 +225,11 @@ from ..tables.directional import DirectionalTable
 from . import nesting
 from .boundary import KIRCHHOFF, Boundary
 from .description import Energy, Nested, SecondOrder, Surface
+from .diffraction_parameters import read_parameters
 from .directions import Pair
 from .energy import EnergyModel
 from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
-from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 from .support import ABSORBING, refusal
