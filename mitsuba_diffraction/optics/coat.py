@@ -61,7 +61,7 @@ def bounced(face: Powers, structure: Powers) -> Number:
         xp.sqrt(xp.maximum(r * rho, 0.0)) for r, rho in zip(face, structure, strict=True)
     )
     largest, least = xp.maximum(*structure), xp.minimum(*face)
-    return xp.reciprocal(xp.maximum(1.0 - first * second, largest * (1.0 - least)))
+    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * (1.0 - least)))
 
 
 def transmitted(
