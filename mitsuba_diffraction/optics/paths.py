@@ -30,21 +30,23 @@ class Side:
     Attributes
     ----------
     index : n, of the medium in which directions are measured, over that above the surface.
-    at_structure : m, of the medium at the structure. It is another one below a thin sheet, whose
-        directions are those beyond its flat other side.
+    at_structure : m, of the medium at the structure. It is another one under a coat and below a
+        thin sheet: directions there are those beyond the flat face.
+    below : whether the side is below the surface.
     """
 
     index: float = 1.0
     at_structure: float = 1.0
+    below: bool = False
 
     @property
     def number(self) -> int:
         """0 above the surface, 1 below."""
-        return 0 if self.at_structure == 1.0 else 1
+        return int(self.below)
 
     @property
-    def beyond_sheet(self) -> bool:
-        """Whether directions are those beyond the flat side of a sheet."""
+    def beyond_face(self) -> bool:
+        """Whether directions are those beyond the flat face of a sheet or a coat."""
         return self.index != self.at_structure
 
     def normal(self, cosine: Real) -> Real:
@@ -83,8 +85,8 @@ class Path:
 
     @property
     def thin(self) -> bool:
-        """Whether light passes the flat side of a sheet."""
-        return self.came.beyond_sheet or self.left.beyond_sheet
+        """Whether light passes the flat face of a sheet or a coat."""
+        return self.came.beyond_face or self.left.beyond_face
 
     @property
     def sign(self) -> int:
@@ -146,10 +148,12 @@ class Path:
         model = boundary.model_of(self.model)
         if self.thin:  # the flat side lies over the structure as the face of a coat does
             n = self.came.at_structure
+            assert self.index is not None
+            assert not isinstance(self.index, Filmed)  # no coat lies on it
             pair = boundary.geometry(refracted(wi, n), refracted(wo, n))
-            jones = model.jones(pair, self._real, heights)
+            jones = model.jones(pair, self.index, heights)
             faces = (transmittances(direction[2], n) for direction in (wi, wo))
-            return pair, transmitted(jones, pair, self._real, *faces)
+            return pair, transmitted(jones, pair, self.index, *faces)
         pair = boundary.geometry(wi, wo)
         return pair, model.jones(pair, self.index, heights)
 
@@ -165,12 +169,12 @@ class Path:
         came, left = (through.flat_transmittances(cosine, n, self.thin) for cosine in outer)
         return 0.5 * (np.sqrt(came[0] * left[0]) + np.sqrt(came[1] * left[1]))
 
-    def face_reflectance(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return G of the flat side of a sheet for light that it reflects from below."""
+    def face_reflectance(self, cos_i: Real, cos_o: Real, cos_turn: Real | float = -1.0) -> Real:
+        """Return G of the flat face of a sheet or a coat for light that it reflects outside."""
         face = Path(None, "kirchhoff")
-        total = np.hypot(face.tangential(cos_i, cos_o, -1.0), face.width(cos_i, cos_o))
+        total = np.hypot(face.tangential(cos_i, cos_o, cos_turn), face.width(cos_i, cos_o))
         shares = reflectance(0.5 * total, self.came.at_structure)  # at ωi + ωo
-        return np.asarray(face.common(cos_i, cos_o, -1.0) * shares)
+        return np.asarray(face.common(cos_i, cos_o, cos_turn) * shares)
 
     @property
     def _real(self) -> float:

@@ -12,7 +12,7 @@ from mitsuba_diffraction.reference import coat, fresnel
 RNG = np.random.default_rng(1)
 COS_I, COS_O = RNG.uniform(0.1, 1.0, (2, 50))
 TURN = RNG.uniform(-np.pi, np.pi, 50)
-INSIDE, BEYOND_SHEET = Side(1.5, 1.5), Side(1.0, 1.5)
+INSIDE, BEYOND_SHEET = Side(1.5, 1.5, below=True), Side(1.0, 1.5, below=True)
 
 
 @pytest.mark.parametrize("side", [ABOVE, INSIDE, BEYOND_SHEET])

@@ -20,6 +20,8 @@ from ..directional import Real
 
 #: Polar angles of both directions, and azimuths between them, of tables of G.
 POLAR, AZIMUTHS = 37, 25
+#: A film's fringe that advances by more, rad, from the normal to the horizon takes finer tables.
+THICK = 6.0
 #: Least cosine: the horizon itself would divide by zero in the facets' frame.
 LEAST_COSINE = 1e-3
 #: The plugin looks up tangential parts of ωi + ωo up to this, in units of k.
@@ -49,8 +51,9 @@ class Gain:
         common = self.path.common(cos_i, cos_o, cos_turn)
         if self.path.index is None:
             return common
+        last = len(self._table)
         rows = (
-            (1.0 - np.sqrt(1.0 - np.arccos(np.minimum(c, 1.0)) * (2.0 / np.pi))) * (POLAR - 1)
+            (1.0 - np.sqrt(1.0 - np.arccos(np.minimum(c, 1.0)) * (2.0 / np.pi))) * (last - 1)
             for c in (cos_i, cos_o)
         )
         at = np.broadcast_arrays(*rows, np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi))
@@ -58,7 +61,7 @@ class Gain:
         reached = self.path.tangential(cos_i, cos_o, cos_turn) < FARTHEST
         return np.asarray(common * ratio * reached)
 
-    def exact(self, cos_i: Real, cos_o: Real, cos_turn: float) -> Real:
+    def exact(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """Return G at cosines that broadcast, without a table."""
         common = self.path.common(cos_i, cos_o, cos_turn)
         if self.path.index is None:
@@ -66,20 +69,23 @@ class Gain:
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 
-    def order_0(self, cos_i: Real, cos_o: Real, power: Real) -> Real:
+    def order_0(self, cos_i: Real, cos_o: Real, power: Real, cos_turn: Real) -> Real:
         """Return the share of order 0 that goes to directions across its lobe.
 
-        power : of order 0 at these directions.
+        power : of order 0 at these directions; cos_turn : of the azimuth between them.
         """
         if self.path.let_through:
             return self.path.flat_transmittance(cos_i, cos_o) * power
-        share = self.exact(cos_i, cos_o, -1.0) * power
-        return share + self.path.face_reflectance(cos_i, cos_o) if self.path.thin else share
+        share = self.exact(cos_i, cos_o, cos_turn) * power
+        if not self.path.thin:
+            return share
+        return share + self.path.face_reflectance(cos_i, cos_o, cos_turn)
 
     @cached_property
     def _table(self) -> Real:
-        """G over `Path.common` at `_nodes`, (POLAR, POLAR, AZIMUTHS)."""
-        return self._ratio(*_nodes())
+        """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS); finer of a thick film."""
+        polar = POLAR if advance(self.path.index) < THICK else 2 * POLAR - 1
+        return self._ratio(*_nodes(polar))
 
     def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
         """G over `Path.common` at these cosines."""
@@ -101,8 +107,16 @@ class Gain:
         return np.asarray(ratio)
 
 
-def _nodes() -> tuple[Real, Real, Real]:
+def advance(index: complex | Filmed | None) -> float:
+    """Phase (rad) by which a film's fringe advances from the normal to the horizon."""
+    if not isinstance(index, Filmed):
+        return 0.0
+    _, film, depth = (np.max(np.real(part)) for part in index.parts)
+    return float(2.0 * depth * (film - np.sqrt(max(film**2 - 1.0, 0.0))))
+
+
+def _nodes(polar: int) -> tuple[Real, Real, Real]:
     """Return cosines of θi, θo and the azimuth between, at which G is tabulated."""
-    angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, POLAR) ** 2)  # denser towards grazing
+    angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, polar) ** 2)  # denser towards grazing
     cosine = np.maximum(np.cos(angle), LEAST_COSINE)
     return cosine[:, None, None], cosine[:, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
