@@ -109,14 +109,14 @@ coat_ior : float or string [none]
     a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
     own face is a mirror of the same coherence width. Light that the face sends back is summed as
     between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md), so that a coated surface never gains energy and is not scaled. The index
-    over that of the medium above is the differentiable parameter `coat_eta`.
+    (docs/validation.md). Energy is conserved as without a coat. The index over that of the medium
+    above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
     above it. The index over that of the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
-    costs a second or two at loading, is cached, and follows the film in steps of 5 nm and 0.01.
+    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01.
 film_thickness : float ∂ [none]
     Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
     coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.
@@ -220,12 +220,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
 from . import nesting
-from .boundary import Kirchhoff
+from .boundary import KIRCHHOFF, Boundary
 from .description import Energy, Nested, SecondOrder, Surface
 from .diffraction_parameters import read_parameters
-from .directions import Pair, vcavity
+from .directions import Pair
 from .energy import EnergyModel
 from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
@@ -259,14 +260,14 @@ class Diffraction(DiffractingSurface):
         super().__init__(props, read.surface, read.reflectance)
         # self.fresnel is the flat surface with its layers, self.boundary the structure alone
         self.boundary, self.coat = read.boundary, read.coat
-        self.mirror = None if self.coat is None else Kirchhoff(self.coat)
+        self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
         self._second_order = read.second_order
         self._energy = None
         if read.scales_energy:
             mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving)
+            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
         if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
         components = nesting.components_of(self.nested)
@@ -356,20 +357,21 @@ class Diffraction(DiffractingSurface):
             others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, k)
             power = power + others * mi.UnpolarizedSpectrum(added)
-        power = factor * power
-        if self._energy is not None and self._energy.active_factors:
-            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
-            power *= self._energy.factor(pair, k, scale)
+        if not mi.is_rgb:
+            power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, si, pair, self.boundary, power, scale, active)
+        value = self.lobe(ctx, si, pair, self.boundary, factor * power, scale, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
+        if self._energy is not None and self._energy.active_factors:
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
+            value *= mi.Spectrum(self._energy.factor(pair, k, scale))
         return value
 
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """See `Nesting.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._energy is not None and isinstance(self.layering, Transmission):
+        if self._energy is not None and self._light_beneath:
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
@@ -436,7 +438,8 @@ class Diffraction(DiffractingSurface):
     @property
     def _light_beneath(self) -> bool:
         """Whether light that is not reflected goes on to a nested BSDF, by the albedo."""
-        return self.nested is not None and isinstance(self.layering, Transmission)
+        beneath = self.nested is not None and isinstance(self.layering, Transmission)
+        return beneath and self.coat is None
 
     # ------------------------------------------------------------------ for people and shaders
 
@@ -471,7 +474,7 @@ class Diffraction(DiffractingSurface):
 
     def _energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
         """See `description.Energy.scale`."""
-        if self._energy is None or not self._energy.conserving:
+        if self._energy is None or not self._energy.conserving or self.coat is not None:
             return None
         return self._energy.brightness(height_scale)
 

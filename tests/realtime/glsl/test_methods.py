@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
 from mitsuba_diffraction.realtime.glsl.packing import (
@@ -46,6 +45,7 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     paired,
     shortened,
 )
+from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
