@@ -22,8 +22,10 @@ although the face returns all of it and some leaves in the end (docs/validation/
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .arithmetic import Number, formula, of, squared
-from .boundary import Direction, Geometry, Jones
+from .boundary import Direction, Geometry, Heights, Jones, geometry, power
 from .fresnel import Index, amplitudes
 
 #: Powers of both polarisations, s and p.
@@ -84,3 +86,62 @@ def transmitted(
     return tuple(
         entry * of(factor).sqrt(factor) for entry, factor in zip(jones, factors, strict=True)
     )
+
+
+def cosine_within(cosine: Number, n: Number) -> Number:
+    """Return the cosine in a coat of relative index n, for the cosine outside."""
+    return of(cosine, n).sqrt(of(cosine, n).maximum(cosine * cosine + (n * n - 1.0), 1e-12)) / n
+
+
+def coated_reflectance(face: Number, beneath: Number) -> Number:
+    """Return 1 − T T/(1 − R R), the reflectance of a flat coated interface.
+
+    face, beneath : reflectances of the coat's face and of the interface beneath it.
+    """
+    # Mirrors that reflect everything let nothing through
+    less = of(face, beneath).maximum(1.0 - face * beneath, 1e-6)
+    return 1.0 - (1.0 - face) * (1.0 - beneath) * of(less).reciprocal(less)
+
+
+def pair_power(
+    jones: Callable[[Geometry, Index, Heights], Jones] | None,
+    wi: Direction,
+    wo: Direction,
+    index: Index,
+    kappa: Number,
+    variance: Number,
+    came: Powers | None = None,
+    left: Powers | None = None,
+) -> Number:
+    """Return N' of a boundary model for a pair of directions, eq. 5 and 6.
+
+    Parameters
+    ----------
+    jones : of a `boundary.Model`; None of a perfect reflector.
+    wi, wo, index : of the structure, in the coat if it has one.
+    kappa, variance : see `boundary.Heights`.
+    came, left : transmittances of the coat, see `transmitted`; None without a coat.
+    """
+    pair = geometry(wi, wo)
+    if jones is None:
+        return pair.one_plus_dot * pair.one_plus_dot
+    matrix = jones(pair, index, Heights(kappa, variance))
+    if came is not None and left is not None:
+        matrix = transmitted(matrix, pair, index, came, left)
+    return power(matrix)
+
+
+def relative_power(
+    jones: Callable[[Geometry, Index, Heights], Jones],
+    wi: Direction,
+    wo: Direction,
+    index: Index,
+    kappa: Number,
+    variance: Number,
+    came: Powers | None = None,
+    left: Powers | None = None,
+) -> Number:
+    """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
+    # not 0 of opposite grazing directions
+    edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
+    return pair_power(jones, wi, wo, index, kappa, variance, came, left) / (edge * edge)
