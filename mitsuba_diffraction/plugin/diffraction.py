@@ -214,31 +214,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
-from . import nesting
 from .boundary import KIRCHHOFF, Boundary
 from .description import Energy, Nested, SecondOrder, Surface
 from .diffraction_parameters import read_parameters
-from .directions import Pair
+from .directions import Pair, Site
 from .energy import EnergyModel
 from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
-from .parameter_changes import ObjectValues, check_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 from .support import ABSORBING, refusal
 from .surface import DiffractingSurface
 from .types import (
-    BSDF,
-    Callback,
     Colour,
     Context,
     Float,
-    Interaction,
     Mask,
     Properties,
     Spectrum,
@@ -253,97 +249,60 @@ class Diffraction(DiffractingSurface):
     f cosθo = N' ⟨|P|²⟩ / (λ² A w² cosθi),   N' = (2 cosθi cosθo)² N,   is eq. 4 times cosθo.
     """
 
+    title = "Diffraction"
+
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
-        super().__init__(props, read.surface, read.reflectance)
+        super().__init__(props, read.surface, read.reflectance, read.nested)
         # self.fresnel is the flat surface with its layers, self.boundary the structure alone
         self.boundary, self.coat = read.boundary, read.coat
         self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
-        self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
         self._second_order = read.second_order
         self._energy = None
         if read.scales_energy:
             mean, conserving = read.surface.mean_table, read.surface.energy_conserving
             self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
-        if self.nested is not None:
-            self.parameters.append(ObjectValues("nested", self.nested))
-        components = nesting.components_of(self.nested)
-        self.m_components = components  # at once: reading it makes a copy
-        self.m_flags = nesting.flags_of(components)
-        check_parameters([self])
-        self.derive()
+        self.ready()
 
-    # ------------------------------------------------------------------ Mitsuba's interface
+    # ------------------------------------------------------------------ the diffraction
 
-    eval, pdf, eval_pdf = nesting.evaluate, nesting.density, nesting.evaluate_both
-    sample = nesting.sample
-    eval_diffuse_reflectance = nesting.evaluate_diffuse_reflectance
-
-    def diffracted_value(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
-    ) -> Spectrum:
-        """See `Nesting.diffracted_value`."""
-        # Eq. 1: (u, v, w) = ωi + ωo
-        pair = self._pair(si, wo, active)
-        # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
-        scale = self.scale_at(si, active)
-        power = self.power.power(pair, scale, si)
-        # Eq. 4 to 10: times N' of the material and the rest
-        return self.layering.diffraction_share * self.diffracted(
-            ctx, si, pair, power, scale, active
-        )
-
-    def diffracted_density(self, si: Interaction, wo: Vector3f, active: Mask) -> Float:
-        """See `Nesting.diffracted_density`."""
-        pair = self._pair(si, wo, active).outer
-        scale = self._drawing_scale(self.scale_at(si, active))
-        return with_even_share(self.power.density(pair, scale, si))
-
-    def diffracted_both(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+    def diffracted(
+        self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `Nesting.diffracted_both`."""
-        pair = self._pair(si, wo, active)
-        scale = self.scale_at(si, active)
-        power, orders = self.power.both(pair, scale, self._drawing_scale(scale), si)
-        value = self.diffracted(ctx, si, pair, power, scale, active)
-        return self.layering.diffraction_share * value, with_even_share(orders)
+        """See `NestingBSDF.diffracted`."""
+        # Eq. 1: (u, v, w) = ωi + ωo
+        pair = self._pair(site, wo, active)
+        drawing = self._drawing_scale(site)
+        if kinds == "d":
+            return mi.Spectrum(0.0), with_even_share(
+                self.power.density(pair.outer, drawing, site.si)
+            )
+        # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
+        if kinds == "v":
+            power, density = self.power.power(pair, site.scale, site.si), mi.Float(0.0)
+        else:
+            power, density = self.power.both(pair, site.scale, drawing, site.si)
+        # Eq. 4 to 10: times N' of the material and the rest
+        value = self._light(ctx, site, pair, power, active)
+        return self.layering.diffraction_share * value, with_even_share(density)
 
-    def normal_reflectance(self, si: Interaction, active: Mask) -> Spectrum:
-        """See `Nesting.normal_reflectance`."""
-        reflectance = mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), si, active))
+    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
+        """See `NestingBSDF.normal_reflectance`."""
+        reflectance = super().normal_reflectance(site, active)
         if self.nested is not None:
             reflectance *= self.layering.diffraction_share
         return reflectance
 
-    def reflected_share(self, si: Interaction, active: Mask) -> Colour:
-        """See `Nesting.reflected_share`."""
-        return self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
+    def reflected_share(self, site: Site, active: Mask) -> Colour:
+        """See `NestingBSDF.reflected_share`."""
+        return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the parameters that may change without another table."""
-        super().traverse(callback)
-        if self.nested is not None:
-            callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
-
-    # ------------------------------------------------------------------ the model
-
-    def diffracted(
-        self,
-        ctx: Context,
-        si: Interaction,
-        pair: Pair,
-        power: Colour,
-        scale: Float,
-        active: Mask,
-    ) -> Spectrum:
+    def _light(self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask) -> Spectrum:
         """Return f cosθo of the structure, and of the coat's face where there is one.
 
         power : ⟨|P|²⟩ / (4π²σ⁴ λ²) of the pair in 1/µm², eq. 2 and 3, from the power model.
-        scale : `scale_at` the points.
         """
-        k = self.power.wavenumbers(si)
         # Eq. 4 without power and N
         factor = self.geometry(pair)
         if self.vcavity:
@@ -351,52 +310,51 @@ class Diffraction(DiffractingSurface):
         if self._second_order is not None:
             # Eq. 10: Σ F_j |a_j|². Only power beyond a mirror's lobe is taken for orders other than
             # 0: order 0 cannot exceed that lobe. Weaker orders beneath it stay uncorrected
-            mirror = dr.abs(self.power.flat(pair, si))
+            mirror = dr.abs(self.power.flat(pair, site.si))
             others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
-            added = self._second_order.added(pair, scale, k)
+            added = self._second_order.added(pair, site.scale, site.wavenumbers)
             power = power + others * mi.UnpolarizedSpectrum(added)
         if not mi.is_rgb:
             power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, si, pair, self.boundary, factor * power, scale, active)
+        value = self.lobe(ctx, site, pair, self.boundary, factor * power, active)
         if self.mirror is not None:
-            value += self.face(ctx, si, pair.outer, self.mirror, active)
+            value += self.face(ctx, site, pair.outer, self.mirror, active)
         if self._energy is not None and self._energy.active_factors:
             # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
-            value *= mi.Spectrum(self._energy.factor(pair, k, scale))
+            value *= mi.Spectrum(self._energy.factor(pair, site.wavenumbers, site.scale))
         return value
 
-    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
-        """See `Nesting.beneath`."""
+    def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
+        """See `NestingBSDF.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
         if self._energy is not None and self._light_beneath:
-            frame = self.frame_at(si, active)
-            k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
-                self._energy.reflected(direction, frame, k, scale) for direction in (si.wi, wo)
+                self._energy.reflected(direction, site.frame, site.wavenumbers, site.scale)
+                for direction in (site.si.wi, wo)
             )
-        return self.layering.beneath(si, wo, active, ratios)
+        return self.layering.beneath(site.si, wo, active, ratios)
 
-    def _drawing_scale(self, scale: Float) -> Float:
+    def _drawing_scale(self, site: Site) -> Float:
         """Height scale to draw directions for: under a coat κ is as if heights were larger."""
-        return scale if self.coat is None else scale * self.coat.eta
+        return site.scale if self.coat is None else site.scale * self.coat.eta
 
-    def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
+    def _pair(self, site: Site, wo: Vector3f, active: Mask) -> Pair:
         """Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one."""
-        pair = Pair(si, wo, self.frame_at(si, active), active)
+        pair = Pair(site.si, wo, site.frame, active)
         return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
-    def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
-        """See `Nesting.draw`."""
+    def draw(self, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
+        """See `NestingBSDF.draw`."""
         uv = self.power.draw(
-            mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self._drawing_scale(self.scale_at(si, active))),
+            mi.Frame3f.cos_theta(site.si.wi),
+            dr.detach(self._drawing_scale(site)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
-            si,
+            site.si,
         )
-        total = self.frame_at(si, active).from_table(uv)
-        ordered = direction_of(total - mi.Vector2f(si.wi.x, si.wi.y))
+        total = site.frame.from_table(uv)
+        ordered = direction_of(total - mi.Vector2f(site.si.wi.x, site.si.wi.y))
         return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
     # ------------------------------------------------------------------ changes of parameters
@@ -482,12 +440,12 @@ class Diffraction(DiffractingSurface):
             return None
         return self._energy.ratio(height_scale)
 
-    def to_string(self) -> str:
-        """Describe all parameters, for people."""
-        extra = {"shadowing": "vcavity" if self.vcavity else "none", "layering": self.layering}
+    def shown(self) -> dict[str, Any]:
+        """See `PluginBSDF.shown`."""
+        more = {"shadowing": "vcavity" if self.vcavity else "none", "layering": self.layering}
         if self.nested is not None:
-            extra["nested"] = self.nested
-        return self.described("Diffraction", self.model, self.energy_conserving, extra)
+            more["nested"] = self.nested
+        return {**super().shown(), **more}
 
 
 mi.register_bsdf("diffraction", Diffraction)

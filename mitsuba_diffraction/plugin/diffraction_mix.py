@@ -24,7 +24,6 @@ weight_NAME : float or texture ∂ [what the others leave of 1]
 from __future__ import annotations
 
 import functools
-import operator
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -36,14 +35,8 @@ import numpy as np
 from ..errors import DiffractionError
 from .description import Mix
 from .memory import index_between
-from .parameter_changes import (
-    Bounded,
-    Changing,
-    ObjectValues,
-    arrays_within,
-    check_parameters,
-    take_changes,
-)
+from .lifecycle import ALL_COMPONENTS, PluginBSDF, ask
+from .parameter_changes import Bounded, Changing, ObjectValues
 from .textures import is_attribute, range_of, require_raw, uv_square
 from .types import (
     BSDF,
@@ -63,15 +56,15 @@ from .types import (
 _PREFIX = "weight_"
 #: A sum of such weights is far from the largest number there is.
 _MOST_WEIGHT = 1e6
-#: The component of a context that asks for all of them.
-_ALL = 0xFFFFFFFF
 
 #: Function that asks a surface, in a context for it, for values and densities where a mask is true.
 Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
 
 
-class DiffractionMix(mi.BSDF):
+class DiffractionMix(PluginBSDF):
     """Several BSDFs, blended by weights that vary over the surface."""
+
+    title = "DiffractionMix"
 
     def __init__(self, props: Properties) -> None:
         super().__init__(props)
@@ -79,44 +72,29 @@ class DiffractionMix(mi.BSDF):
         self.bsdfs = {name: bsdf for name, bsdf in objects.items() if isinstance(bsdf, mi.BSDF)}
         self.weights = _weights(props, list(self.bsdfs), objects)
         self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
-        components = [bsdf.flags(n) for bsdf in self._held for n in range(bsdf.component_count())]
-        self.m_components = components  # at once: what it gives back is a copy
-        self.m_flags = functools.reduce(operator.or_, components)
         self.parameters = [
             weight if isinstance(weight, Bounded) else ObjectValues(_PREFIX + name, weight)
             for name, weight in self.weights.items()
             if weight is not None
         ]
-        check_parameters([self])
+        self.ready()
         for surface in self._held:
             if hasattr(surface, "mix"):
                 surface.mix = weakref.ref(self)  # a cycle would keep both
-        self.derive()
+
+    def components(self) -> list[int]:
+        """See `PluginBSDF.components`."""
+        return [bsdf.flags(n) for bsdf in self._held for n in range(bsdf.component_count())]
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
-    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """Return f cosθo per wavelength."""
-        weights = [self.weights_at(si, _wide(active, si, wo.z))]
-        ask: Ask = lambda bsdf, context, on: [bsdf.eval(context, si, wo, on)]  # noqa: E731
-        return self._sum(ctx, weights, ask, "v")[0]
-
-    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Return the density of `sample` per solid angle."""
-        shares = [self._shares(ctx, self.weights_at(si, _wide(active, si, wo.z)))]
-        ask: Ask = lambda bsdf, context, on: [bsdf.pdf(context, si, wo, on)]  # noqa: E731
-        return self._sum(ctx, shares, ask, "d")[0]
-
-    def eval_pdf(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
-    ) -> tuple[Spectrum, Float]:
-        """Return `eval` and `pdf` at once."""
+    def answers(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask, kinds: str
+    ) -> Sequence[Any]:
+        """See `PluginBSDF.answers`."""
         weights = self.weights_at(si, _wide(active, si, wo.z))
-        both = [weights, self._shares(ctx, weights)]
-        value, density = self._sum(
-            ctx, both, lambda bsdf, context, on: bsdf.eval_pdf(context, si, wo, on), "vd"
-        )
-        return value, density
+        asked: Ask = lambda bsdf, context, on: ask(bsdf, context, si, wo, on, kinds)  # noqa: E731
+        return self._sum(ctx, weights, asked, kinds)
 
     def sample(
         self,
@@ -133,7 +111,7 @@ class DiffractionMix(mi.BSDF):
         weights = self.weights_at(si, _wide(active, si, sample1, sample2.x))
         shares = self._shares(ctx, weights)
         result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
-        chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
+        chosen, weight, share = mi.UInt32(ALL_COMPONENTS), mi.Float(0.0), mi.Float(0.0)
         lower = mi.Float(0.0)
         for n, bsdf, context, first in self._asked(ctx):
             here = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
@@ -149,7 +127,7 @@ class DiffractionMix(mi.BSDF):
         smooth = ~mi.has_flag(result.sampled_type, mi.BSDFFlags.Delta) & (result.pdf > 0.0)
         others, density = self._sum(
             ctx,
-            [weights, shares],
+            weights,
             lambda bsdf, context, on: bsdf.eval_pdf(context, si, result.wo, on),
             "vd",
             lambda n: smooth & (chosen != n),
@@ -161,23 +139,15 @@ class DiffractionMix(mi.BSDF):
 
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
         """Return the weighted reflectances of the surfaces, for denoisers."""
-        weights = [self.weights_at(si, _wide(active, si))]
-        ask: Ask = lambda bsdf, context, on: [bsdf.eval_diffuse_reflectance(si, on)]  # noqa: E731
-        return self._sum(mi.BSDFContext(), weights, ask, "v")[0]
+        weights = self.weights_at(si, _wide(active, si))
+        asked: Ask = lambda bsdf, context, on: [bsdf.eval_diffuse_reflectance(si, on)]  # noqa: E731
+        return self._sum(mi.BSDFContext(), weights, asked, "v")[0]
 
     def traverse(self, callback: Callback) -> None:
         """Expose surfaces and weights."""
         for name, bsdf in self.bsdfs.items():
             callback.put(name, bsdf, mi.ParamFlags.Differentiable)
-        for name, weight in self.weights.items():
-            if isinstance(weight, Bounded):
-                weight.traverse(callback)
-            elif weight is not None:
-                callback.put(_PREFIX + name, weight, mi.ParamFlags.Differentiable)
-
-    def parameters_changed(self, keys: list[str]) -> None:
-        """Take all changed weights, or none of them."""
-        take_changes(self, self.together)
+        super().traverse(callback)
 
     @property
     def together(self) -> list[Changing]:
@@ -193,20 +163,17 @@ class DiffractionMix(mi.BSDF):
 
     def derive(self) -> None:
         """Collect what `dr.freeze` must know."""
-        self._for_freezing = arrays_within(list(self.weights.values()))
+        self.freeze(self.weights.values())
 
     def describe(self) -> Mix:
         """Return the description of the surfaces and weights (`description.describe`)."""
         textures = [weight for weight in self.weights.values() if isinstance(weight, mi.Texture)]
         return Mix(self.bsdfs, textures, lambda si: self.weights_at(si, mi.Mask(True)))
 
-    def to_string(self) -> str:
-        """Describe all parameters, for people."""
-        lines = [f"  {name} = {bsdf},\n" for name, bsdf in self.bsdfs.items()]
-        lines += [
-            f"  {_PREFIX}{name} = {_text(weight)},\n" for name, weight in self.weights.items()
-        ]
-        return f"DiffractionMix[\n{''.join(lines)}]"
+    def shown(self) -> dict[str, Any]:
+        """See `PluginBSDF.shown`."""
+        weights = {_PREFIX + name: _text(weight) for name, weight in self.weights.items()}
+        return {**self.bsdfs, **weights}
 
     # ------------------------------------------------------------------ the weights
 
@@ -222,7 +189,7 @@ class DiffractionMix(mi.BSDF):
 
     def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
         """Return shares of the samples: the weights; for a component of one surface, all."""
-        if ctx.component == _ALL:
+        if ctx.component == ALL_COMPONENTS:
             return weights
         return [dr.select(weight > 0.0, mi.Float(1.0), 0.0) for weight in weights]
 
@@ -230,7 +197,7 @@ class DiffractionMix(mi.BSDF):
         """Yield number, surface, context for that surface, and its first component."""
         first = 0
         for n, bsdf in enumerate(self._held):
-            if ctx.component == _ALL:
+            if ctx.component == ALL_COMPONENTS:
                 yield n, bsdf, ctx, first
             elif first <= ctx.component < first + bsdf.component_count():
                 context = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
@@ -240,20 +207,21 @@ class DiffractionMix(mi.BSDF):
     def _sum(
         self,
         ctx: Context,
-        shares: Sequence[list[Float]],
-        ask: Ask,
+        weights: list[Float],
+        asked: Ask,
         kinds: str,
         where: Callable[[int], Mask] = lambda n: True,
     ) -> list[Any]:
-        """Sum the surfaces' answers, "v"alues and "d"ensities, times their shares."""
+        """Sum the surfaces' answers, "v"alues and "d"ensities, times their weights or shares."""
+        factors = [weights if kind == "v" else self._shares(ctx, weights) for kind in kinds]
         nothing = [mi.Spectrum(0.0) if kind == "v" else mi.Float(0.0) for kind in kinds]
         totals = list(nothing)
         for n, bsdf, context, _ in self._asked(ctx):
-            on = mi.Mask((shares[0][n] > 0.0) & where(n))
-            answers = _where(on, functools.partial(ask, bsdf, context), nothing)
+            on = mi.Mask((weights[n] > 0.0) & where(n))
+            answers = _where(on, functools.partial(asked, bsdf, context), nothing)
             totals = [
-                total + dr.select(on, part * share[n], 0.0)
-                for total, part, share in zip(totals, answers, shares, strict=True)
+                total + dr.select(on, part * factor[n], 0.0)
+                for total, part, factor in zip(totals, answers, factors, strict=True)
             ]
         return totals
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -55,6 +56,24 @@ class PatchFrame:
     def area(self) -> Float:
         """Factor from densities over (u, v) of the surface to those over (u, v) of the table."""
         return dr.square(self.stretch)
+
+
+@dataclass(frozen=True)
+class Site:
+    """What one evaluation shares at points of a surface, looked up once.
+
+    Attributes
+    ----------
+    si : the interaction.
+    frame : the patch as it lies there.
+    scale : factor on the heights.
+    wavenumbers : 2π/λ of each channel, rad/µm.
+    """
+
+    si: Interaction
+    frame: PatchFrame
+    scale: Float = 1.0
+    wavenumbers: Sequence[Float] = ()
 
 
 class Pair:

@@ -98,10 +98,6 @@ class VaryingFactor:
             f"between {self._limits.least:g} and {self.high:g}"
         )
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the texture."""
-        callback.put(self._limits.name, self.texture, mi.ParamFlags.Differentiable)
-
     def __str__(self) -> str:
         return " ".join(str(self.texture).split())
 
@@ -164,12 +160,6 @@ class LateralScale:
     def differentiable(self) -> bool:
         """Whether derivatives with respect to the number are wanted."""
         return self._number is not None and dr.grad_enabled(self._number.value)
-
-    def traverse(self, callback: Callback) -> None:
-        """Expose the number or the texture."""
-        for part in (self._number, self.varying):
-            if part is not None:
-                part.traverse(callback)
 
     def __str__(self) -> str:
         if self._number is not None:

@@ -18,8 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..tables.orders import OrderTable
-from ..tables.table import DiffractionTable
 from .types import Callback, Float
 
 _OURS = __name__.rpartition(".")[0]
@@ -38,6 +36,9 @@ class Changeable(Protocol):
 
     def keep(self) -> None:
         """Remember the present value as the one to restore."""
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose the parameter."""
 
 
 class Bounded:
@@ -81,7 +82,7 @@ class Bounded:
         self._kept: Float = mi.Float(dr.detach(self.value))
 
     def traverse(self, callback: Callback) -> None:
-        """Expose the number."""
+        """See `Changeable.traverse`."""
         callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
 
 
@@ -121,6 +122,10 @@ class ObjectValues:
     def keep(self) -> None:
         """See `Changeable.keep`."""
         self._kept = {key: _copy(value) for key, value in mi.traverse(self.thing)}
+
+    def traverse(self, callback: Callback) -> None:
+        """See `Changeable.traverse`."""
+        callback.put(self._name, self.thing, mi.ParamFlags.Differentiable)
 
 
 class Changing(Protocol):
@@ -224,12 +229,12 @@ def arrays_within(*holders: Any) -> list[Any]:
     return list(values.values())
 
 
-def marks(table: DiffractionTable | OrderTable, *constants: object) -> list[Any]:
-    """Return zeros whose types tell apart the kernels of this table and these constants.
+def marks(*constants: object) -> list[Any]:
+    """Return zeros whose types tell apart the kernels of these constants.
 
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.
     """
-    checksum = zlib.crc32(repr((table.digest(), *constants)).encode())
+    checksum = zlib.crc32(repr(constants).encode())
     kinds = (
         mi.Bool, mi.Int32, mi.UInt32, mi.Int64, mi.UInt64, mi.Float16, mi.Float32, mi.Float64,
     )  # fmt: skip

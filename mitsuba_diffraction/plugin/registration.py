@@ -13,9 +13,9 @@ import mitsuba as mi
 
 from . import arithmetic
 
-# Base classes first: the plugins inherit from `surface`
+# Base classes first
 _MODULES = (
-    "surface", "diffraction", "transmission.diffraction_dielectric", "orders.diffraction_orders",
+    "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric", "orders.diffraction_orders",
     "orders.orders_sheet", "diffraction_mix",
 )  # fmt: skip
 

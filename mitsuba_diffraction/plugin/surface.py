@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,19 +13,20 @@ import mitsuba as mi
 from .boundary import Boundary
 from .conductors import tabulated_range
 from .description import Feature, Film, Material, Quantity, Surface
-from .directions import Pair, PatchFrame
+from .directions import Pair, PatchFrame, Site
 from .energy import indices_of
 from .energy_factors import ScaleRange
 from .factors import LEAST_SCALE, VaryingFactor
 from .fresnel import Conductor, Perfect, Reflectance, tinted
 from .layers import CoatedPair, UnderCoat, UnderFilm
-from .parameter_changes import Bounded, Changeable, arrays_within, marks, take_changes
+from .nesting import NestingBSDF
+from .parameter_changes import Bounded, Changeable
 from .power import power_model
 from .surface_parameters import SurfaceParameters
-from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
+from .types import BSDF, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 
 
-class DiffractingSurface(mi.BSDF):
+class DiffractingSurface(NestingBSDF):
     """Table, factors, orientation and power of a surface; the lobe that they make.
 
     Attributes
@@ -39,8 +40,6 @@ class DiffractingSurface(mi.BSDF):
     height_scale : mi.Float; the largest, where it varies.
     power : `power.PowerModel` of the variant.
     wavelength : nm, of mono variants.
-    parameters : everything that `traverse` exposes.
-    mix : the mix that the surface is part of, as a weak reference, or None.
     """
 
     def __init__(
@@ -48,8 +47,9 @@ class DiffractingSurface(mi.BSDF):
         props: Properties,
         surface: SurfaceParameters,
         fresnel: Reflectance | UnderCoat | UnderFilm,
+        nested: BSDF = None,
     ) -> None:
-        super().__init__(props)
+        super().__init__(props, nested)
         self.table, self.heights = surface.table, surface.heights
         self.window_positions, self.wavelength = surface.window_positions, surface.wavelength
         self.fresnel, self.orientation = fresnel, surface.orientation
@@ -57,13 +57,12 @@ class DiffractingSurface(mi.BSDF):
         self.power = power_model(self.table, self.wavelength, self.window_positions)
         # Heights are in a medium of this optical index
         self._set_height_scale(surface.height_scale, surface.optical)
-        self.parameters: list[Changeable] = [
+        self.parameters += [
             *self._scale_changeable,
             *self.orientation.changeable,
             *self.lateral_scale.changeable,
             *fresnel.changeable,
         ]
-        self.mix: weakref.ref[Any] | None = None
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
         self.area_factor = 4.0 * dr.pi * self.table.sigma**2
 
@@ -98,32 +97,34 @@ class DiffractingSurface(mi.BSDF):
     def lobe(
         self,
         ctx: Context,
-        si: Interaction,
+        site: Site,
         pair: Pair,
         boundary: Boundary,
         power: Colour,
-        scale: Float,
         active: Mask,
     ) -> Spectrum:
         """Return f cosθo of a boundary.
 
         power : `geometry` times ⟨|P|²⟩ / (4π²σ⁴ λ²), per channel.
-        scale : `scale_at` the points.
         """
-        k = self.power.wavenumbers(si)
-        factor = boundary.factor(pair, scale, k, si, active, ctx.mode)
+        factor = boundary.factor(pair, site.scale, site.wavenumbers, site.si, active, ctx.mode)
         return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
 
     def face(
-        self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask
+        self, ctx: Context, site: Site, pair: Pair, mirror: Boundary, active: Mask
     ) -> Spectrum:
         """Return f cosθo of a flat face: the lobe of a flat patch."""
-        power = self.geometry(pair) * self.power.flat(pair, si)
-        return self.lobe(ctx, si, pair, mirror, power, mi.Float(0.0), active)
+        power = self.geometry(pair) * self.power.flat(pair, site.si)
+        return self.lobe(ctx, replace(site, scale=mi.Float(0.0)), pair, mirror, power, active)
 
-    def scale_at(self, si: Interaction, active: Mask) -> Float:
-        """Return the factor on the heights at points of the surface."""
-        return self._varying.at(si, active) if self._varying else self.height_scale
+    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
+        """See `NestingBSDF.normal_reflectance`."""
+        return mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), site.si, active))
+
+    def site_at(self, si: Interaction, active: Mask) -> Site:
+        """See `NestingBSDF.site_at`."""
+        scale = self._varying.at(si, active) if self._varying else self.height_scale
+        return Site(si, self.frame_at(si, active), scale, self.power.wavenumbers(si))
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the patch as it lies at points of the surface."""
@@ -133,33 +134,10 @@ class DiffractingSurface(mi.BSDF):
 
     # ------------------------------------------------------------------ changes of parameters
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the parameters that may change without another table."""
-        self._scale.traverse(callback)
-        self.orientation.traverse(callback)
-        self.lateral_scale.traverse(callback)
-        self.fresnel.traverse(callback)
-
-    def parameters_changed(self, keys: list[str]) -> None:
-        """Take all changes, or none of them.
-
-        Raises
-        ------
-        DiffractionError
-            If a parameter is out of bounds, as a height_scale that the table does not serve. All
-            parameters then have their last values.
-        """
-        mix = self.mix and self.mix()
-        take_changes(self, mix.together if mix else [self])
-
     def refusals(self) -> Iterator[str | None]:
         """See `Changing.refusals`."""
         if self._varying is not None:
             yield self._varying.refusal()
-
-    def derive(self) -> None:
-        """See `Changing.derive`."""
-        raise NotImplementedError
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
         """Reason why heights times the index that they are in are beyond the table, or None.
@@ -184,16 +162,14 @@ class DiffractingSurface(mi.BSDF):
         return ScaleRange((lowest, largest), stretch, varies, differentiable)
 
     def freeze(self, holders: Iterable[Any], *constants: object) -> None:
-        """Tell `dr.freeze` all arrays, and constants for which kernels are others.
-
-        holders : objects that hold arrays.
-        """
+        """See `PluginBSDF.freeze`; adds what all surfaces have."""
         factors = self._varying, self.lateral_scale
-        held = arrays_within(self.power, self.orientation, self.fresnel, *factors, *holders)
         textures = str(self._varying), str(self.lateral_scale.varying)
-        self._for_freezing = held + marks(
-            self.table, str(self.window_positions), *textures, *constants
-        )
+        placed = str(self.window_positions)
+        super().freeze(
+            (self.power, self.orientation, self.fresnel, *factors, *holders),
+            self.table.digest(), placed, *textures, *constants,
+        )  # fmt: skip
 
     # ------------------------------------------------------------------ for people and shaders
 
@@ -224,29 +200,33 @@ class DiffractingSurface(mi.BSDF):
             model=str(self.boundary),
         )
 
-    def described(self, plugin: str, model: str, conserving: bool, more: Mapping[str, Any]) -> str:
-        """Return all parameters as `to_string` shows them.
+    @property
+    def model(self) -> str:
+        """Name of the boundary model, for people."""
+        return str(self.boundary)
 
-        model, conserving : of the plugin; more : its other parameters.
-        """
+    @property
+    def energy_conserving(self) -> bool:
+        """Whether the BSDF is scaled so that it never reflects more than it receives."""
+        return self._energy is not None
+
+    def shown(self) -> dict[str, Any]:
+        """See `PluginBSDF.shown`."""
         placed = {}
         if self.window_positions is not None:
             placed["coherence"] = f"surface, {self.window_positions}"  # see textures.PLACED
-        shown = {
+        return {
             "table": self.table,
             "coherence_width": self.table.width_text,
             **placed,
             "tolerance": f"{self.table.tolerance:g}",
             "surface": self.fresnel,
-            "model": model,
+            "model": self.model,
             "height_scale": self._varying or f"{dr.slice(self.height_scale):g}",
-            "energy_conserving": "true" if conserving else "false",
+            "energy_conserving": "true" if self.energy_conserving else "false",
             "orientation": self.orientation,
             "lateral_scale": self.lateral_scale,
-            **more,
         }
-        lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())
-        return f"{plugin}[\n{lines}]"
 
 
 def _described(material: Any) -> Material:

@@ -55,8 +55,6 @@ XML and the same in Python:
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Iterator
 from typing import Any
 
 import drjit as dr
@@ -65,21 +63,11 @@ import mitsuba as mi
 from ...errors import warn
 from ...optics.geometry import sigma_of
 from ...tables.orders import OrderTable
-from .. import nesting
 from ..description import Nested, Surface
-from ..directions import Pair, PatchFrame
-from ..parameter_changes import (
-    Changeable,
-    ObjectValues,
-    arrays_within,
-    check_parameters,
-    marks,
-    take_changes,
-)
+from ..directions import Pair, PatchFrame, Site
+from ..nesting import NestingBSDF
 from ..sampling import direction_of
 from ..types import (
-    BSDF,
-    Callback,
     Colour,
     Context,
     Float,
@@ -95,132 +83,84 @@ from .lobes import DaylightLobes, Lobes, SpectralLobes
 from .polarised_lobes import PolarisedLobes
 
 
-class DiffractionOrders(mi.BSDF):
+class DiffractionOrders(NestingBSDF):
     """Reflection by a grating with solved orders.
 
     Attributes
     ----------
     table : efficiencies of the orders.
     orientation : angle from the first tangent to the patch's x axis.
-    parameters : everything that `traverse` exposes.
-    mix : the mix that the surface is part of, as a weak reference, or None.
     """
 
+    title = "DiffractionOrders"
+
     def __init__(self, props: Properties, read: Parameters) -> None:
-        super().__init__(props)
+        super().__init__(props, read.nested)
         self.table, self.orientation = read.table, read.orientation
         self.coherence_width, self._wavelength = read.coherence_width, read.wavelength
         self._lobes = _lobes_of(read)
-        self.nested: BSDF = read.nested  # or None
-        self.parameters: list[Changeable] = [*self.orientation.changeable]
-        if self.nested is not None:
-            self.parameters.append(ObjectValues("nested", self.nested))
-        self.mix: weakref.ref[Any] | None = None
-        components = nesting.components_of(self.nested)
-        self.m_components = components  # at once: reading it makes a copy
-        self.m_flags = nesting.flags_of(components)
+        self.parameters += self.orientation.changeable
         if mi.is_polarized and not self.table.polarised:
             _warn_of_polarisation()
         _warn_of_wavelengths(self.table)
-        check_parameters([self])
-        self.derive()
+        self.ready()
 
     @property
     def sigma(self) -> float:
         """Standard deviation of the amplitude window, µm."""
         return sigma_of(self.coherence_width)
 
-    # ------------------------------------------------------------------ Mitsuba's interface
+    # ------------------------------------------------------------------ the diffraction
 
-    eval, pdf, eval_pdf = nesting.evaluate, nesting.density, nesting.evaluate_both
-    sample = nesting.sample
-    eval_diffuse_reflectance = nesting.evaluate_diffuse_reflectance
+    def site_at(self, si: Interaction, active: Mask) -> Site:
+        """See `NestingBSDF.site_at`."""
+        return Site(si, PatchFrame(self.orientation.rotation(si, active)))
 
-    def diffracted_value(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
-    ) -> Spectrum:
-        """See `Nesting.diffracted_value`."""
-        return self.diffracted_both(ctx, si, wo, active)[0]
-
-    def diffracted_density(self, si: Interaction, wo: Vector3f, active: Mask) -> Float:
-        """See `Nesting.diffracted_density`."""
-        return self.diffracted_both(mi.BSDFContext(), si, wo, active)[1]
-
-    def diffracted_both(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+    def diffracted(
+        self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `Nesting.diffracted_both`."""
-        pair = Pair(si, wo, self._frame(si, active), active)
-        light = self._lobes.reflected(pair, si, None, ctx)
+        """See `NestingBSDF.diffracted`."""
+        light = self._lobes.reflected(Pair(site.si, wo, site.frame, active), site.si, None, ctx)
         return light.value, light.density
 
-    def draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
-        """Draw an order by its efficiency, and a direction in its lobe; see `Nesting.draw`."""
-        return self._drawn(si, sample1, sample2, active)[0]
+    def draw(self, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
+        """Draw an order by its efficiency, and a direction in its lobe; see `NestingBSDF.draw`."""
+        return self._drawn(site, sample1, sample2)[0]
 
-    def _drawn(
-        self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask
-    ) -> tuple[Vector3f, Mask]:
+    def _drawn(self, site: Site, sample1: Float, sample2: Vector2f) -> tuple[Vector3f, Mask]:
         """Return a direction mirrored to above, z below 0 if invalid, and whether it is below."""
-        frame = self._frame(si, active)
-        incident = dr.detach(frame.turned(si.wi))
-        cos_i = mi.Frame3f.cos_theta(si.wi)
-        drawn = self._lobes.draw(incident, cos_i, si, sample1, sample2)
-        direction = direction_of(frame.from_table(drawn.uv) - mi.Vector2f(si.wi.x, si.wi.y))
+        wi = site.si.wi
+        incident, cos_i = dr.detach(site.frame.turned(wi)), mi.Frame3f.cos_theta(wi)
+        drawn = self._lobes.draw(incident, cos_i, site.si, sample1, sample2)
+        direction = direction_of(site.frame.from_table(drawn.uv) - mi.Vector2f(wi.x, wi.y))
         direction.z = dr.select(drawn.valid, direction.z, -1.0)
         return dr.detach(direction), drawn.below
 
-    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
-        """See `Nesting.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
+    def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
+        """See `NestingBSDF.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
         inwards, outwards = (
-            dr.maximum(1.0 - self._albedo(direction, si, active), 0.0) for direction in (si.wi, wo)
+            dr.maximum(1.0 - self._albedo(direction, site), 0.0) for direction in (site.si.wi, wo)
         )
         return inwards * outwards
 
-    def reflected_share(self, si: Interaction, active: Mask) -> Colour:
-        """See `Nesting.reflected_share`."""
-        return self._albedo(si.wi, si, active)
+    def reflected_share(self, site: Site, active: Mask) -> Colour:
+        """See `NestingBSDF.reflected_share`."""
+        return self._albedo(site.si.wi, site)
 
-    def normal_reflectance(self, si: Interaction, active: Mask) -> Spectrum:
-        """See `Nesting.normal_reflectance`."""
-        return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), si, active))
+    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
+        """See `NestingBSDF.normal_reflectance`."""
+        return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), site))
 
-    def _albedo(self, direction: Vector3f, si: Interaction, active: Mask) -> Colour:
+    def _albedo(self, direction: Vector3f, site: Site) -> Colour:
         """Return Σ η_m of light from a direction in the shading frame."""
-        tangential = self._frame(si, active).turned(direction)
-        return self._lobes.albedo(tangential, mi.Frame3f.cos_theta(direction), si)
+        tangential = site.frame.turned(direction)
+        return self._lobes.albedo(tangential, mi.Frame3f.cos_theta(direction), site.si)
 
-    def _frame(self, si: Interaction, active: Mask) -> PatchFrame:
-        """Return the axes of the profile at points of the surface."""
-        return PatchFrame(self.orientation.rotation(si, active))
-
-    # ------------------------------------------------------------------ changes of parameters
-
-    def traverse(self, callback: Callback) -> None:
-        """Expose the orientation and the nested BSDF."""
-        self.orientation.traverse(callback)
-        if self.nested is not None:
-            callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
-
-    def parameters_changed(self, keys: list[str]) -> None:
-        """Take all changes, or none of them.
-
-        Raises
-        ------
-        DiffractionError
-            If a parameter is out of bounds. All parameters then have their last values.
-        """
-        mix = self.mix and self.mix()
-        take_changes(self, mix.together if mix else [self])
-
-    def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
-        yield None
+    # ------------------------------------------------------------------ the surface
 
     def derive(self) -> None:
         """Collect what `dr.freeze` must know."""
-        held = arrays_within(self._lobes, self.orientation)
-        self._for_freezing = held + marks(self.table, self.coherence_width)
+        self.freeze((self._lobes, self.orientation), self.table.digest(), self.coherence_width)
 
     def describe(self) -> Surface:
         """Return the description of the surface (`description.describe`)."""
@@ -234,8 +174,8 @@ class DiffractionOrders(mi.BSDF):
             transmits=self.table.thin,
         )
 
-    def to_string(self) -> str:
-        """Describe all parameters, for people."""
+    def shown(self) -> dict[str, Any]:
+        """See `PluginBSDF.shown`."""
         shown: dict[str, Any] = {
             "table": self.table,
             "coherence_width": f"{self.coherence_width:g} µm",
@@ -243,8 +183,7 @@ class DiffractionOrders(mi.BSDF):
         }
         if self.nested is not None:
             shown["nested"] = self.nested
-        lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())
-        return f"DiffractionOrders[\n{lines}]"
+        return shown
 
 
 def _lobes_of(read: Parameters) -> Lobes:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..directions import Pair
+from ..directions import Pair, Site
+from ..lifecycle import both_sides, sample_of
 from ..types import (
     Context,
     Float,
@@ -23,40 +24,26 @@ from ..types import (
     Vector3f,
 )
 from .diffraction_orders import DiffractionOrders
-from .grating_parameters import Parameters, read_parameters
+from .grating_parameters import read_parameters
 
 
 class OrdersSheet(DiffractionOrders):
     """Reflection and transmission of a thin sheet with solved orders."""
 
-    def __init__(self, props: Properties, read: Parameters) -> None:
-        super().__init__(props, read)
-        flags = mi.BSDFFlags
-        sides = flags.FrontSide | flags.BackSide | flags.Anisotropic
-        components = [flags.GlossyReflection | sides, flags.GlossyTransmission | sides]
-        self.m_components = components
-        self.m_flags = components[0] | components[1]
+    def components(self) -> list[int]:
+        """See `PluginBSDF.components`."""
+        return both_sides()
 
-    # ------------------------------------------------------------------ Mitsuba's interface
-
-    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """Return f |cosθo| per wavelength."""
-        return self.eval_pdf(ctx, si, wo, active)[0]
-
-    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Return the density of `sample` per solid angle, of the requested components."""
-        return self.eval_pdf(ctx, si, wo, active)[1]
-
-    def eval_pdf(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    def evaluated(
+        self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """Return `eval` and `pdf` at once."""
-        sides = mi.Frame3f.cos_theta(si.wi) * mi.Frame3f.cos_theta(wo)
-        lit = mi.Mask(active) & (sides != 0.0) & _requested(ctx, sides < 0.0)
+        """See `NestingBSDF.evaluated`; of the requested components."""
+        sides = mi.Frame3f.cos_theta(site.si.wi) * mi.Frame3f.cos_theta(wo)
+        lit = active & (sides != 0.0) & _requested(ctx, sides < 0.0)
         below = mi.Mask(wo.z < 0.0)
         above = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
-        pair = Pair(si, above, self._frame(si, lit), lit)
-        light = self._lobes.reflected(pair, si, below, ctx)
+        pair = Pair(site.si, above, site.frame, lit)
+        light = self._lobes.reflected(pair, site.si, below, ctx)
         return dr.select(lit, light.value, 0.0), dr.select(lit, light.density, 0.0)
 
     def sample(
@@ -71,16 +58,14 @@ class OrdersSheet(DiffractionOrders):
 
         A context for one component has no light where the other one is drawn.
         """
-        wo, below = self._drawn(si, sample1, sample2, active)
+        active = mi.Mask(active)
+        site = self.site_at(si, active)
+        wo, below = self._drawn(site, sample1, sample2)
         wo.z = dr.mulsign(dr.maximum(wo.z, 0.0), dr.select(below, mi.Float(-1.0), 1.0))
-        value, density = self.eval_pdf(ctx, si, wo, active)
+        value, density = self.evaluated(ctx, site, wo, active, "vd")
         lit = density > 0.0
         passed = mi.Frame3f.cos_theta(si.wi) * wo.z < 0.0
-        kinds = mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission
-        result = dr.zeros(mi.BSDFSample3f)
-        result.wo, result.eta, result.pdf = wo, 1.0, density
-        result.sampled_type = dr.select(passed, mi.UInt32(+kinds[1]), mi.UInt32(+kinds[0]))
-        result.sampled_component = dr.select(passed, mi.UInt32(1), mi.UInt32(0))
+        result = sample_of(wo, density, passed, 1.0)
         return result, dr.select(lit, value / dr.select(lit, density, 1.0), 0.0)
 
 

@@ -60,7 +60,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -71,10 +71,10 @@ from ...optics.coat import transmittances
 from ...optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
 from ..boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
 from ..description import Surface
-from ..directions import Pair, PatchFrame, TablePoint
+from ..directions import Pair, Site, TablePoint
 from ..fresnel import Inside
 from ..layers import CoatedPair
-from ..parameter_changes import check_parameters
+from ..lifecycle import both_sides, sample_of
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
 from ..surface import DiffractingSurface
@@ -90,11 +90,7 @@ from ..types import (
     Vector2f,
     Vector3f,
 )
-from .crossing import (
-    Crossing,
-    Sides,
-    Turned,
-)
+from .crossing import Crossing, Sides, Turned
 from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
 
@@ -118,6 +114,8 @@ class DiffractionDielectric(DiffractingSurface):
     thin : whether the side below is beyond the flat side of a sheet.
     """
 
+    title = "DiffractionDielectric"
+
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
         super().__init__(props, read.surface, read.material)
@@ -130,56 +128,44 @@ class DiffractionDielectric(DiffractingSurface):
             self._energy = DielectricEnergy(
                 self.table, self.material, str(self.boundary), self.thin, self.wavelength
             )
-        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
-        transmitted = mi.BSDFFlags.GlossyTransmission | sides
-        if not self.thin:
-            transmitted = transmitted | mi.BSDFFlags.NonSymmetric
-        self.m_components = [mi.BSDFFlags.GlossyReflection | sides, transmitted]
-        self.m_flags = mi.BSDFFlags.GlossyReflection | sides | transmitted
-        check_parameters([self])
-        self.derive()
+        self.ready()
+
+    def components(self) -> list[int]:
+        """See `PluginBSDF.components`."""
+        return both_sides(0 if self.thin else mi.BSDFFlags.NonSymmetric)
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
-    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """Return f |cosθo| per wavelength, as the context's mode of transport has it."""
-        return self.eval_pdf(ctx, si, wo, active)[0]
-
-    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Return the density of `sample` per solid angle."""
-        return self.eval_pdf(ctx, si, wo, active)[1]
-
-    def eval_pdf(
-        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    def evaluated(
+        self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """Return `eval` and `pdf` at once."""
+        """See `NestingBSDF.evaluated`."""
+        si, frame = site.si, site.frame
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         asked = _asked(ctx)
-        share = self._reflected_share(cos_i, asked)
-        frame = self.frame_at(si, active)
+        share = self._staying_share(cos_i, asked)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        scale = self.scale_at(si, active)
-        change, where = None, (self.power.wavenumbers(si), scale)
+        change, where = None, (frame, site.wavenumbers, site.scale)
         if self._energy is not None and self._energy.scales_order_0:
-            change = self._energy.order_0_scale((si.wi, wo), frame, *where)
+            change = self._energy.order_0_scale((si.wi, wo), *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, si, wo, frame, scale, lit, change)
+                side, orders = reflected(ctx, site, wo, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
-            passed = self._transmitted(ctx, si, crossing, scale, change) * dr.abs(cos_o)
+            passed = self._transmitted(ctx, site, crossing, change) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
-            orders = self.power.density(crossing, scale, si) * dr.square(out)
+            orders = self.power.density(crossing, site.scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         if self._energy is not None and self._energy.attenuates:
             # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), frame, *where))
+            value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), *where))
         return value, density
 
     def sample(
@@ -193,98 +179,71 @@ class DiffractionDielectric(DiffractingSurface):
         """Draw a side by the flat reflectance, then a direction by the orders."""
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & (cos_i != 0.0)
-        share = self._reflected_share(cos_i, _asked(ctx))
+        site = self.site_at(si, active)
+        share = self._staying_share(cos_i, _asked(ctx))
         reflected = sample1 < share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
         down, n = cos_i > 0.0, dr.detach(self.material.eta)
         sides = Sides.of(n, self.thin, down)
-        inner = mi.Float(1.0) if self.thin else n
-        into = dr.select(reflected, dr.select(down, 1.0, inner), sides.into)
-        out = dr.select(reflected, into, sides.out)
+        out = dr.select(reflected, sides.into, sides.out)
         sign = dr.select(reflected & down, 1.0, -1.0)
         cosine = dr.abs(cos_i)
         drawn = self.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
-            dr.detach(self.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
+            dr.detach(site.scale * dr.select(reflected & ~down, n, 1.0)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
-        drawn = sign * self.frame_at(si, active).from_table(drawn)
-        total = drawn - into * mi.Vector2f(si.wi.x, si.wi.y)
+        drawn = sign * site.frame.from_table(drawn)
+        total = drawn - sides.into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
             sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
         active &= wo.z > 0.0
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
-        value, density = self.eval_pdf(ctx, si, wo, active)
+        value, density = self.evaluated(ctx, site, wo, active, "vd")
         active &= density > 0.0
-        result = dr.zeros(mi.BSDFSample3f)
-        result.wo = wo
-        result.pdf = dr.select(active, density, 0.0)
-        result.eta = dr.select(reflected, 1.0, out / into)
-        kinds = mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission
-        result.sampled_type = dr.select(reflected, mi.UInt32(+kinds[0]), mi.UInt32(+kinds[1]))
-        result.sampled_component = dr.select(reflected, mi.UInt32(0), mi.UInt32(1))
+        eta = dr.select(reflected, 1.0, out / sides.into)
+        result = sample_of(wo, dr.select(active, density, 0.0), ~reflected, eta)
         return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
-
-    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
-        """Return the reflectance of the flat surface at normal incidence, for denoisers."""
-        reflectance = mi.Spectrum(self.material.reflectance(mi.Float(1.0), si, active))
-        return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
 
     # ------------------------------------------------------------------ reflection
 
     def _above(
-        self,
-        ctx: Context,
-        si: Interaction,
-        wo: Vector3f,
-        frame: PatchFrame,
-        scale: Float,
-        lit: Mask,
-        change: Colour | None,
+        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, change: Colour | None
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        pair = Pair(si, wo, frame, lit)
-        power = self.geometry(pair) * self._power(si, pair, scale, change)
-        value = self.lobe(ctx, si, pair, self.boundary, power, scale, lit)
+        pair = Pair(site.si, wo, site.frame, lit)
+        power = self.geometry(pair) * self._power(site, pair, change)
+        value = self.lobe(ctx, site, pair, self.boundary, power, lit)
         if self.thin:
-            value += self._returned(si, pair, scale, change)
-        return value, self.power.density(pair, scale, si)
+            value += self._returned(site, pair, change)
+        return value, self.power.density(pair, site.scale, site.si)
 
     def _below(
-        self,
-        ctx: Context,
-        si: Interaction,
-        wo: Vector3f,
-        frame: PatchFrame,
-        scale: Float,
-        lit: Mask,
-        change: Colour | None,
+        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, change: Colour | None
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n = self.material.eta
         if self.thin:
-            outer = Turned(si, wo, frame, lit, mi.Float(1.0))
+            outer = Turned(site.si, wo, site.frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            power = self.geometry(pair) * self._power(si, pair, scale, change)
-            value = self.lobe(ctx, si, pair, self.inner_boundary, power, scale, lit)
-            face = self.face(ctx, si, outer, self.mirror, lit)
+            power = self.geometry(pair) * self._power(site, pair, change)
+            value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
+            face = self.face(ctx, site, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
-            return value, self.power.density(outer, scale * n, si)
-        inner = Turned(si, wo, frame, lit, n)
-        power = self.geometry(inner) * self._power(si, inner.place, scale, change)
+            return value, self.power.density(outer, site.scale * n, site.si)
+        inner = Turned(site.si, wo, site.frame, lit, n)
+        power = self.geometry(inner) * self._power(site, inner.place, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
-        value = self.lobe(ctx, si, inner, self.inner_boundary, power, scale, lit) * dr.square(n)
-        return value, self.power.density(inner, scale * n, si) * dr.square(n)
+        value = self.lobe(ctx, site, inner, self.inner_boundary, power, lit) * dr.square(n)
+        return value, self.power.density(inner, site.scale * n, site.si) * dr.square(n)
 
-    def _returned(
-        self, si: Interaction, pair: Pair, scale: Float, change: Colour | None
-    ) -> Spectrum:
+    def _returned(self, site: Site, pair: Pair, change: Colour | None) -> Spectrum:
         """f cosθo of light that the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, returned = [], []
@@ -294,41 +253,35 @@ class DiffractionDielectric(DiffractingSurface):
             # T² R / (1 − R²) of each polarisation
             returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
-        power = self._power(si, point, scale, change)
+        power = self._power(site, point, change)
         ends_factor = dr.safe_sqrt(returned[0] * returned[1])
         factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
         return mi.depolarizer(power * factor)
 
-    def _power(
-        self, si: Interaction, point: Pair | TablePoint, scale: Float, change: Colour | None
-    ) -> Colour:
+    def _power(self, site: Site, point: Pair | TablePoint, change: Colour | None) -> Colour:
         """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
-        power = self.power.power(point, scale, si)
+        power = self.power.power(point, site.scale, site.si)
         if change is None:
             return power
         # Speckle may be dark where the ensemble's order 0 is not
-        return power + (change - 1.0) * dr.minimum(self.power.zeroth(point, scale, si), power)
+        zeroth = dr.minimum(self.power.zeroth(point, site.scale, site.si), power)
+        return power + (change - 1.0) * zeroth
 
     # ------------------------------------------------------------------ transmission
 
     def _transmitted(
-        self,
-        ctx: Context,
-        si: Interaction,
-        crossing: Crossing,
-        scale: Float,
-        change: Colour | None,
+        self, ctx: Context, site: Site, crossing: Crossing, change: Colour | None
     ) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        point = crossing.place
+        si, scale, point = site.si, site.scale, crossing.place
         power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
         zeroth = dr.minimum(zeroth, power)  # speckle may be dark
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
-        others = self._factor(ctx, si, crossing, self._matrices(si, crossing, scale, pair))
+        others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
@@ -342,12 +295,10 @@ class DiffractionDielectric(DiffractingSurface):
             outside *= dr.select(down, *scales)
         return dr.select(crossing.active, value * outside, 0.0)
 
-    def _matrices(
-        self, si: Interaction, crossing: Crossing, scale: Float, pair: Geometry
-    ) -> list[Jones]:
+    def _matrices(self, site: Site, crossing: Crossing, pair: Geometry) -> list[Jones]:
         """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
         n, above, below = crossing.n, crossing.above, crossing.below
-        heights = self.boundary.heights(crossing.place, scale, self.power.wavenumbers(si))
+        heights = self.boundary.heights(crossing.place, site.scale, site.wavenumbers)
         # Beyond the critical angle light decays outside; from outside none arrives there
         outside = outside_square(pair, n)
         outside = outside if self.thin else mi.Complex2f(outside, 0.0)
@@ -374,13 +325,12 @@ class DiffractionDielectric(DiffractingSurface):
         # light that goes up is that which goes down, reversed: with other s, so other signs
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
-        ends = -crossing.above, crossing.below
-        axes = polarisation_axes(-crossing.above, crossing.inside)
-        light = tuple(
-            dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
-        )
-        about = tuple(
-            dr.select(falls, *both) for both in ((axes[0], -axes[1]), (axes[1], -axes[0]))
+        light, about = (
+            (dr.select(falls, into, -out), dr.select(falls, out, -into))
+            for into, out in (
+                (-crossing.above, crossing.below),
+                polarisation_axes(-crossing.above, crossing.inside),
+            )
         )
         turned_round = [
             (ss, dr.select(falls, sp, -ps), dr.select(falls, ps, -sp), pp)
@@ -388,7 +338,7 @@ class DiffractionDielectric(DiffractingSurface):
         ]
         return mueller(turned_round, light, about)
 
-    def _reflected_share(self, cos_i: Float, asked: Asked) -> Float:
+    def _staying_share(self, cos_i: Float, asked: Asked) -> Float:
         """Share of the samples that stay on their side."""
         if not (asked.reflection and asked.transmission):
             return mi.Float(1.0 if asked.reflection else 0.0)
@@ -422,12 +372,9 @@ class DiffractionDielectric(DiffractingSurface):
         """See `DiffractingSurface.describe`."""
         return replace(super().describe(), transmits=True)
 
-    def to_string(self) -> str:
-        """Describe all parameters, for people."""
-        more = {"thin": "true" if self.thin else "false"}
-        return self.described(
-            "DiffractionDielectric", str(self.boundary), self._energy is not None, more
-        )
+    def shown(self) -> dict[str, Any]:
+        """See `PluginBSDF.shown`."""
+        return {**super().shown(), "thin": "true" if self.thin else "false"}
 
 
 def _asked(ctx: Context) -> Asked:
