@@ -290,8 +290,8 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
-    from ..plugin.bsdf import Diffraction
-    from ..plugin.orders.sheet import diffraction_orders
+    from ..plugin.diffraction import Diffraction
+    from ..plugin.orders.orders_sheet import diffraction_orders
 
     parameters = surface_parameters(args)
     settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}

@@ -18,8 +18,9 @@ from .options import whole_number
 from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
+    from ..heights.field import HeightField
     from ..heights.spectra import Periodicity
-    from ..thesis.period_fit import Fit, Response, Ridge
+    from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
 _WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -73,24 +74,59 @@ def _add_beam_options(group: argparse._ArgumentGroup) -> None:
     )
 
 
+class _Experiment(NamedTuple):
+    """Patch under a beam: gratings, periods in the plane of incidence (µm), and the axes."""
+
+    patch: HeightField
+    settings: dict[str, Any]  # of the method
+    gratings: Sequence[Periodicity]
+    held: list[float]
+    beam: Beam
+    steps: Any  # (W,) nm
+    angles: Any  # (A,) degrees
+
+
 def run(args: argparse.Namespace) -> int:
     """Measure, fit, draw, and return the exit code."""
-    import numpy as np
-
-    from ..atomic import atomic_path
-    from ..heights.coherence import resolved_width
-    from ..heights.spectra import dominant_periods
-    from ..thesis.methods import make
-    from ..thesis.methods.method import trapezoid_rule
-    from ..thesis.methods.periods import check_period
-    from ..thesis.period_fit import Beam, measure
-    from ..thesis.period_fit.plot import figure, save_csv, save_npz
-    from ..thesis.period_fit.ridge import check_axes
-
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
     check_outputs(written, [args.source], "evaluation")
+    experiment = _prepared(args)
+    result, more = _measured(args, experiment)
+    report = [("spectrum", str(grating)) for grating in experiment.gratings]
+    report += [result.followed.line, *result.lines]
+    _write(args, experiment, result, report, more, written)
+    print(
+        f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
+        f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
+        f"{time.perf_counter() - start:.1f} s"
+    )
+    if distance := _distance(args, experiment, result.followed.ridge):
+        report.insert(len(experiment.gratings) + 1, ("given", distance))
+    for name, text in report:
+        print(f"  {name:<9} {text}")
+    asked = TableSettings(
+        coherence_width=experiment.settings.get("coherence_width", "auto"),
+        wavelength_range=experiment.settings["wavelength_range"],
+    )
+    if notes := options.notes(args, experiment.patch, asked):
+        say_warning(notes)
+    print(f"  {'period':<9} {_published(result.followed.fit, more.get('window_error'))}")
+    beam = experiment.beam
+    save_report(args, {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
+                       "phi": beam.phi, **more})  # fmt: skip
+    return 0
+
+
+def _prepared(args: argparse.Namespace) -> _Experiment:
+    """Check the options, read the patch, and choose the beam and the viewing angles."""
+    from ..heights.spectra import dominant_periods
+    from ..thesis.methods.method import trapezoid_rule
+    from ..thesis.methods.periods import check_period
+    from ..thesis.period_fit import Beam
+    from ..thesis.period_fit.ridge import check_axes
+
     beam = Beam(args.theta, args.phi or 0.0)
     if args.period is not None:
         check_period(args.period)
@@ -98,7 +134,6 @@ def run(args: argparse.Namespace) -> int:
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
     patch, settings = options.load_patch(args)
-    width = resolved_width(settings.get("coherence_width", "auto"), [patch])
     gratings = dominant_periods(patch)
     if args.phi is None and gratings:
         beam = Beam(args.theta, float(round(gratings[0].direction)))  # known to a degree
@@ -106,53 +141,73 @@ def run(args: argparse.Namespace) -> int:
     reach = args.order * 1e-3 * steps[-1] / max(held) if held else None  # mλ/d of its last colour
     angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order, reach)
     check_axes(steps, angles)
-    settings |= spectrum
+    return _Experiment(patch, {**settings, **spectrum}, gratings, held, beam, steps, angles)
+
+
+class _Result(NamedTuple):
+    """Response of the patch, the ridge in it, and lines on single windows."""
+
+    response: Response
+    followed: FollowedRidge
+    lines: list[tuple[str, str]]
+
+
+def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Result, dict[str, Any]]:
+    """Measure and fit; also return the figures for the NPZ file."""
+    from ..heights.coherence import resolved_width
+    from ..thesis.methods import make
+    from ..thesis.period_fit import measure
+
+    patch, settings, _, held, beam, steps, angles = experiment
     with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)  # said above
+        warnings.simplefilter("ignore", DiffractionWarning)  # `options.notes` has them
         method = make(args.method, patch, period=args.period, progress=bar, **settings)
         response = measure(
             method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
         )  # fmt: skip
-        ridge, fit, line = _followed(response, args.order, held)
+        followed = _followed(response, args.order, held)
+        fit = followed.fit
         lines, more = _windows(args, patch, settings, beam, steps, angles, fit, bar)
-    fitted = np.nan if fit is None else fit.period
-    period = fitted if args.period is None else args.period
-    report = [("spectrum", str(grating)) for grating in gratings] + [line, *lines]
+    more |= {"fitted_period": math.nan if fit is None else fit.period,
+             "fit_error": math.nan if fit is None else fit.error,
+             "residual": math.nan if fit is None else fit.residual,
+             "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
+             "source": str(args.source)}  # fmt: skip
+    return _Result(response, followed, lines), more
+
+
+def _write(
+    args: argparse.Namespace, experiment: _Experiment, result: _Result,
+    report: Sequence[tuple[str, str]], more: dict[str, Any], written: Sequence[Path],
+) -> None:  # fmt: skip
+    """Write the picture, the ridge (CSV) and everything (NPZ)."""
+    from ..atomic import atomic_path
+    from ..thesis.period_fit.plot import figure, save_csv, save_npz
+
+    response, (ridge, fit, _), _ = result
+    period = more["fitted_period"] if args.period is None else args.period
     with atomic_path(written[0]) as path:
         figure(
-            response, ridge if fit else None, fit, None if np.isnan(period) else period,
-            order=args.order, title=patch.name,
+            response, ridge if fit else None, fit, None if math.isnan(period) else period,
+            order=args.order, title=experiment.patch.name,
             notes="\n".join(f"{name}: {text}" for name, text in report),
         ).savefig(path, format="png")  # fmt: skip
     save_csv(written[1], response, ridge, period, args.order)
-    more |= {"fitted_period": fitted, "fit_error": np.nan if fit is None else fit.error,
-             "residual": np.nan if fit is None else fit.residual,
-             "coherence_width": width, "source": str(args.source)}  # fmt: skip
     save_npz(written[2], response, ridge, period, args.order, more)
-    print(
-        f"{', '.join(map(str, written))}: {patch.name}, method {args.method}, light at "
-        f"{beam}, {steps.size} wavelengths, {angles.size} angles, "
-        f"{time.perf_counter() - start:.1f} s"
-    )
-    if args.period is not None:
-        apart = np.abs(ridge.angles - beam.grating_angles(steps, period, args.order))
-        if np.isfinite(apart).any():
-            report.insert(len(gratings) + 1, (
-                "given", f"{1e3 * period:.6g} nm, the ridge is within {np.nanmax(apart):.2g}° of it"
-            ))  # fmt: skip
-    for name, text in report:
-        print(f"  {name:<9} {text}")
-    asked = TableSettings(
-        coherence_width=settings.get("coherence_width", "auto"),
-        wavelength_range=spectrum["wavelength_range"],
-    )
-    if notes := options.notes(args, patch, asked):
-        say_warning(notes)
-    print(f"  {'period':<9} {_published(fit, more.get('window_error'))}")
-    save_report(args, {"patch": patch.name, "method": args.method, "theta": beam.theta,
-                       "phi": beam.phi, **more})  # fmt: skip
-    return 0
+
+
+def _distance(args: argparse.Namespace, experiment: _Experiment, ridge: Ridge) -> str:
+    """Describe how far the ridge is from the period that is given; "" without either."""
+    import numpy as np
+
+    if args.period is None:
+        return ""
+    expected = experiment.beam.grating_angles(experiment.steps, args.period, args.order)
+    apart = np.abs(ridge.angles - expected)
+    if not np.isfinite(apart).any():
+        return ""
+    return f"{1e3 * args.period:.6g} nm, the ridge is within {np.nanmax(apart):.2g}° of it"
 
 
 def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:

@@ -63,6 +63,8 @@ AZIMUTHS = np.pi * (np.arange(12) + 0.5) / 12
 #: i|ε − 1| times this is added to ε of film and material, so that a guided mode is no pole between
 #: nodes. A third or three times of it changes the films of docs/validation/layers.md by 0.5 %.
 MODE_WIDTH = 0.01
+#: Reflectance below which the mean is 0.
+MIN_LIGHT = 1e-12
 #: Bands of the spectrum in an octave, and lines in a band: g has no finer features.
 _PER_OCTAVE, _LINES = 4, 3
 #: Bands with less than this share of the variance are left out.
@@ -211,7 +213,8 @@ def mean_of_waves(
         added = wave.returned(came, jumps, sine, variance) + 2.0 * cosine**2 * variance * r
         whole += (r.conj() * added).real
         light += np.abs(r) ** 2
-    return np.asarray(whole / light)
+    # a face without contrast reflects no light whose mean could change
+    return np.divide(whole, light, out=np.zeros_like(whole), where=light > MIN_LIGHT)
 
 
 def _apart(square: Real, between: Real, index: Filmed) -> Real:

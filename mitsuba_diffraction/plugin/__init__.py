@@ -2,18 +2,18 @@
 
 Contents
 --------
-bsdf            `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
+diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
 transmission    the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, the part that both plugins share
 description     what a surface is: the record that shaders, OSL, maps and plans read
-blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
+diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
 nesting         methods of a BSDF over a nested one
 arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
-parameters      parameters of `diffraction`, read from Mitsuba's Properties and checked
+diffraction_parameters  parameters of `diffraction`, read from Mitsuba's Properties and checked
 surface_parameters  parameters that both plugins have: the surface and its table
 support         features that go together, declared by each choice of a scene
 meshes          arrays of Mitsuba's meshes, of 3.9 and 3.10
@@ -27,7 +27,7 @@ textures        orientation that varies; whether a mesh has what its BSDF reads
 types           names of the types of arguments
 directions      a pair of directions in the patch's frame, and how V-shaped grooves shadow it
 power           the diffracted power at single wavelengths
-lookup          a table inside a kernel: `DeviceTable`
+device_table    a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
 loops           sums in a loop inside a kernel, which derivatives pass
 series          series in κ: weights of a bin's terms, and order 0

@@ -116,7 +116,9 @@ class DirectionLookup:
         size = self._pages * self._polar * self._azimuthal
         page = page + mi.UInt32(lower) * size
         ends = (read_record(self._nodes, at, 4) for at in (page, page + size))
-        return [dr.lerp(*both, share - lower) for both in zip(*ends, strict=True)]
+        # no farther, where values might become negative; derivatives at the ends are as inside
+        share = dr.clip(share - lower, -0.01, 1.01)
+        return [dr.lerp(*both, share) for both in zip(*ends, strict=True)]
 
 
 def scales_of(tables: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:

@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import warn
 from ..optics import fresnel
-from ..optics.colour import RGB_WAVELENGTHS, response
+from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
-from ..tables.directional import FINE, DirectionalTable
+from ..tables.directional import FINE, LAST_ANGLE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, SmallSlope
+from .boundary import Boundary
 from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
-from .fresnel import Inside, Perfect, Reflectance
-from .layers import UnderFilm
+from .fresnel import Dielectric, Inside, Perfect, Reflectance
+from .layers import UnderFilm, plain
 from .memory import upload
 from .types import Colour, Float, Vector3f
 
@@ -41,15 +41,22 @@ Indices = NDArray[np.complex128] | fresnel.Filmed
 INDEX_STEP = 0.05
 #: For g.
 FILM_STEP = 0.01
-#: And a film's thickness, nm.
-THICKNESS_STEP = 5.0
+#: For a coat.
+COAT_STEP = 0.01
+#: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
+#: guides gains several times, within narrow fringes.
+FILM_PHASE = 0.02
+#: A film's thickness is rounded to this, nm, which changes the fringe by as much.
+THICKNESS_STEP = 1.0
 #: Step of a height scale over which the slope of g is taken. g bends by less than 1e-3 of its slope
 #: over it, and single precision leaves four digits of the difference.
-NEAR = 2.0**-9
+SLOPE_STEP = 2.0**-9
+#: Cosine of the last angle of tables of directions.
+LAST_COSINE = math.cos(LAST_ANGLE)
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
-MUCH = 0.05
+WARNED_EXCESS = 0.05
 
 
 class EnergyModel:
@@ -60,17 +67,23 @@ class EnergyModel:
     table, boundary : of the BSDF.
     wavelength : nm, for mono variants.
     conserving : whether anything is to be taken.
+    coat : the clear layer over the structure, or None.
     """
 
     def __init__(
-        self, table: DiffractionTable, boundary: Boundary, wavelength: float, conserving: bool
+        self,
+        table: DiffractionTable,
+        boundary: Boundary,
+        wavelength: float,
+        conserving: bool,
+        coat: Dielectric | None = None,
     ) -> None:
         mono = wavelength, wavelength
         self._table, self._model = table, str(boundary)
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self._material = conserving, boundary.material
-        self._warned = False
-        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
+        self._warned, self._coat = False, coat
+        self._filmed = isinstance(self._material, UnderFilm) and boundary.model.has_second_order
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
@@ -88,8 +101,9 @@ class EnergyModel:
             partial(_indices_under, self._material, step, scales.centre, self._range)
             for step in (INDEX_STEP, FILM_STEP)
         )
-        material = Reflector(self._model, self._indices)
-        self._energy = Energy(self._table, material, scales.wavelengths(self._range))
+        material = Reflector(self._model, self._indices, self._coat_index)
+        wavelengths = scales.wavelengths(self._range)
+        self._energy = Energy(self._table, material, wavelengths, scales.least)
         if not (self.conserving or beneath or self._filmed):
             return
         nodes = scales.nodes(self._energy)
@@ -97,7 +111,7 @@ class EnergyModel:
             # g costs little at any height scale: its slope is taken there, and not from nodes of s,
             # on both sides of which it differs by some per cent
             height_scale = scales.height_scale
-            near = [height_scale, height_scale + (NEAR if scales.differentiable else 0.0)]
+            near = [height_scale, height_scale + (SLOPE_STEP if scales.differentiable else 0.0)]
             around = nodes if scales.varies else near
             self._mean.update([self._mean_gain(node) for node in around], around, scales)
         if not (self.conserving or beneath):
@@ -110,6 +124,13 @@ class EnergyModel:
             ratios = [self._ratio(energy) for energy in conserved]
             self._reflected.update(ratios, nodes, scales)
 
+    @property
+    def _coat_index(self) -> float:
+        """Index of the coat, rounded; 1 without a coat."""
+        if self._coat is None:
+            return 1.0
+        return float(_rounded_index(plain(self._coat.eta), COAT_STEP))
+
     def _warn(self, conserved: list[Conservation]) -> None:
         """Say once that much is taken of a real material."""
         if self._warned or isinstance(self._material, Perfect) or conserved[0].scale is None:
@@ -117,7 +138,7 @@ class EnergyModel:
         albedo = conserved[0].albedo
         assert albedo is not None  # of a reflector
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
-        if largest > 1.0 + MUCH:
+        if largest > 1.0 + WARNED_EXCESS:
             self._warned = True
             warn(
                 f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
@@ -125,8 +146,8 @@ class EnergyModel:
                 "orders are least certain there"
             )
 
-    def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
+    def scale(self, height_scale: float) -> DirectionalTable | None:
+        """Energy scale s on `FINE`; None where all are 1."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
@@ -134,9 +155,7 @@ class EnergyModel:
         if scales is None:
             return None
         scale = between([scale.on(FINE) for scale in scales], nodes, height_scale)
-        wavelengths = scale.wavelengths * self._scales.centre
-        weights = response(wavelengths)[:, 1] * wavelengths
-        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+        return DirectionalTable(scale.wavelengths * self._scales.centre, scale.values)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
         """Return the table that `reflected` looks up, for shaders."""
@@ -157,17 +176,23 @@ class EnergyModel:
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
         """
+        outer = pair.outer
         product = mi.UnpolarizedSpectrum(1.0)
         for lookup in (self._scale, self._mean):
             if lookup.present:
                 both = zip(
-                    lookup.at(pair.wi, pair.cos_i, pair.frame, wavenumbers, height_scale),
-                    lookup.at(pair.wo, pair.cos_o, pair.frame, wavenumbers, height_scale),
+                    lookup.at(outer.wi, outer.cos_i, outer.frame, wavenumbers, height_scale),
+                    lookup.at(outer.wo, outer.cos_o, outer.frame, wavenumbers, height_scale),
                     strict=True,
                 )
                 product *= mi.UnpolarizedSpectrum(
                     [incident * outgoing for incident, outgoing in both]
                 )
+        if self._scale.present:
+            # beyond the table's angles an albedo that gains rises as 1/cosθ, of wide lobes faster
+            for cosine in (outer.cos_i, outer.cos_o):
+                near = dr.minimum(cosine * (1.0 / LAST_COSINE), 1.0)
+                product *= near * dr.sqrt(near)
         return product
 
     def reflected(
@@ -261,13 +286,16 @@ def _rounded_indices(
         return None
     if isinstance(exact, fresnel.Filmed):
         index, film, depth = exact.parts
-        return fresnel.Filmed(_rounded_index(index, step), _rounded_index(film, step), depth)
+        phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)
+        fine = min(step, 10.0 ** math.floor(math.log10(phase)))  # of decimal numbers as given
+        return fresnel.Filmed(_rounded_index(index, step), _rounded_index(film, fine), depth)
     return _rounded_index(exact, step)
 
 
 def _rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
-    """An index to a step, but not to 0, where no wave exists."""
-    rounded = _rounded(index, step)
+    """An index to a step, finer where it is close to 1, but not to 0, where no wave exists."""
+    contrast = np.abs(np.asarray(index) - 1.0)
+    rounded = np.where(contrast > 4.0 * step, _rounded(index, step), _rounded(index, 0.02 * step))
     return np.where(rounded == 0.0, step, rounded)
 
 

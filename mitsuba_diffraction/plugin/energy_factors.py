@@ -55,6 +55,11 @@ class ScaleRange(NamedTuple):
         return wavelength_range[0] / high, wavelength_range[1] / low
 
     @property
+    def least(self) -> float:
+        """Least factor on lengths that is tabulated."""
+        return self._tabulated[0]
+
+    @property
     def _rounded(self) -> tuple[float, float]:
         low, high = (math.log2(factor) * STEPS_PER_OCTAVE for factor in self._tabulated)
         ends = math.floor(low), math.ceil(high)

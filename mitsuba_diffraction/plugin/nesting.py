@@ -93,7 +93,7 @@ def evaluate(
     if nested is not None:
         # T(ωi) T(ωo) f of the BSDF beneath
         beneath = mi.Spectrum(self.beneath(si, wo, active))
-        value += beneath * self.nested.eval(nested, si, wo, active)
+        value += beneath * _valid(self.nested.eval(nested, si, wo, active))
     return dr.select(active, value, 0.0)
 
 
@@ -124,7 +124,7 @@ def evaluate_both(
     if nested is not None:
         beneath = mi.Spectrum(self.beneath(si, wo, active))
         nested_value, nested_pdf = self.nested.eval_pdf(nested, si, wo, active)
-        value += beneath * nested_value
+        value += beneath * _valid(nested_value)
         pdf = dr.lerp(nested_pdf, pdf, _glossy_share(self, diffracts, si, active))
     return dr.select(active, value, 0.0), dr.select(active, pdf, 0.0)
 
@@ -153,6 +153,7 @@ def sample(
         chosen = active & (sample1 >= share)
         remaining = (sample1 - share) / dr.select(chosen, 1.0 - share, 1.0)
         below, weight = self.nested.sample(nested, si, remaining, sample2, chosen)
+        weight = _valid(weight)
         below.sampled_component += 1
         result = dr.select(chosen, below, result)
         delta = chosen & mi.has_flag(below.sampled_type, mi.BSDFFlags.Delta)
@@ -178,8 +179,14 @@ def evaluate_diffuse_reflectance(self: Nesting, si: Interaction, active: Mask = 
         level = mi.SurfaceInteraction3f(si)
         level.wi = mi.Vector3f(0.0, 0.0, 1.0)
         nested = self.nested.eval_diffuse_reflectance(level, active)
-        reflectance += mi.Spectrum(self.beneath(level, level.wi, active)) * nested
+        reflectance += mi.Spectrum(self.beneath(level, level.wi, active)) * _valid(nested)
     return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
+
+
+def _valid(light: Spectrum) -> Spectrum:
+    """Return light of a nested BSDF, 0 where it is negative or not a number."""
+    valid = mi.unpolarized_spectrum(light) >= 0.0
+    return dr.select(dr.all(valid) if mi.is_polarized else valid, light, 0.0)
 
 
 def _lit(si: Interaction, wo: Vector3f, active: Mask) -> Mask:

@@ -12,13 +12,14 @@ from typing import Protocol
 import drjit as dr
 import mitsuba as mi
 
+from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
+from .device_table import device_table
 from .directions import Pair, TablePoint
-from .lookup import device_table
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .transmission.crossing import Crossing
-from .types import Colour, Float, Index, Interaction, Vector2f
+from .types import Colour, Float, Index, Interaction, Mask, Vector2f
 from .window_positions import Window, WindowPositions
 
 
@@ -71,6 +72,9 @@ class SpectralPower:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma = table.sigma
+        #: Least and largest 2π/λ that the table serves, rad/µm, to rounding.
+        longest, shortest = (float(wavenumber(lam)) for lam in reversed(table.wavelength_range))
+        self._served = longest * (1.0 - 1e-5), shortest * (1.0 + 1e-5)
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -106,7 +110,7 @@ class SpectralPower:
 
         def of_wavelength(k: Float) -> Float:
             total = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
-            return total * dr.square(k * (0.5 / dr.pi))
+            return dr.select(self._serves(k), total * dr.square(k * (0.5 / dr.pi)), 0.0)
 
         return of_wavelength
 
@@ -145,10 +149,14 @@ class SpectralPower:
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
-        squares = [dr.square(k) for k in self.wavenumbers(si)]
+        squares = [dr.select(self._serves(k), dr.square(k), 0.0) for k in self.wavenumbers(si)]
         return mi.UnpolarizedSpectrum(
             [dr.exp(apart * square) * (square * (0.5 / dr.pi) ** 2) for square in squares]
         )
+
+    def _serves(self, k: Float) -> Mask:
+        """Whether the table is of light of this 2π/λ."""
+        return (k >= self._served[0]) & (k <= self._served[1])
 
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if not mi.is_spectral:

@@ -15,7 +15,8 @@ from . import arithmetic
 
 # Base classes first: the plugins inherit from `surface`
 _MODULES = (
-    "surface", "bsdf", "transmission.bsdf", "orders.bsdf", "orders.sheet", "blended_patches",
+    "surface", "diffraction", "transmission.diffraction_dielectric", "orders.diffraction_orders",
+    "orders.orders_sheet", "diffraction_mix",
 )  # fmt: skip
 
 

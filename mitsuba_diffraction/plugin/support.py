@@ -46,7 +46,7 @@ MIRROR = Support(
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
 DISPERSIVE = Support("a material whose index varies with the wavelength", second_order=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
-COAT = Support("coat_ior", energy=False, film=False, thesis=False)
+COAT = Support("coat_ior", film=False, thesis=False)
 FILM = Support("a thin film (film_ior)", second_order=False, coat=False, thesis=False)
 ABSORBING = Support("film_k, which absorbs the light for what lies beneath", nested=False)
 THESIS = Support("layering='thesis'", second_order=False)

@@ -12,7 +12,7 @@ from ..optics.blend import RoughnessTable
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
 from .directional import FINE, DirectionalTable, DirectionGrid
-from .energy.materials import PROBES, Index, rounded
+from .energy.materials import PROBES, Index, Reflector, rounded
 from .energy.scaling import parallel
 from .energy.settings import energy_settings
 from .store import DirectionalTables, cached_directions
@@ -29,15 +29,9 @@ def exponents(
     Arguments as of `tables.energy.conservation.Energy`.
     """
     low, high = wavelength_range
-    film = index(np.array([low]))
-    assert isinstance(film, Filmed)
     settings = energy_settings()
-    path = 2.0 * float((film.parts[1] * film.parts[2]).real[0])
-    count = int(
-        np.clip(
-            math.ceil(path * (1.0 - low / high) / settings.fringe_step), _FEWEST, settings.fringes
-        )
-    )
+    phase = Reflector("small_slope", index).phase(wavelength_range)
+    count = int(np.clip(math.ceil(phase / settings.fringe_step), _FEWEST, settings.fringes))
     wavelengths = np.geomspace(low, high, count if high > low else 1)
     films = index(wavelengths)
     assert isinstance(films, Filmed)

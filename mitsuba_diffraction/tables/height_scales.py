@@ -48,11 +48,16 @@ class HeightScales:
         return node(lower), node(lower if at_node and not interval else lower + 1)
 
     @property
+    def most(self) -> float:
+        """Largest height scale."""
+        return self.table.height_scale_max
+
+    @property
     def _lattice(self) -> tuple[int, float]:
         """Height scales a unit, and the largest."""
         phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
         # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
-        most = max(self.table.height_scale_max, _FLAT)
+        most = max(self.most, _FLAT)
         return max(_FEWEST_STEPS, math.ceil(phase / _PHASE)), most
 
     def between(self, low: float, high: float) -> list[float]:

@@ -84,7 +84,7 @@ def order_mixture(
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     stored = []
-    powers_at = _Powers(table, axes)
+    powers_at = _Powers(table, axes, apart)
     for n, kappa in enumerate(kappas):
         power, central[n] = powers_at(float(kappa))
         if all_smooth and not apart:  # order 0 then is as wide as any other
@@ -127,6 +127,7 @@ class _Axis:
             density = max(1, math.ceil(step / 0.8))
             positions = np.arange(-last * density, last * density + 1) / density
             self.frequency = positions * spacing
+            self.lobe = np.exp(-2.0 * table.grid.exponents[axis] * positions**2)
             self.matrix = tap_matrix(positions, -last, len(bins), table.grid.exponents[axis], None)
             self.weight = step / density / math.sqrt(math.pi)
             return
@@ -143,8 +144,8 @@ class _Axis:
 class _Powers:
     """Powers at any κ; keeps the coefficients of the last interval in single precision."""
 
-    def __init__(self, table: DiffractionTable, axes: list[_Axis]) -> None:
-        self._table, self._axes = table, axes
+    def __init__(self, table: DiffractionTable, axes: list[_Axis], apart: bool) -> None:
+        self._table, self._axes, self._apart = table, axes, apart
         self._interval = -1
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
@@ -165,7 +166,13 @@ class _Powers:
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
             weight = axes[0].weight * axes[1].weight
-            return np.abs(field).astype(np.float32) ** 2 * weight, 0.0
+            power = np.abs(field).astype(np.float32) ** 2 * weight
+            if not self._apart:
+                return power, 0.0
+            # order 0 is the mean's lobe, or all light where the speckle is darker than that
+            x, y = (axis.lobe for axis in axes)
+            order_0 = np.minimum(float(np.sum(centre**2)) * weight * y[:, None] * x, power)
+            return power - order_0, float(order_0.sum())
         if expansion.kind == "power":
             power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
         else:

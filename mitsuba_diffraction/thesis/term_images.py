@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..analysis.timing import quiet_bsdf
-from ..plugin.lookup import DeviceTable
+from ..plugin.device_table import DeviceTable
 from ..plugin.memory import upload
 from ..tables.table import DiffractionTable
 
@@ -26,8 +26,8 @@ class TermImages(DeviceTable):
     """A coherent Taylor table as the thesis stores it: an image of complex numbers per term.
 
     For every wavelength and every term, the 3 × 3 texels around the frequency are gathered from
-    that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` stores all
-    terms of one bin together instead. Only `window_sum` differs.
+    that term's image, weighted by the Gaussian window, and added up. `plugin.device_table` stores
+    all terms of one bin together instead. Only `window_sum` differs.
     """
 
     def __init__(self, table: DiffractionTable) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.lookup import device_table
+from mitsuba_diffraction.plugin.device_table import device_table
 from tests.support.directions import polar, rough_patch, uniform_directions
 from tests.support.lanes import evaluated, lanes, refusal
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS, device_table
+from mitsuba_diffraction.plugin.device_table import _UNROLLED_TAPS, device_table
 from tests.support.directions import rough_patch
 from tests.support.lanes import lanes
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction.analysis.timing import PIXEL, Queries, quiet_bsdf
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.plugin.lookup import device_table
+from mitsuba_diffraction.plugin.device_table import device_table
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.tables.table import DiffractionTable
 from mitsuba_diffraction.thesis.term_images import thesis_bsdf

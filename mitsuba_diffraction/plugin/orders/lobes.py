@@ -24,15 +24,15 @@ from ..loops import sum_of
 from ..memory import index_between, read_record, upload
 from ..sampling import BELOW_ONE, invert
 from ..types import Colour, Context, Float, Index, Interaction, Mask, Spectrum, Vector2f
-from .lookup import OrderLookup, Row, order_lookup
+from .order_lookup import OrderLookup, Row, order_lookup
 
 #: Mask of lanes whose ωo lies below a sheet; None without a sheet.
 Below = Mask | None
 
 #: Squared distance from a lobe's centre, in units of its width, beyond which it is 0.
-_FAR = 18.0
+_REACH = 18.0
 #: Sum of efficiencies below which nothing is drawn, against division by 0.
-_LEAST = 1e-12
+_MIN_SUM = 1e-12
 
 
 class Reflected(NamedTuple):
@@ -121,7 +121,7 @@ class _Window:
         self.lookup = order_lookup(table, self.lookup_kind)
         self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
         # where an order's neighbour adds to its lobe
-        self._overlaps = 0.25 * self._sharpness < _FAR
+        self._overlaps = 0.25 * self._sharpness < _REACH
 
     def orders(self, position: Float) -> list[Float]:
         """Return the orders whose lobes reach a position, in units of orders along x."""
@@ -173,7 +173,7 @@ class SpectralLobes(_Window):
                 terms.append((order, lobe, share.efficiency))
             peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self.sigma) * pair.cos_o
             lit.append(Lit(row, light * peak, peak, terms))
-            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _LEAST))
+            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _MIN_SUM))
         mean = density * (1.0 / len(wavelengths))
         return Reflected(self.spectrum(pair, ctx, lit), dr.detach(mean))
 
@@ -255,12 +255,12 @@ class DaylightLobes(_Window):
         """Return the efficiency of an order, and its probability."""
         row = self.lookup.row(light.incident, light.cos_i, wavelength)
         share, total = self.lookup.order(row, order, True, below), self.lookup.total(row)
-        return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _LEAST))
+        return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _MIN_SUM))
 
     def _zeroth(self, light: Incidence, below: Below, radius: Float) -> list[Float]:
         """Sum order 0 over wavelengths, for red, green, blue and the density."""
         longest = dr.square(2e3 * math.pi * self.sigma / ENDS[1])
-        count = dr.select(radius * longest < _FAR, mi.UInt32(self._wavelengths), mi.UInt32(0))
+        count = dr.select(radius * longest < _REACH, mi.UInt32(self._wavelengths), mi.UInt32(0))
 
         def add(n: Index, inputs: tuple[Incidence, Float], sums: list[Float]) -> list[Float]:
             light, radius = inputs
@@ -282,7 +282,8 @@ class DaylightLobes(_Window):
         aside = lobe_falloff(u, v, self.sigma, self.period)
         first = dr.maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
         last = dr.minimum(
-            dr.floor(self._waves[1] * dr.rcp(step)), dr.sqrt(_FAR * dr.rcp(dr.maximum(aside, 1e-8)))
+            dr.floor(self._waves[1] * dr.rcp(step)),
+            dr.sqrt(_REACH * dr.rcp(dr.maximum(aside, 1e-8))),
         )
         most = int(2.0 * self._waves[1] / unit) + 1
         lit = (last >= first) & (radius * (self._waves[1] / unit) ** 2 > 0.25)

@@ -49,7 +49,8 @@ class DielectricEnergy:
         """Look up, or compute, c and s at other factors or another index: `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
         dielectric = materials.Dielectric(index, self._model, self._thin)
-        energy = Energy(self._table, dielectric, factors.wavelengths(self._range))
+        wavelengths = factors.wavelengths(self._range)
+        energy = Energy(self._table, dielectric, wavelengths, factors.least)
         nodes = factors.nodes(energy)
         conserved = [energy.at(node) for node in nodes]
         scales = {

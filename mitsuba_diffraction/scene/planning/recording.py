@@ -76,7 +76,7 @@ class Session:
         return self
 
     def __exit__(self, *_: object) -> None:
-        from ...plugin.bsdf import Diffraction
+        from ...plugin.diffraction import Diffraction
 
         mi.register_bsdf("diffraction", Diffraction)
         _one_at_a_time.release()
@@ -152,7 +152,7 @@ def described_table(bsdf: BSDF) -> DiffractionTable:
 
 def _kind(session: Session) -> type[BSDF]:
     """The plugin of the current variant; a subclass that records, where the session does."""
-    from ...plugin.bsdf import Diffraction
+    from ...plugin.diffraction import Diffraction
 
     if not session.recording:
         return Diffraction
@@ -161,11 +161,17 @@ def _kind(session: Session) -> type[BSDF]:
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
         def diffracted(
-            self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+            self,
+            ctx: Context,
+            si: Interaction,
+            pair: Pair,
+            power: Colour,
+            scale: Float,
+            active: Mask,
         ) -> Spectrum:
-            value = super().diffracted(ctx, si, pair, power, active)
+            value = super().diffracted(ctx, si, pair, power, scale, active)
             light = mi.unpolarized_spectrum(value)
-            session.record(self, si, pair.uv, pair.w * self.scale_at(si, active), light)
+            session.record(self, si, pair.uv, pair.w * scale, light)
             return value
 
     return RecordedDiffraction

@@ -28,6 +28,7 @@ surface exceed 1 on their own, all light is scaled by s(ωi) s(ωo) with s at mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from functools import partial
@@ -49,6 +50,9 @@ from .transport import Orders, ScatteredLight, Transport
 
 #: Where order 0 has less of the light, it is not scaled.
 MIN_ORDER_0 = 1e-4
+#: Polar angles beyond the grid of directions. Towards the horizon an albedo that gains there rises
+#: as 1/cosθ or faster, and the plugin attenuates what is scaled.
+GRAZING = np.radians([89.8, 89.9])
 
 
 @dataclass(frozen=True)
@@ -78,9 +82,12 @@ class Surface:
         material: Reflector | Dielectric,
         height_scale: float = 1.0,
     ) -> None:
-        self.material, self.orders = material, Orders(table, height_scale, material.densest)
+        self.material, finer = material, 1
         self._settings = settings = energy_settings()
         self._both_sides = isinstance(material, Dielectric)
+        if isinstance(material, Reflector):
+            finer += material.thick(table.wavelength_range[0])
+        self.orders = Orders(table, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
@@ -91,9 +98,12 @@ class Surface:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings, grid = self._settings, self._grid
         albedo = None if self._both_sides else self._albedo(wavelength_range)
-        if albedo is not None and albedo.values.max() <= self._limit:
+        if albedo is not None and self._conserves(albedo):
             return Conservation(albedo)
-        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        count = settings.side_wavelengths
+        if isinstance(self.material, Reflector):
+            fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+            count = max(settings.wavelengths, min(fringes, settings.fringes))
         nodes = spread(wavelength_range, count)
         lights = self._lights(nodes, grid.theta, grid.phi)
         solved = parallel(lambda light: self._solved(light()), lights)
@@ -112,9 +122,11 @@ class Surface:
             parallel(lower, range(first, len(between), 2))
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
-            missing = side >= scale.shape[1] or np.all(scale == 1.0)
+            missing = side >= scale.shape[1] or (self._both_sides and np.all(scale == 1.0))
             return None if missing else DirectionalTable(nodes, scale[:, side])
 
+        if not self._both_sides:
+            return Conservation(albedo, table(s, 0))
         return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
     def albedos(
@@ -152,6 +164,14 @@ class Surface:
 
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
+
+    def _conserves(self, albedo: DirectionalTable) -> bool:
+        """Whether a reflector gains no light, up to the horizon."""
+        if albedo.values.max() > self._limit:
+            return False
+        lights = self._lights(albedo.wavelengths, GRAZING, albedo.grid.phi)
+        largest = max(light().sent(self._ones, self._ones).max() for light in lights)
+        return bool(largest <= self._limit)
 
     def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
         """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
@@ -220,10 +240,18 @@ class Energy(HeightScales):
     ----------
     material : a reflector, or a dielectric that lets light through.
     wavelength_range : nm; its ends may be one.
+    stretch : least factor on lengths. A patch stretched by it is looked up with heights divided by
+        it, in light of wavelengths divided by it.
     """
 
     material: Reflector | Dielectric
     wavelength_range: tuple[float, float]
+    stretch: float = 1.0
+
+    @property
+    def most(self) -> float:
+        """Largest height scale: κ of a stretched patch stays within the table."""
+        return super().most / self.stretch
 
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""

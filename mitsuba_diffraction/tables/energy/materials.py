@@ -12,6 +12,7 @@ from ...optics import boundary, through
 from ...optics.fresnel import Filmed
 from ...optics.paths import ABOVE, Path, Returned, Side
 from ..directional import Real
+from .gain import THICK, advance
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
@@ -26,24 +27,43 @@ class Reflector:
     Attributes
     ----------
     model : one of `optics.boundary.MODELS`.
-    index : of the material over that of the medium above it.
+    index : of the material over that of the medium at the structure.
+    coat : index of a coat over that of the medium above; 1 without a coat.
     """
 
     model: str
     index: Index
+    coat: float = 1.0
 
-    #: Largest index of the media that light travels in, over that of the medium above.
-    densest = 1.0
+    @property
+    def densest(self) -> float:
+        """Largest index of the media that light travels in, over that of the medium above."""
+        return self.coat
 
     def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
         """Return the one path of light at each wavelength (nm); `least` does not matter to it."""
         index = self.index(wavelengths)
         indices = [None] * len(wavelengths) if index is None else index
-        return [[Path(indices[n], self.model)] for n in range(len(wavelengths))]
+        side = Side(1.0, self.coat)
+        return [[Path(indices[n], self.model, side, side)] for n in range(len(wavelengths))]
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this material from another over a range of wavelengths (nm)."""
-        return [self.model, rounded(self.index(np.geomspace(*wavelength_range, PROBES)))]
+        index = rounded(self.index(np.geomspace(*wavelength_range, PROBES)))
+        return [self.model, index, self.coat]
+
+    def thick(self, wavelength: float) -> bool:
+        """Whether fringes of a film vary quickly with the angle at a wavelength (nm)."""
+        index = self.index(np.array([wavelength]))
+        return isinstance(index, Filmed) and advance(index) > THICK
+
+    def phase(self, wavelength_range: tuple[float, float]) -> float:
+        """Phase (rad) by which a film's fringe advances over a range of wavelengths (nm)."""
+        low, high = wavelength_range
+        film = self.index(np.array([low]))
+        if not isinstance(film, Filmed):
+            return 0.0
+        return 2.0 * float((film.parts[1] * film.parts[2]).real[0]) * (1.0 - low / high)
 
 
 @dataclass(frozen=True)
@@ -69,7 +89,7 @@ class Dielectric:
     def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
         """Return the paths of light at each wavelength; least : w of light let through."""
         n, model = self.index, boundary.checked_model(self.model, through.MODELS)
-        below = Side(1.0 if self.thin else n, n)
+        below = Side(1.0 if self.thin else n, n, below=True)
         paths = [
             Path(n, model, ABOVE, ABOVE),
             Path(n, model, ABOVE, below, least),

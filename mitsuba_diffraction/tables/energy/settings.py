@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 17
+VERSION = 22
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class EnergySettings:
         mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
         2 n d of 3 µm, and three times that at 12 µm. Under thin films waves in between come and go,
         which three times the step misses by 0.03.
+    scale_fringe_step : likewise from one wavelength of a scale to the next.
     sweeps : of Sinkhorn and Knopp's iteration.
     threshold : an albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; what is left to 1 is for what lies between nodes.
@@ -43,6 +44,7 @@ class EnergySettings:
     side_wavelengths: int = 8
     wavelengths: int = 16
     fringe_step: float = 0.1
+    scale_fringe_step: float = 0.6
     fringes: int = 64
     few_parts: int = 3
     few_orders: int = 32

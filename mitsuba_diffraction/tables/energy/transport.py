@@ -39,6 +39,8 @@ SMOOTHING = 0.6
 LEAST_WEAK = 2e-3
 
 _LOBE = 3.5  # a lobe ends here, in units of 1/σ: exp(−3.5²) = 5e-6
+_ACROSS = [part[8:] for part in np.polynomial.hermite.hermgauss(16)]  # half a lobe, in azimuth
+_WIDE = 0.04  # width of a lobe, in direction cosines, that is looked at across
 _LOBE_NODES = 96  # in cosθo across a lobe
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
@@ -48,27 +50,35 @@ class Orders:
 
     densest : largest index of the media that light travels in; order 0 of a dielectric is summed
         apart from the others however wide its lobe is.
+    finer : factor on the quadrature's resolution.
     """
 
     def __init__(
-        self, table: DiffractionTable, height_scale: float = 1.0, densest: float = 1.0
+        self,
+        table: DiffractionTable,
+        height_scale: float = 1.0,
+        densest: float = 1.0,
+        finer: int = 1,
     ) -> None:
         self.sigma, self.roughness, self.height_scale = table.sigma, table.roughness, height_scale
         self.densest, settings = densest, energy_settings()
         longest = float(wavenumber(table.wavelength_range[0]))
-        smoothing = SMOOTHING * longest * 0.5 * math.pi / settings.rings
+        rings, steps = finer * settings.rings, finer * settings.steps
+        smoothing = SMOOTHING * longest * 0.5 * math.pi / rings
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
         self.mixture = order_mixture(table, scale, smoothing, apart=densest > 1.0)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.strong = len(self.mixture.frequency)
-        self.nodes = _directions(settings.rings, settings.steps)
+        self.nodes = _directions(rings, steps)
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
-        # nothing of it is left where it is among the weak ones
+        nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
+        # none is left where it is among the weak ones, and less in dark speckle
+        left = self.mixture.central / np.maximum(order_0_power(table, nodes * scale), 1e-12)
         powers = order_0_power(table, self._kappas * scale)
-        self._powers = powers * (self.mixture.central.max() > 0.0)
+        self._powers = powers * np.interp(self._kappas, nodes, left)
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step
         self.least_width /= float(wavenumber(table.wavelength_range[1]))
@@ -144,15 +154,23 @@ class Transport:
         low = np.clip(sine - _LOBE * width, 0.0, 1.0)
         high = np.minimum(sine + _LOBE * width, 1.0)
         first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
-        step = (last - first) / _LOBE_NODES
-        # beyond the critical angle the step is 0, and so are the shares
-        cos_o = np.maximum(first + step * (np.arange(_LOBE_NODES) + 0.5), 1e-9)
+        place = (np.arange(_LOBE_NODES) + 0.5) / _LOBE_NODES
+        # denser towards the horizon. Beyond the critical angle the step is 0, and so are the shares
+        cut = high == 1.0
+        cos_o = np.maximum(first + (last - first) * np.where(cut, place**2, place), 1e-9)
+        step = (last - first) * np.where(cut, 2.0 * place, 1.0) / _LOBE_NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= i0e(2.0 * sin_o * sine / width**2)
 
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
-        parts *= self._gain.order_0(cos_i, cos_o, power)
+        # azimuths across the lobe, at which G of a wide one differs towards the horizon
+        across, weights = _ACROSS if width > _WIDE else (np.zeros(1), np.ones(1))
+        turn = across * width / np.sqrt(np.maximum(sin_o * sine, 1e-9))[..., None]
+        cos_turn = -np.cos(np.minimum(turn, np.pi))
+        cos_in, cos_out, share = (x[..., None] + 0.0 * turn for x in (cos_i, cos_o, power))
+        gain = self._gain.order_0(cos_in, cos_out, share, cos_turn)
+        parts *= gain @ (weights / weights.sum())
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 

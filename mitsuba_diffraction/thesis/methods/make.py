@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,6 @@ from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated
 from .periods import check_period, estimate_periods, required_period
 
-NAMES = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
-
 #: Function that builds a table of a patch, like `DiffractionTable.build`.
 Build = Callable[..., DiffractionTable]
 
@@ -33,35 +32,12 @@ Build = Callable[..., DiffractionTable]
 SINC_TAPS = 8
 
 
-def make(name: str, heights: HeightField, **settings: object) -> Method:
-    """Build the method with a name of `NAMES`; settings as in `make_all`."""
-    return make_all((name,), heights, **settings)[name]  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class MethodSettings:
+    """Settings of the methods.
 
-
-def make_all(
-    names: Sequence[str],
-    heights: HeightField,
-    *,
-    coherence_width: str | float = "auto",
-    coherence: str | None = None,
-    tolerance: float = 1e-3,
-    terms: int | None = None,
-    taps: int | None = None,
-    wavelength_range: tuple[float, float] = (380.0, 780.0),
-    step: float = 5.0,
-    period: float | None = None,
-    repeats: tuple[int, int] | None = None,
-    nmm_weights: str = "step",
-    specular: float | None = None,
-    progress: Progress | None = None,
-    build: Build | None = None,
-) -> dict[str, Method]:
-    """Build methods by name, for one patch.
-
-    Parameters
+    Attributes
     ----------
-    names : names of `NAMES`.
-    heights : the patch, which tiles the plane.
     coherence_width : 4σ of the Gaussian amplitude window, µm, or "auto" (`heights.coherence`); for
         `pq`, the width that is filled with copies of the patch.
     coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all
@@ -76,8 +52,49 @@ def make_all(
         default estimated from the heights.
     repeats : (N₁, N₂) of `pq`; by default as many as fill the coherence width, at least 2.
     nmm_weights, specular : see `OrdersOnly`.
+    """
+
+    coherence_width: str | float = "auto"
+    coherence: str | None = None
+    tolerance: float = 1e-3
+    terms: int | None = None
+    taps: int | None = None
+    wavelength_range: tuple[float, float] = (380.0, 780.0)
+    step: float = 5.0
+    period: float | None = None
+    repeats: tuple[int, int] | None = None
+    nmm_weights: str = "step"
+    specular: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the wavelengths and the period."""
+        trapezoid_rule(self.wavelength_range, self.step)
+        if self.period is not None:
+            check_period(self.period)
+
+
+def make(name: str, heights: HeightField, **settings: Any) -> Method:
+    """Build the method with a name of `NAMES`; settings as in `make_all`."""
+    return make_all((name,), heights, **settings)[name]
+
+
+def make_all(
+    names: Sequence[str],
+    heights: HeightField,
+    *,
+    progress: Progress | None = None,
+    build: Build | None = None,
+    **settings: Any,
+) -> dict[str, Method]:
+    """Build methods by name, for one patch, with shared tables.
+
+    Parameters
+    ----------
+    names : names of `NAMES`.
+    heights : the patch, which tiles the plane.
     progress : called as progress(done, total, text) while tables are built.
     build : function to call instead of `DiffractionTable.build`, for instance with a cache.
+    settings : fields of `MethodSettings`.
 
     Raises
     ------
@@ -88,56 +105,82 @@ def make_all(
     for name in names:
         if name not in NAMES:
             raise DiffractionError(f"method='{name}' is unknown; choose one of {', '.join(NAMES)}")
-    trapezoid_rule(wavelength_range, step)
-    if period is not None:
-        check_period(period)
-    width = resolved_width(coherence_width, [heights])
-    common: dict[str, Any] = {
-        "coherence_width": width, "tolerance": tolerance, "height_scale_max": 1.0,
-        "wavelength_range": wavelength_range, "progress": progress, "second_order": False,
-    }  # fmt: skip
+    common = MethodSettings(**settings)
+    width = resolved_width(common.coherence_width, [heights])
 
     @functools.cache  # methods share tables
     def table(**changes: Any) -> DiffractionTable:
-        return (build or DiffractionTable.build)(heights, **(common | changes))
+        arguments = {
+            "coherence_width": width, "tolerance": common.tolerance, "height_scale_max": 1.0,
+            "wavelength_range": common.wavelength_range, "progress": progress,
+            "second_order": False, **changes,
+        }  # fmt: skip
+        return (build or DiffractionTable.build)(heights, **arguments)
 
-    def spectral(name: str) -> FullSpectrum:
-        powers = table(coherence=coherence or "ensemble")
-        return FullSpectrum(name, powers, wavelength_range, step)
+    return {name: _MAKERS[name](_Patch(heights, width, common, table), name) for name in names}
 
-    def flss(name: str) -> FullSpectrum:
-        taylor = table(coherence=coherence or "patch", basis="taylor", terms=terms, taps=taps)
-        return FullSpectrum(name, taylor, wavelength_range, step)
 
-    def nmm(name: str) -> OrdersOnly:
-        periods = _periods(heights, name, period)
-        return OrdersOnly(flss("flss"), periods, weights=nmm_weights, specular=specular, name=name)
+class _Patch(NamedTuple):
+    """Patch for which methods are built: heights, coherence width (µm), settings and tables."""
 
-    def pq(name: str) -> Repeated:
-        x, y = (max(2, round(width / extent)) for extent in heights.extent)
-        widest = max(heights.extent)  # coherence width of the table, which `Repeated` does not use
-        step_x, step_y = (0.5 * math.pi * widest / extent for extent in heights.extent)
-        most = max(SINC_TAPS, *taps_for((step_x, step_y), tolerance * TAPS_SHARE, True))
-        copies = table(
-            coherence="patch", basis="taylor", terms=terms, coherence_width=widest, taps=most
-        )
-        return Repeated(
-            copies, repeats or (x, y), interpolation="sinc" if name == "pq-sinc" else "linear",
-            taps=SINC_TAPS, wavelength_range=wavelength_range, step=step, name=name,
-        )  # fmt: skip
+    heights: HeightField
+    width: float
+    settings: MethodSettings
+    table: Build
 
-    makers: dict[str, Callable[[str], Method]] = {
-        "spectral": spectral,
-        "flss": flss,
-        "nmm": nmm,
-        "pq": pq,
-        "pq-sinc": pq,
-        "rainbow": lambda name: Rainbow(
-            required_period(heights, name, period), coherence_width=width,
-            wavelength_range=wavelength_range, name=name,
-        ),
-    }  # fmt: skip
-    return {name: makers[name](name) for name in names}
+
+def _spectral(patch: _Patch, name: str) -> FullSpectrum:
+    settings = patch.settings
+    powers = patch.table(coherence=settings.coherence or "ensemble")
+    return FullSpectrum(name, powers, settings.wavelength_range, settings.step)
+
+
+def _flss(patch: _Patch, name: str) -> FullSpectrum:
+    settings = patch.settings
+    taylor = patch.table(
+        coherence=settings.coherence or "patch", basis="taylor", terms=settings.terms,
+        taps=settings.taps,
+    )  # fmt: skip
+    return FullSpectrum(name, taylor, settings.wavelength_range, settings.step)
+
+
+def _nmm(patch: _Patch, name: str) -> OrdersOnly:
+    settings = patch.settings
+    return OrdersOnly(
+        _flss(patch, "flss"), _periods(patch.heights, name, settings.period),
+        weights=settings.nmm_weights, specular=settings.specular, name=name,
+    )  # fmt: skip
+
+
+def _pq(patch: _Patch, name: str) -> Repeated:
+    settings, extent = patch.settings, patch.heights.extent
+    x, y = (max(2, round(patch.width / length)) for length in extent)
+    widest = max(extent)  # coherence width of the table, which `Repeated` does not use
+    step_x, step_y = (0.5 * math.pi * widest / length for length in extent)
+    most = max(SINC_TAPS, *taps_for((step_x, step_y), settings.tolerance * TAPS_SHARE, True))
+    copies = patch.table(
+        coherence="patch", basis="taylor", terms=settings.terms, coherence_width=widest, taps=most
+    )
+    return Repeated(
+        copies, settings.repeats or (x, y), taps=SINC_TAPS, name=name, step=settings.step,
+        interpolation="sinc" if name == "pq-sinc" else "linear",
+        wavelength_range=settings.wavelength_range,
+    )  # fmt: skip
+
+
+def _rainbow(patch: _Patch, name: str) -> Rainbow:
+    settings = patch.settings
+    period = required_period(patch.heights, name, settings.period)
+    return Rainbow(
+        period, coherence_width=patch.width, wavelength_range=settings.wavelength_range, name=name
+    )
+
+
+_MAKERS: dict[str, Callable[[_Patch, str], Method]] = {
+    "spectral": _spectral, "flss": _flss, "nmm": _nmm, "pq": _pq, "pq-sinc": _pq,
+    "rainbow": _rainbow,
+}  # fmt: skip
+NAMES = tuple(_MAKERS)
 
 
 def _periods(

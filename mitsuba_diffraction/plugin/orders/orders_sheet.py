@@ -22,8 +22,8 @@ from ..types import (
     Vector2f,
     Vector3f,
 )
-from .bsdf import DiffractionOrders
-from .parameters import Parameters, read_parameters
+from .diffraction_orders import DiffractionOrders
+from .grating_parameters import Parameters, read_parameters
 
 
 class OrdersSheet(DiffractionOrders):

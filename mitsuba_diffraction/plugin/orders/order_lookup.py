@@ -9,6 +9,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...optics.coat import transmittances
 from ...optics.orders import (
     cell_wavelengths,
     order_cell,
@@ -17,12 +18,11 @@ from ...optics.orders import (
 )
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners, least_c
-from ..layers import transmittances
 from ..memory import index_between, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
-_LEAST = 1e-7
+_MIN_DIVISOR = 1e-7
 #: Half floats round: sums are raised so that no order is left out where one is drawn.
 _RAISED = 1.0 + 2.0**-10
 
@@ -115,7 +115,7 @@ class OrderLookup:
         vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
         x, y = (incident.x * (-1.0 / self.index), incident.y * (1.0 / self.index))
         inverse = self._period * dr.rcp(wavelength)
-        place = order_cell(x, y, inverse, self._last, _LEAST)
+        place = order_cell(x, y, inverse, self._last, _MIN_DIVISOR)
         band, channel, is_a = place.band, place.channel, place.kind_a
         places = [
             smooth_coordinate(place.t), smooth_coordinate(place.r),

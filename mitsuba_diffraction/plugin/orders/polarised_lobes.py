@@ -16,19 +16,21 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...optics.arithmetic import squared
+from ...optics.boundary import SAME_DIRECTION, Jones
+from ...optics.coat import refracted, transmittances
+from ...optics.fresnel import amplitudes
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import matrices
 from ...tables.orders.polarised import ODD
-from ..boundary import LEVEL, Jones, mueller, turn, turned
+from ..boundary import mueller, turn, turned
 from ..directions import Pair
-from ..fresnel import amplitudes, squared
-from ..layers import refracted, transmittances
 from ..memory import read, read_record, upload
 from ..types import Context, Float, Mask, Spectrum, Vector3f
 from .lobes import Lit, SpectralLobes
-from .lookup import OrderLookup, Row
+from .order_lookup import OrderLookup, Row
 
-_LEAST, _DARK = 1e-12, 1e-30
+_MIN_DIVISOR, _MIN_POWER = 1e-12, 1e-30
 
 
 class Wave(NamedTuple):
@@ -70,7 +72,7 @@ class PolarisedLookup(OrderLookup):
         share = mi.Float(1.0)
         if self.coated:
             within = self._between(row, q, 0, active)
-            share = dr.minimum(elements[0] * dr.rcp(dr.maximum(within, _LEAST)), 1.0)
+            share = dr.minimum(elements[0] * dr.rcp(dr.maximum(within, _MIN_DIVISOR)), 1.0)
         factors = [y if odd else 1.0 for odd in ODD.ravel().tolist()]
         return Wave(_nearest([x * f for x, f in zip(elements, factors, strict=True)]), share)
 
@@ -97,7 +99,7 @@ class PolarisedLobes(SpectralLobes):
                 power = dr.maximum(efficiency - face, 0.0) * lobe * wave.share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
-                root = dr.sqrt(dr.maximum(power, _DARK))  # has a derivative
+                root = dr.sqrt(dr.maximum(power, _MIN_POWER))  # has a derivative
                 jones.append(tuple(entry * root for entry in wave.jones))
             total += path.diffracted(jones)
         if self.lookup.coated:
@@ -128,7 +130,7 @@ class _Path:
     def mirrored(self, powers: list[Float]) -> Spectrum:
         """Return the Mueller matrices of the coat's face, of mean reflected powers."""
         r_s, r_p = amplitudes(self._cosine, 1.0 - dr.square(self._cosine), self._index)
-        inverse = dr.rsqrt(dr.maximum(0.5 * (dr.square(r_s) + dr.square(r_p)), _LEAST))
+        inverse = dr.rsqrt(dr.maximum(0.5 * (dr.square(r_s) + dr.square(r_p)), _MIN_DIVISOR))
         roots = [dr.sqrt(power) * inverse for power in powers]
         zero = mi.Float(0.0)
         s = _level(self._ends[0])
@@ -149,9 +151,9 @@ class _Path:
     def _passage(self, outside: Vector3f, enters: bool) -> Jones:
         """Return the Jones matrix of the coat's face between the axes outside and inside."""
         sign = -1.0 if enters else 1.0
-        inside = sign * refracted(sign * outside, mi.Float(self._index))
+        inside = sign * mi.Vector3f(*refracted(sign * outside, mi.Float(self._index)))
         powers = transmittances(dr.abs(outside.z), mi.Float(self._index))
-        inverse = dr.rcp(dr.maximum(0.5 * (powers[0] + powers[1]), _LEAST))
+        inverse = dr.rcp(dr.maximum(0.5 * (powers[0] + powers[1]), _MIN_DIVISOR))
         through_s, through_p = (dr.sqrt(power * inverse) for power in powers)
         s, zero = _level(outside), mi.Float(0.0)
         first, last = (outside, inside) if enters else (inside, outside)
@@ -165,15 +167,15 @@ class _Path:
 def _across(axis: Vector3f, direction: Vector3f) -> Vector3f:
     """Return a unit vector, made perpendicular to a direction."""
     across = dr.fma(direction, -dr.dot(axis, direction), axis)
-    return across * dr.rsqrt(dr.maximum(dr.squared_norm(across), _LEAST))
+    return across * dr.rsqrt(dr.maximum(dr.squared_norm(across), _MIN_DIVISOR))
 
 
 def _level(direction: Vector3f) -> Vector3f:
     """Return s = ẑ×d/|ẑ×d|, y along the normal."""
     square = dr.square(direction.x) + dr.square(direction.y)
-    inverse = dr.rsqrt(dr.maximum(square, LEVEL))
+    inverse = dr.rsqrt(dr.maximum(square, SAME_DIRECTION))
     level = mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)
-    return dr.select(square > LEVEL, level, mi.Vector3f(0.0, 1.0, 0.0))
+    return dr.select(square > SAME_DIRECTION, level, mi.Vector3f(0.0, 1.0, 0.0))
 
 
 def _product(a: Jones, b: Jones) -> Jones:
@@ -214,5 +216,5 @@ def _nearest(m: list[Float]) -> Jones:
         sum((columns[n][row] * largest[n] for n in range(1, 4)), columns[0][row] * largest[0])
         for row in range(4)
     ]
-    inverse = dr.rsqrt(dr.maximum(0.5 * sum(map(squared, vector)), _LEAST**2))
+    inverse = dr.rsqrt(dr.maximum(0.5 * sum(map(squared, vector)), _MIN_DIVISOR**2))
     return tuple(entry * inverse for entry in vector)

@@ -90,9 +90,9 @@ from ..types import (
     Vector2f,
     Vector3f,
 )
+from .grating_parameters import Parameters
 from .lobes import DaylightLobes, Lobes, SpectralLobes
-from .parameters import Parameters
-from .polarised import PolarisedLobes
+from .polarised_lobes import PolarisedLobes
 
 
 class DiffractionOrders(mi.BSDF):
