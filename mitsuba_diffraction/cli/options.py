@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,9 @@ Subparsers = argparse._SubParsersAction
 
 #: Default of --wavelength-range and of --step, nm.
 WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
+
+#: Numbers of an option that accepts ranges, at most.
+_MOST_NUMBERS = 10_000
 
 #: `--json` without a file, which only `info` has: printed instead of the text.
 STDOUT = Path("-")
@@ -110,6 +114,26 @@ def _number(
         raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(text)}")
 
     return number
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
+    try:
+        return tuple(itertools.chain.from_iterable(map(_numbers_of, text.split(","))))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
+            f"{_MOST_NUMBERS} of them), got {quoted(text)}"
+        ) from error
+
+
+def _numbers_of(text: str) -> list[float]:
+    if ":" not in text:
+        return [float(text)]
+    first, last, step = (float(part) for part in text.split(":"))
+    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
+        raise ValueError(text)
+    return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
 
 def add_command(

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import itertools
 from pathlib import Path
 
-from ..errors import quoted
 from . import options
 from .options import number_between
 from .report import check_outputs, save_report
-
-#: Values of an option at most.
-_MOST = 10_000
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -36,17 +31,20 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the light", "Values, or FIRST:LAST:STEP, several joined by commas."
     )
     group.add_argument(
-        "--theta", metavar="DEG", type=_values, default=(0.0,),
+        "--theta", metavar="DEG", type=options.numbers, default=(0.0,),
         help="angles of the light from the normal, -90 to 90; e.g. 30, or --theta=-85:85:5; "
         "default: 0",
     )  # fmt: skip
     group.add_argument(
-        "--phi", metavar="DEG", type=_values, default=(0.0,),
+        "--phi", metavar="DEG", type=options.numbers, default=(0.0,),
         help="azimuths of the light, from x, across the grooves, towards y; default: 0",
     )  # fmt: skip
     chosen = group.add_mutually_exclusive_group()
     chosen.add_argument(
-        "--wavelength", metavar="NM", type=_values, help="wavelengths in vacuum, e.g. 400:700:20"
+        "--wavelength",
+        metavar="NM",
+        type=options.numbers,
+        help="wavelengths in vacuum, e.g. 400:700:20",
     )
     chosen.add_argument(
         "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
@@ -83,23 +81,3 @@ def run(args: argparse.Namespace) -> int:
     )
     save_report(args, {"file": str(output), "columns": listing.columns, "lines": rows.tolist()})
     return 0
-
-
-def _values(text: str) -> tuple[float, ...]:
-    """Return the numbers of an option: values and FIRST:LAST:STEP, joined by commas."""
-    try:
-        return tuple(itertools.chain.from_iterable(map(_some, text.split(","))))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
-            f"{_MOST} of them), got {quoted(text)}"
-        ) from error
-
-
-def _some(text: str) -> list[float]:
-    if ":" not in text:
-        return [float(text)]
-    first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < _MOST):
-        raise ValueError(text)
-    return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]

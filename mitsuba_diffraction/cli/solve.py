@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "thin", "wavelength_range", "tolerance", "solver",
-    "resolution", "polarised", "accept", "jobs", "workers", "scheduler",
+    "resolution", "polarised", "accept", "theta", "phi", "step", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -92,6 +93,19 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group.add_argument(
         "--polarised", action="store_true", default=None,
         help="with Mueller matrices, for polarised variants; about 20 times as large",
+    )  # fmt: skip
+    group.add_argument(
+        "--theta", metavar="DEG", type=options.numbers,
+        help="solve light from these directions alone, angles from the normal within the "
+        "superstrate, e.g. 63.4, or --theta=-20:20:5: for an echelle in its mount",
+    )  # fmt: skip
+    group.add_argument(
+        "--phi", metavar="DEG", type=options.numbers,
+        help="with --theta: azimuths from x, across the grooves, towards y; default: 0",
+    )  # fmt: skip
+    group.add_argument(
+        "--step", metavar="NM", type=number_between(0.01, 1000),
+        help="with --theta: between wavelengths; default: 5",
     )  # fmt: skip
     group.add_argument(
         "--import", dest="imports", action="store_true",
@@ -186,9 +200,18 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     """Solve a recipe on the requested processes; what is done lies beside the output until then."""
+    from ..solve.accuracy import WORST
+    from ..solve.beam import solve_beam
     from ..solve.jobs import Jobs
-    from ..solve.orders import WORST, solve_orders
+    from ..solve.orders import solve_orders
 
+    solve: Callable[..., OrderTable] = functools.partial(solve_orders, thin=recipe.thin)
+    if args.theta is not None:
+        _check_beam(recipe, args)
+        light = {"theta": args.theta, "phi": args.phi or 0.0, "step": args.step or 5.0}
+        solve = functools.partial(solve_beam, **light)
+    elif args.phi is not None or args.step is not None:
+        args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
     say(
         f"tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} in "
@@ -204,17 +227,25 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
                 f"'{folder}'"
             )
 
-        table = solve_orders(
+        table = solve(
             recipe.profile,
             recipe.material,
             superstrate=recipe.superstrate,
-            thin=recipe.thin,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
         )
     shutil.rmtree(folder, ignore_errors=True)
     return table
+
+
+def _check_beam(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
+    """Refuse thin sheets and matrices with `--theta`, with a usage error."""
+    for name, used in (("thin", recipe.thin), ("polarised", recipe.settings.polarised)):
+        if used:
+            args.parser.error(
+                f"argument --theta: not allowed with --{name}: reflected shares alone"
+            )
 
 
 @contextlib.contextmanager

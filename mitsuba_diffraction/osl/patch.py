@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.blend import NODES_PER_OCTAVE
+from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ..optics.boundary import Model
+from ..optics.coat import pair_power
+from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
+from ..optics.programs import Program
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
 from ..tables.powers import order_0_power
@@ -58,13 +62,15 @@ class EnergyTexture(NamedTuple):
 
     Attributes
     ----------
-    pixels : (polar + 1, azimuthal + 1, 4) float32 on `FINE`, the first column repeated at the end;
-        channels are the scales of the two height scales `nodes`, and two of 0.
+    pixels : (wavelengths · (polar + 1), azimuthal + 1, 4) float32 on `FINE`, the first column
+        repeated at the end; channels are the scales of the height scales `nodes`, and two of 1.
     nodes : the surface's height scale, and the largest of its table.
+    wavelengths : (n,) nm, evenly in their logarithm.
     """
 
     pixels: NDArray[np.float32]
     nodes: tuple[float, float]
+    wavelengths: NDArray[np.float64]
 
     @property
     def constants(self) -> dict[str, float | int]:
@@ -75,18 +81,25 @@ class EnergyTexture(NamedTuple):
             "ENERGY_SHARE": SHARE,
             "ENERGY_HEIGHT": self.nodes[0],
             "ENERGY_MOST": self.nodes[1],
+            "ENERGY_PAGES": len(self.wavelengths),
+            "ENERGY_FIRST": float(np.log(self.wavelengths[0])),
+            "ENERGY_LAST": float(np.log(self.wavelengths[-1])),
         }
 
 
 def energy_texture(described: Surface) -> EnergyTexture | None:
     """Tabulate the scales of energy at two height scales; None where all are 1."""
     nodes = described.height_scale.number, float(described.patch.height_scale_max)
-    pages = [described.energy_scale(node) for node in nodes]
-    if all(page is None for page in pages):
+    tables = [described.energy_scale(node) for node in nodes]
+    if not (known := [table for table in tables if table is not None]):
         return None
-    values = [FINE.ones if page is None else page for page in pages]
-    scales = np.stack([np.pad(page, [(0, 0), (0, 1)], mode="wrap") for page in values], axis=-1)
-    return EnergyTexture(np.pad(scales, [(0, 0), (0, 0), (0, 2)]).astype(np.float32), nodes)
+    lam = known[0].wavelengths
+    values = np.ones((len(lam), FINE.polar + 1, FINE.azimuthal + 1, 4), np.float32)
+    for channel, table in enumerate(tables):
+        if table is not None:
+            pages = np.stack([table.page(float(wavelength)) for wavelength in lam])
+            values[..., channel] = np.pad(pages, [(0, 0), (0, 0), (0, 1)], mode="wrap")
+    return EnergyTexture(values.reshape(-1, *values.shape[2:]), nodes, lam)
 
 
 def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:
@@ -155,14 +168,14 @@ def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, f
 
 
 def patch_constants(
-    table: DiffractionTable, textures: PatchTextures, stretch: float
+    table: DiffractionTable, textures: PatchTextures, statistic: RoughnessTable, stretch: float
 ) -> dict[str, float | int]:
     """Return the constants of `shaders/patch.osl`; lengths in µm.
 
+    statistic : of the heights, see `boundary.Model`.
     stretch : factor on lengths in the patch's plane.
     """
     rows, columns = table.grid.shape
-    roughness = table.roughness
     return {
         "DRAWS": DRAWS,
         "ORDERS": rows * columns,
@@ -179,12 +192,34 @@ def patch_constants(
         "BANDED": BANDED,
         "DRAWS_WIDTH": DRAWS_WIDTH,
         "DRAWS_ROWS": textures.rows,
-        "FIRST_OCTAVE": roughness.first,
+        "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
-        "ROUGHNESS_NODES": len(roughness.nodes),
+        "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
     }
+
+
+def patch_formulas(model: Model | None) -> str:
+    """Return the functions of `optics` that `shaders/patch.osl` calls.
+
+    model : of the boundary; None of a perfect reflector.
+
+    Raises a DiffractionError if the model's formula cannot be written in OSL.
+    """
+    program = Program(OSL)
+    jones = None if model is None else model.jones
+    program.add(
+        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
+    )
+    flat = reflectance if model is not None else _everything
+    program.add(flat, "float", "complex", name="flat_reflectance")
+    return program.text
+
+
+def _everything(cosine: Any, index: Any) -> float:
+    """Return the reflectance of a perfect reflector."""
+    return 1.0
 
 
 def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:

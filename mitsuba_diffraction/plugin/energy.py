@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import warn
 from ..optics import fresnel
-from ..optics.colour import RGB_WAVELENGTHS, response
+from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
 from ..tables.directional import FINE, LAST_ANGLE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, SmallSlope
+from .boundary import Boundary
 from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
@@ -83,7 +83,7 @@ class EnergyModel:
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self._material = conserving, boundary.material
         self._warned, self._coat = False, coat
-        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
+        self._filmed = isinstance(self._material, UnderFilm) and boundary.model.has_second_order
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
@@ -146,8 +146,8 @@ class EnergyModel:
                 "orders are least certain there"
             )
 
-    def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
+    def scale(self, height_scale: float) -> DirectionalTable | None:
+        """Energy scale s on `FINE`; None where all are 1."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
@@ -155,9 +155,7 @@ class EnergyModel:
         if scales is None:
             return None
         scale = between([scale.on(FINE) for scale in scales], nodes, height_scale)
-        wavelengths = scale.wavelengths * self._scales.centre
-        weights = response(wavelengths)[:, 1] * wavelengths
-        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+        return DirectionalTable(scale.wavelengths * self._scales.centre, scale.values)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
         """Return the table that `reflected` looks up, for shaders."""

@@ -20,8 +20,8 @@ from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
 COUNTS = Counts(12, 8, 4)
-#: Nodes of the table of one direction: a curve over wavelength, for each order.
-OF_ONE_DIRECTION = Counts(2, 32, 1)
+#: Nodes along ρ of the table of one direction: a curve over wavelength, for each order.
+_MOST_RHO, _LEAST_RHO = 32, 4
 #: Distance from grazing, in p, within which rounding decides whether an order propagates.
 _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
@@ -85,8 +85,19 @@ def read_orders(
         If the file cannot be read, or its grid has holes; if it has orders that do not propagate,
         lacks one that does, or has efficiencies that are negative or sum to above 1.001.
     """
-    shown = repr(os.fspath(path))
-    grid = read_efficiencies(path)
+    header: dict[str, Any] = {
+        "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
+    }  # fmt: skip
+    return table_of(read_efficiencies(path), period, superstrate, repr(os.fspath(path)), header)
+
+
+def table_of(
+    grid: Efficiencies, period: float, superstrate: float, shown: str, header: dict[str, Any]
+) -> OrderTable:
+    """Return the table of a grid of efficiencies; its errors are added to the header.
+
+    shown : source of the grid, for messages. Other arguments and errors as for `read_orders`.
+    """
     wavelengths = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
     thin = grid.values.shape[-1] == 4
     check_outline(period, wavelengths, superstrate, thin)
@@ -106,11 +117,8 @@ def read_orders(
         )
     counts = Counts(*COUNTS[:2], 1 if in_plane or len(grid.wavelengths) == 1 else COUNTS.w)
     if len(np.unique(samples.s)) == 1:
-        counts = OF_ONE_DIRECTION
+        counts = _of_one_direction(len(grid.wavelengths), last)
     bands = tuple(_band(k, counts, samples) for k in range(last + 1))
-    header: dict[str, Any] = {
-        "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
-    }  # fmt: skip
     table = OrderTable(period, wavelengths, bands, superstrate, header, thin, S_AND_P)
     header |= _errors(table, samples)
     if not incomplete and header["reciprocity_error"] > _ONE_WAY:
@@ -120,6 +128,12 @@ def read_orders(
             "of cosines; check that, and the signs of the orders and of phi"
         )
     return table
+
+
+def _of_one_direction(wavelengths: int, last: int) -> Counts:
+    """Return nodes for a curve of so many wavelengths, some twice as many in all bands."""
+    in_band = 4 * wavelengths // (last + 1)
+    return Counts(2, min(max(in_band, _LEAST_RHO), _MOST_RHO), 1)
 
 
 def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:

@@ -15,6 +15,7 @@ from ..heights.lengths import count_between, number_between
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import MOST_NODES, Counts, check_outline
+from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import FEWEST, MOST, Line, Place, count_for, lines
@@ -36,8 +37,6 @@ from .stations import Complex, Grating, Real, reversed_light
 WAVELENGTHS = (380.0, 780.0)
 #: Mean error of interpolation between nodes, of the light in all orders but 0.
 TOLERANCE = 0.01
-#: The error that 95 % of directions and wavelengths keep, in tolerances.
-WORST = 4.0
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
 REFINEMENTS, _FINER = 2, 1.4
 #: Times that the resolution is raised, if solutions at nodes have light from nothing.
@@ -45,8 +44,6 @@ _RAISED = 3
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
-#: Random directions and wavelengths at which the error is measured.
-SAMPLES = 128
 
 
 class Estimate(NamedTuple):
@@ -56,27 +53,6 @@ class Estimate(NamedTuple):
     stations: int
     solutions: int
     seconds: float
-
-
-class Measured(NamedTuple):
-    """Error of interpolation, over random directions and wavelengths.
-
-    mean : of the light in all orders but 0, which the table has too much or too little in an order.
-    most : the same of a direction, which 95 % of them keep.
-    bands : of each band, from k = 0, as a share of all light.
-    polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the same light (½‖M‖ is the
-        efficiency); None without them.
-    """
-
-    mean: float
-    most: float
-    bands: Real
-    polarised: float | None
-
-    def within(self, tolerance: float) -> bool:
-        """Whether the table keeps a tolerance on average, and `WORST` of it in 95 %."""
-        mean = max(self.mean, self.polarised or 0.0)
-        return mean <= tolerance and self.most <= WORST * tolerance
 
 
 @dataclass(frozen=True)
@@ -142,7 +118,7 @@ def solve_orders(
             "a recipe is solved by 'mitsuba-diffraction solve'"
         )
     how, work = settings or Settings(), jobs or Jobs()
-    tell = announce or _silent
+    tell = announce or silent
     check_outline(profile.period, how.wavelengths, superstrate, thin)
     substance = material_of(material, how.wavelengths)
     if thin:
@@ -217,9 +193,9 @@ def _solved_at_nodes(
     """Solve all nodes, at a higher resolution if solutions have light from nothing."""
     places = [place for band in counts for place in _places(band, counts[band])]
     for _ in range(_RAISED):
-        _announce(announce, "solving", problem, jobs, places)
+        announce_stage(announce, "solving", problem, jobs, places)
         solved = jobs.amplitudes(problem, places, "solving orders")
-        excess = max(float(_powers(values).sum(axis=2).max()) for values in solved.values())
+        excess = max(float(powers(values).sum(axis=2).max()) for values in solved.values())
         if excess <= MOST_EXCESS:
             return problem, solved
         problem = finer_problem(problem)
@@ -239,45 +215,6 @@ def _refined_counts(counts: Mapping[int, Counts], missed: Real) -> dict[int, Cou
     }
 
 
-def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
-    """Compare a table with solutions at random directions and wavelengths.
-
-    Directions are those of diffuse light within the superstrate, wavelengths even over the table's.
-    """
-    x, y, lam = _diffuse(SAMPLES, table.wavelengths)
-    cell = cells.to_cell(x, y, lam, table.optical_period)
-    w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
-    places = [
-        Place(int(band), int(kind), float(tau), float(rho), (float(at),))
-        for band, kind, tau, rho, at in zip(
-            cell.band, cell.kind, cell.tau, cell.rho, w, strict=True
-        )
-    ]
-    solved = jobs.amplitudes(problem, places, "measuring the error")
-    missed, light, turned = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
-    for n, place in enumerate(places):
-        j = int(cell.channel[n])
-        side, count = n % table.sides, int(cell.channels[n])  # from above and below by turns
-        truth = _powers(solved[place])[0, side * count + j].mean(axis=-1)  # (ports,)
-        orders = j - np.arange(count)
-        of = functools.partial(table.efficiency, x[n], y[n], lam[n], orders, from_below=side == 1)
-        got = np.concatenate([of(transmitted=other != side) for other in range(table.sides)])
-        # where order 0 is alone, it is the colour
-        coloured = np.tile(orders != 0 if count > 1 else True, table.sides)
-        missed[n], light[n] = np.abs(got - truth)[coloured].sum(), truth[coloured].sum()
-        if table.polarised:
-            matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
-            error = matrices - mueller_of(solved[place])[0, j]
-            turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
-    floor = 0.05 * light.mean()  # directions with hardly any light in orders
-    return Measured(
-        float(missed.sum() / light.sum()),
-        float(np.quantile(missed / np.maximum(light, floor), 0.95)),
-        np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
-        float(turned / light.sum()) if table.polarised else None,
-    )
-
-
 def _counts(
     problem: Problem,
     jobs: Jobs,
@@ -289,7 +226,7 @@ def _counts(
     most = Counts(*MOST[:2], 1 if problem.grating.is_perfect else MOST[2])
     drawn = {band: list(lines(band, most)) for band in bands}
     places = [place for of_band in drawn.values() for line in of_band for place in line.places]
-    _announce(announce, "choosing nodes", problem, jobs, places)
+    announce_stage(announce, "choosing nodes", problem, jobs, places)
     solved = jobs.amplitudes(problem, places, "choosing nodes")
     values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
     # three variables share the tolerance; rarely seen bands may miss more
@@ -308,18 +245,10 @@ def _band_shares(grating: Grating, bands: int) -> Real:
     If a band of share p misses 1/√(n p) of a tolerance, all n bands together miss the tolerance at
     most (Cauchy and Schwarz).
     """
-    x, y, lam = _diffuse(4096, grating.wavelengths)
+    x, y, lam = diffuse_light(4096, grating.wavelengths)
     band = cells.to_cell(x, y, lam, grating.optical_period).band
     counted = np.bincount(np.minimum(band, bands - 1), minlength=bands) / len(band)
     return np.maximum(counted, 1.0 / (16 * bands))
-
-
-def _diffuse(count: int, wavelengths: tuple[float, float]) -> tuple[Real, Real, Real]:
-    """Return x, y of random directions of diffuse light, and even random wavelengths, nm."""
-    rng = np.random.default_rng(0)
-    radius, azimuth = np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
-    lam = rng.uniform(*wavelengths, count)
-    return radius * np.cos(azimuth), radius * np.sin(azimuth), lam
 
 
 def _count(
@@ -351,7 +280,7 @@ def _count(
 
 def _unpolarised(place: Place, amplitudes: Complex) -> Real:
     """Return unpolarised efficiencies (w, j, q, 1)."""
-    return _powers(amplitudes).mean(axis=-1, keepdims=True)
+    return powers(amplitudes).mean(axis=-1, keepdims=True)
 
 
 def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
@@ -380,7 +309,7 @@ def _band(
     kinds, matrices = [], []
     for kind in (cells.A, cells.B) if band else (cells.A,):
         at_nodes = functools.partial(_at_nodes, band, kind, counts, solved, sides)
-        values = at_nodes(_powers)
+        values = at_nodes(powers)
         total = values.sum(axis=-2, keepdims=True)
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
@@ -388,14 +317,9 @@ def _band(
     return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 
-def _powers(amplitudes: Complex) -> Real:
-    """Return (w, j, q, 2) of (w, j, 2, q, 2): sums over the leaving light's polarisations."""
-    return np.asarray((np.abs(amplitudes) ** 2).sum(axis=-1).swapaxes(2, 3))
-
-
 def _limited(amplitudes: Complex) -> Complex:
     """Scale amplitudes (w, j, 2, q, 2) whose powers sum to more than 1."""
-    total = _powers(amplitudes).sum(axis=2)
+    total = powers(amplitudes).sum(axis=2)
     return amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None]
 
 
@@ -431,7 +355,7 @@ def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
     return reciprocity_error(solved, problem.grating.sides)
 
 
-def _announce(
+def announce_stage(
     announce: Callable[[Estimate], None],
     stage: str,
     problem: Problem,
@@ -439,7 +363,7 @@ def _announce(
     places: Sequence[Place],
 ) -> None:
     """Time the stage's middle station and announce the stage."""
-    if announce is _silent:
+    if announce is silent:
         return
     middle = places[len(places) // 2]
     seconds = jobs.seconds(problem, middle) / len(middle.w)
@@ -447,5 +371,5 @@ def _announce(
     announce(Estimate(stage, len(places), solutions, seconds * solutions))
 
 
-def _silent(estimate: Estimate) -> None:
+def silent(estimate: Estimate) -> None:
     """Announce nothing."""

@@ -8,20 +8,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics.colour import RGB_WAVELENGTHS
+from ...optics.boundary import MODELS
+from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Material, Surface
-from ...tables.directional import FINE
+from ...tables.directional import FINE, DirectionalTable
 from ...tables.store import cached_colours
 from .lobes import colour_power, pack_lobes
 from .maps import evaluated
 from .packing import (
     pack_beneath,
+    pack_boundary,
     pack_colours,
     pack_conductor,
     pack_energy,
     pack_powers,
-    pack_roughness,
     pack_second_order,
 )
 from .texels import Packed, Uniform
@@ -63,8 +64,8 @@ class Modelled:
             uniforms["coat"] = self._coat
             uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
         packed = Packed((), uniforms, definitions)
-        if described.model == "small_slope":
-            packed |= pack_roughness(described.patch.roughness)
+        if described.model != "kirchhoff" or described.coat is not None:
+            packed |= pack_boundary(MODELS[described.model], described.patch.roughness)
         if (second := described.second_order) is not None:
             packed |= pack_second_order(second.index, second.ratios)
         return packed | _reflectance(described.material)
@@ -78,8 +79,7 @@ class Modelled:
         pages = [energy.scale(scale) for scale in scales]
         if all(page is None for page in pages):
             return beneath
-        ones = FINE.ones
-        return beneath | pack_energy([ones if page is None else page for page in pages])
+        return beneath | pack_energy([FINE.ones if s is None else luminous_mean(s) for s in pages])
 
     def tables(self, method: str, *, floats: bool = False) -> Packed:
         """Pack the table for `fast` or `exact`.
@@ -95,6 +95,12 @@ class Modelled:
         colours = cached_colours(self.described.patch)
         factor = self.described.height_scale.number * self._coat
         return pack_lobes(lambda edges: colour_power(colours, edges, factor), colours.sigma)
+
+
+def luminous_mean(table: DirectionalTable) -> NDArray[np.float32]:
+    """Average a table over wavelengths as bright as they are, (polar + 1, azimuthal)."""
+    weights = response(table.wavelengths)[:, 1] * table.wavelengths
+    return np.average(table.values, axis=0, weights=weights).astype(np.float32)
 
 
 def _reflectance(material: Material | None) -> Packed:

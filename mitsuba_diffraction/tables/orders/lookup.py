@@ -79,7 +79,7 @@ def polarised_efficiency(
     stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
     if table.components == S_AND_P:
         return stored
-    turned = _turned(x, y)
+    turned = turned_axes(x, y)
     mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
     difference = half * turned.cosine
     conical = np.abs(turned.sine) > _IN_PLANE
@@ -118,7 +118,7 @@ def groove_efficiency(
     stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
     if table.components == GROOVES:
         return stored
-    turned = _turned(x, y)
+    turned = turned_axes(x, y)
     mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
     if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
         raise DiffractionError(
@@ -128,14 +128,14 @@ def groove_efficiency(
     return np.stack([mean + half * turned.cosine, mean - half * turned.cosine], axis=-1)
 
 
-class _Turned(NamedTuple):
+class TurnedAxes(NamedTuple):
     """Cosine and sine of 2ψ, with ψ from the table's axis e to that of s polarisation."""
 
     cosine: Array
     sine: Array
 
 
-def _turned(x: ArrayLike, y: ArrayLike) -> _Turned:
+def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
     """Return the angle between the axes of incident light by its mirror direction.
 
     With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
@@ -146,7 +146,7 @@ def _turned(x: ArrayLike, y: ArrayLike) -> _Turned:
     squared = along**2 + across**2
     level = squared < _IN_PLANE**2
     cosine = np.where(level, 1.0, along**2 - across**2) / np.where(level, 1.0, squared)
-    return _Turned(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
+    return TurnedAxes(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
 
 
 def _stored(
