@@ -220,12 +220,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
 from . import nesting
-from .boundary import Kirchhoff
+from .boundary import KIRCHHOFF, Boundary
 from .description import Energy, Nested, SecondOrder, Surface
 from .diffraction_parameters import read_parameters
-from .directions import Pair, vcavity
+from .directions import Pair
 from .energy import EnergyModel
 from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
 from .parameter_changes import ObjectValues, check_parameters
@@ -259,7 +260,7 @@ class Diffraction(DiffractingSurface):
         super().__init__(props, read.surface, read.reflectance)
         # self.fresnel is the flat surface with its layers, self.boundary the structure alone
         self.boundary, self.coat = read.boundary, read.coat
-        self.mirror = None if self.coat is None else Kirchhoff(self.coat)
+        self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
         self._second_order = read.second_order

@@ -65,11 +65,15 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
+from ...optics import through
+from ...optics.boundary import Geometry, Jones, geometry, power
+from ...optics.coat import transmittances
+from ...optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
+from ..boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
 from ..description import Surface
 from ..directions import Pair, PatchFrame, TablePoint
-from ..fresnel import Inside, squared
-from ..layers import CoatedPair, transmittances
+from ..fresnel import Inside
+from ..layers import CoatedPair
 from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
@@ -90,11 +94,6 @@ from .crossing import (
     Crossing,
     Sides,
     Turned,
-    crossing_axes,
-    first_order,
-    order_0,
-    out_of_sheet,
-    tangent_plane,
 )
 from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
@@ -124,10 +123,8 @@ class DiffractionDielectric(DiffractingSurface):
         super().__init__(props, read.surface, read.material)
         self.material, self.thin, self.boundary = read.material, read.thin, read.boundary
         inside = Inside(self.material, self.thin)
-        self.inner_boundary: Boundary = (
-            self.boundary.of(inside) if isinstance(self.boundary, SmallSlope) else Kirchhoff(inside)
-        )
-        self.mirror = Kirchhoff(self.material)
+        self.inner_boundary = self.boundary.of(inside)
+        self.mirror = Boundary(KIRCHHOFF, self.material)
         self._energy = None
         if read.surface.energy_conserving:
             self._energy = DielectricEnergy(
@@ -325,10 +322,10 @@ class DiffractionDielectric(DiffractingSurface):
         point, scale = crossing.place, self.scale_at(si, crossing.active)
         power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
         zeroth = dr.minimum(zeroth, power)  # speckle may be dark
-        axes = crossing_axes(-crossing.above, crossing.inside)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
-        others = self._factor(ctx, si, crossing, axes, self._matrices(si, crossing, axes))
-        flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
+        pair = geometry(crossing.above, crossing.inside)
+        others = self._factor(ctx, si, crossing, self._matrices(si, crossing, pair))
+        flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
         outside = mi.Float(self.area_factor * crossing.frame.area)
@@ -341,45 +338,40 @@ class DiffractionDielectric(DiffractingSurface):
             outside *= dr.select(down, *scales)
         return dr.select(crossing.active, value * outside, 0.0)
 
-    def _matrices(
-        self,
-        si: Interaction,
-        crossing: Crossing,
-        axes: tuple[Vector3f, Vector3f],
-    ) -> list[Jones]:
+    def _matrices(self, si: Interaction, crossing: Crossing, pair: Geometry) -> list[Jones]:
         """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
-        tangent = tangent_plane(crossing, axes)
-        if not isinstance(self.boundary, SmallSlope):
-            return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
-        first = first_order(crossing, axes, self.thin)
-        shares = self.boundary.shares(
-            crossing.place,
-            self.scale_at(si, crossing.active),
-            self.power.wavenumbers(si),
-            [crossing.n],
+        n, above, below = crossing.n, crossing.above, crossing.below
+        heights = self.boundary.heights(
+            crossing.place, self.scale_at(si, crossing.active), self.power.wavenumbers(si)
         )
-        blended = [
-            tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
-            for share in shares
-        ]
-        return [out_of_sheet(jones, crossing) for jones in blended] if self.thin else blended
+        # Beyond the critical angle light decays outside; from outside none arrives there
+        outside = outside_square(pair, n)
+        outside = outside if self.thin else mi.Complex2f(outside, 0.0)
+        formula = through.MODELS[self.boundary.model.name]
+        matrices = [formula(pair, above, crossing.inside, n, outside, each) for each in heights]
+        if not self.thin:
+            return matrices
+        return [out_of_sheet(jones, n, above.z, -below.z) for jones in matrices]
+
+    def _order_0(self, crossing: Crossing, pair: Geometry) -> Jones:
+        """Return the matrix of order 0."""
+        n, above = crossing.n, crossing.above.z
+        outer = -crossing.below.z if self.thin else dr.safe_sqrt(outside_square(pair, n))
+        ends = (flat_transmittances(cosine, n, self.thin) for cosine in (above, outer))
+        return order_0(pair, *ends)
 
     def _factor(
-        self,
-        ctx: Context,
-        si: Interaction,
-        crossing: Crossing,
-        axes: tuple[Vector3f, Vector3f],
-        matrices: list[Jones],
+        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
     ) -> Spectrum:
         """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
-            powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
+            powers = [power(jones) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
         # light that goes up is that which goes down, reversed: with other s, so other signs
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
         ends = -crossing.above, crossing.below
+        axes = polarisation_axes(-crossing.above, crossing.inside)
         light = tuple(
             dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
         )
