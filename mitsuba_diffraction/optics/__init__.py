@@ -7,10 +7,10 @@ symbols    numbers that record a formula's expressions
 programs   formulas written as functions of a shading language
 printer    text of such a function
 dialects   words of GLSL and OSL
-geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
+geometry   directions, wave numbers, the coherence window, the Kirchhoff factor, shadowing
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
-boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
-blend      share of small slope in an order, from the roughness at its scale
+boundary   boundary models: K, B, their blend, and the registry `MODELS`
+blend      roughness of the heights by scale, and weights of K and B
 second_order         second order of small slope as a factor on powers: its coefficients
 slope_ratios         second order of small slope: the heights' part
 second_order_change  change of a surface's colours by the second order, for "auto"

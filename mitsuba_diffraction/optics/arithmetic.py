@@ -66,12 +66,16 @@ class Arithmetic(Protocol):
 
 
 class _Arrays:
-    """Arithmetic of NumPy arrays."""
+    """Arithmetic of NumPy arrays, which all count as complex."""
 
     sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
     floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
     arcsin, power = np.arcsin, np.power
-    where, clip, is_complex = np.where, np.clip, staticmethod(np.iscomplexobj)
+    where, clip, expm1 = np.where, np.clip, np.expm1
+
+    @staticmethod
+    def is_complex(x: Number) -> bool:
+        return True  # roots of negative numbers then are what they are
 
     @staticmethod
     def reciprocal(x: Number) -> Number:
@@ -92,7 +96,7 @@ class _Plain:
     sqrt, exp, log2, sin, cos = math.sqrt, math.exp, math.log2, math.sin, math.cos
     floor, absolute, minimum, maximum = math.floor, abs, min, max
     arcsin, power = math.asin, pow
-    reciprocal, fma = _Arrays.reciprocal, _Arrays.fma
+    reciprocal, fma, expm1 = _Arrays.reciprocal, _Arrays.fma, math.expm1
     complex = complex
 
     @staticmethod
@@ -165,3 +169,17 @@ def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Resu
         return written
 
     return call
+
+
+@formula
+def one_minus_exp(x: Number) -> Number:
+    """Return 1 − exp(−x), x ≥ 0, without cancellation.
+
+    An arithmetic in double precision has `expm1`; without it, a series near 0 has an error of
+    x⁵/120.
+    """
+    xp = of(x)
+    if hasattr(xp, "expm1"):
+        return -xp.expm1(-x)
+    series = x * xp.fma(x, xp.fma(x, xp.fma(x, -1.0 / 24.0, 1.0 / 6.0), -0.5), 1.0)
+    return xp.where(x < 0.05, series, 1.0 - xp.exp(-x))

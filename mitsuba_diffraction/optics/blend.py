@@ -1,4 +1,4 @@
-"""Blend of Kirchhoff's matrix K and small slope's B: J = (1−s) K + s B (NumPy, float64).
+"""Blend of Kirchhoff's matrix K and small slope's B, J = (1−s) K + s B: roughness and weights.
 
 B is right at any angle for surfaces that are smooth against the wavelength. K is right for rough
 and gentle surfaces, where facets reflect. The share s of B depends on the roughness at the scales
@@ -30,9 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import boundary, fresnel
-from .boundary import Complex, Real
-from .fresnel import Index
+from .arithmetic import Number, formula, of, one_minus_exp
+
+Real = NDArray[np.float64]
 
 #: Frequencies within this part of an octave share a bin, at the mean frequency of their power.
 _BINS_PER_OCTAVE = 256
@@ -127,21 +127,28 @@ class RoughnessTable:
         return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
-def weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
-    """s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3), for any shapes that broadcast.
+@formula
+def kirchhoff_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
+    """Return 1 − s, the weight of Kirchhoff's matrix, eq. 9.
+
+    Not s: near the horizon K is so large beside B that the last digit of 1 − s counts.
 
     Parameters
     ----------
-    kappa : rad/µm.
+    kappa : κ, rad/µm.
     variance : σ_q², µm² (`ScaleRoughness.at`).
-    index : n + ik of the material over that of the medium above it; a film counts in R₀.
+    normal_reflectance : R₀, of a film with the film (`fresnel.normal_reflectance`).
     """
-    roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
-    return np.exp(-roughness * (0.5 * fresnel.reflectance(1.0, index) + roughness / 3))
+    return one_minus_exp(_exponent(kappa, variance, normal_reflectance))
 
 
-def jones(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
-    """(1−s) K + s B, (..., 2, 2); arguments as `boundary.small_slope`, s as `weight` (...)."""
-    share: NDArray[np.float64] = np.asarray(s, np.float64)[..., None, None]
-    tangent, gentle = boundary.kirchhoff(wi, wo, index), boundary.small_slope(wi, wo, index)
-    return np.asarray((1 - share) * tangent + share * gentle)
+@formula
+def small_slope_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
+    """Return s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3), eq. 9; arguments as for `kirchhoff_weight`."""
+    exponent = _exponent(kappa, variance, normal_reflectance)
+    return of(exponent).exp(-exponent)
+
+
+def _exponent(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
+    roughness = kappa * kappa * variance  # (κσ_q)²
+    return roughness * (0.5 * normal_reflectance + roughness * (1.0 / 3.0))

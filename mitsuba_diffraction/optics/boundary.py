@@ -1,7 +1,4 @@
-"""Jones matrices K and B of a boundary for a pair of directions, bare or filmed (NumPy, float64).
-
-`reference.model` has the same matrices for a bare material in their shortest form, with the
-equations that they stand in. Tables, and the twins of the plugin, take them from here.
+"""Boundary models: Jones matrices of a pair of directions, in any arithmetic.
 
 - B is the small-slope approximation of first order (Voronovich 1985), with the coefficients of
   Rice (1951): exact for gentle slopes at any angle as κh → 0.
@@ -13,32 +10,156 @@ survey of approximate scattering wave theories from random rough surfaces", sect
 
 Conventions: time is exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
 d = −ωi, then along d = ωo. The axes are s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is
-right-handed, as Mitsuba's bases are. Then r_s and r_p of a mirror have opposite signs at normal
-incidence. Row 0 and column 0 of a matrix are s, row 1 and column 1 are p: E_out = J E_in.
+right-handed, as Mitsuba's bases are. Along the normal s is that of the other direction. Then r_s
+and r_p of a mirror have opposite signs at normal incidence. A Jones matrix is the tuple of its
+entries ss, sp, ps, pp, outgoing polarisation first: E_out = J E_in. All matrices here are J times
+2 cosθi cosθo, which stays finite towards the horizon.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 from ..errors import DiffractionError
-from .fresnel import Filmed, Index, amplitudes, faces
+from .arithmetic import Number, formula, of, squared
+from .blend import RoughnessTable, kirchhoff_weight
+from .fresnel import Face, Filmed, Index, amplitudes, faces, normal_reflectance, reflectance
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+#: Entries ss, sp, ps, pp of a Jones matrix.
+Jones: TypeAlias = tuple[Number, Number, Number, Number]
+#: A direction, a unit vector: x, y, z.
+Direction: TypeAlias = tuple[Number, Number, Number]
 
-# sinθ below which a direction is the normal itself: its azimuth is rounding
-_NORMAL = 1e-12
+#: Squared sines below which a direction is the normal itself, or two directions are one.
+SAME_DIRECTION = 1e-20
 
 
-def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
-    """Jones matrices B of the first-order small-slope approximation, (..., 2, 2).
+class Geometry(NamedTuple):
+    """A pair of directions, as matrices need it.
+
+    Attributes
+    ----------
+    cos_i, cos_o : cosθi and cosθo.
+    square_i, square_o : squared sines.
+    one_plus_dot : 1 + ωi·ωo.
+    cos_half : cosine of the angle between either direction and the half vector.
+    tilt : cosine of the half vector to the normal of the surface.
+    dot, cross : t̂·t̂0 and ẑ·(t̂0×t̂) of the tangential parts t0 of −ωi and t of ωo.
+    sines : product of the sines.
+    cc, cs, sc, ss : products of cosine or sine of the turn at ωo from the facet's s to s, and of
+        the turn at ωi from s to the facet's s. The facet's s is along ωi×ωo.
+    """
+
+    cos_i: Number
+    cos_o: Number
+    square_i: Number
+    square_o: Number
+    one_plus_dot: Number
+    cos_half: Number
+    tilt: Number
+    dot: Number
+    cross: Number
+    sines: Number
+    cc: Number
+    cs: Number
+    sc: Number
+    ss: Number
+
+
+class Heights(NamedTuple):
+    """Heights of the surface, as a model sees them for a pair of directions and a wavelength.
+
+    Attributes
+    ----------
+    kappa : κ, phase per height, rad/µm.
+    variance : the model's statistic of the heights at the order's frequency q, µm²; σ_q² of eq. 9
+        by `roughness`.
+    """
+
+    kappa: Number
+    variance: Number
+
+
+@formula
+def geometry(wi: Direction, wo: Direction) -> Geometry:
+    """Return the geometry of directions ωi and ωo, which point away from the surface."""
+    (x0, y0, z0), (x, y, z) = wi, wo
+    xp = of(x0, x, z0, z)
+    sum_x, sum_y, sum_z = x0 + x, y0 + y, z0 + z
+    # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
+    one_plus_dot = 0.5 * (sum_x * sum_x + sum_y * sum_y + sum_z * sum_z)
+    cos_half = xp.sqrt(0.5 * one_plus_dot)
+    tilt = 0.5 * sum_z * xp.reciprocal(xp.maximum(cos_half, 1e-4))
+    square_i, square_o = x0 * x0 + y0 * y0, x * x + y * y
+    slanted = (square_i > SAME_DIRECTION) & (square_o > SAME_DIRECTION)
+    sines = xp.sqrt(xp.where(slanted, square_i, 1.0)) * xp.sqrt(xp.where(slanted, square_o, 1.0))
+    inverse, across = xp.reciprocal(sines), x0 * y - y0 * x
+    # t̂0 points against ωi
+    dot = xp.where(slanted, -(x0 * x + y0 * y) * inverse, 1.0)
+    cross = xp.where(slanted, -across * inverse, 0.0)
+    # n = ωi×ωo: n·s and n·p of both directions make the turns
+    normal_x, normal_y = y0 * z - z0 * y, z0 * x - x0 * z
+    turn0, turn = normal_x * y0 - normal_y * x0, normal_y * x - normal_x * y
+    length0, length = turn0 * turn0 + across * across, turn * turn + across * across
+    apart = (length0 > SAME_DIRECTION) & (length > SAME_DIRECTION)
+    inverse = xp.reciprocal(
+        xp.sqrt(xp.where(apart, length0, 1.0)) * xp.sqrt(xp.where(apart, length, 1.0))
+    )
+    return Geometry(
+        z0, z, square_i, square_o, one_plus_dot, cos_half, tilt, dot, cross,
+        sines=xp.where(slanted, sines, 0.0),
+        # parallel directions: any facet's axis does, s of ωi
+        cc=xp.where(apart, turn * turn0 * inverse, dot),
+        cs=xp.where(apart, turn * across * inverse, 0.0),
+        sc=xp.where(apart, -across * turn0 * inverse, cross),
+        ss=xp.where(apart, -across * across * inverse, 0.0),
+    )  # fmt: skip
+
+
+@formula
+def facets(geometry: Geometry, r_s: Number, r_p: Number) -> Jones:
+    """Return U(ωo) diag(r_s, r_p) U(ωi), facets with coefficients r_s and r_p at their own axes."""
+    cc, cs, sc, ss = geometry[-4:]
+    return (
+        r_s * cc - r_p * ss,
+        r_s * cs + r_p * sc,
+        -(r_s * sc + r_p * cs),
+        r_p * cc - r_s * ss,
+    )
+
+
+@formula
+def kirchhoff(geometry: Geometry, index: Index) -> Jones:
+    """Return 2 cosθi cosθo K of the tangent plane, eq. 7.
+
+    Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
+    those of the surface, times 1 + ωi·ωo: for unpolarised light ½ Σ|J|² is then
+    R(cosθ_half) (1 + ωi·ωo)² (Stam 1999, eq. 7).
+    """
+    if isinstance(index, Filmed):
+        index = index.tilted(geometry.tilt)
+    one, cosine = geometry.one_plus_dot, geometry.cos_half
+    r_s, r_p = amplitudes(cosine, 1.0 - cosine * cosine, index)
+    return facets(geometry, r_s * one, r_p * one)
+
+
+@formula
+def kirchhoff_power(geometry: Geometry, index: Index) -> Number:
+    """Return ½ Σ|J|² of `kirchhoff`, without its turns."""
+    if isinstance(index, Filmed):
+        index = index.tilted(geometry.tilt)
+    one, cosine = geometry.one_plus_dot, geometry.cos_half
+    return reflectance(cosine, index) * (one * one)
+
+
+@formula
+def small_slope(geometry: Geometry, index: Index) -> Jones:
+    """Return 2 cosθi cosθo B of the first-order small-slope approximation, eq. 8.
 
     With t0, t the tangential parts of −ωi and ωo, γ0, γ their cosines, γ' = √(ε − t²), and unit
-    vectors t̂0, t̂ (Rice 1951; Elfouhaily and Guérin 2004, section 4; ε is the square of `index`):
+    vectors t̂0, t̂ (Rice 1951; Elfouhaily and Guérin 2004, section 4; ε is the index squared):
 
         B_ss = −(ε−1) (t̂·t̂0)                       / ((γ+γ')(γ0+γ0'))
         B_pp =  (ε−1) (γ' γ0' (t̂·t̂0) − ε |t||t0|)  / ((εγ+γ')(εγ0+γ0'))
@@ -49,77 +170,98 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 γ γ0 (Elson 1977,
     Applied Optics 16, 2872). A film that follows the heights has two interfaces, which are
     displaced alike: their products add up. For t = t0 the sums are r_s and r_p of the film.
+    """
+    ends = zip(
+        faces(geometry.cos_i, geometry.square_i, index),
+        faces(geometry.cos_o, geometry.square_o, index),
+        strict=True,
+    )
+    first, *others = (_of_face(geometry, came, there) for came, there in ends)
+    for other in others:
+        first = tuple(a + b for a, b in zip(first, other, strict=True))
+    return first
 
-    Parameters
+
+def _of_face(geometry: Geometry, came: Face, there: Face) -> Jones:
+    contrast = came.contrast * (2.0 * geometry.cos_i * geometry.cos_o)
+    out, bent, into = contrast * there.s, contrast * there.x, contrast * there.p
+    return (
+        -(out * came.s * geometry.dot),
+        out * came.x * geometry.cross,
+        bent * came.s * geometry.cross,
+        bent * came.x * geometry.dot - into * came.p * came.normal * geometry.sines,
+    )
+
+
+@formula
+def mixed(first: Jones, second: Jones, weight: Number) -> Jones:
+    """Return the second matrix, and as much of the first as its weight says."""
+    return tuple((a - b) * weight + b for a, b in zip(first, second, strict=True))
+
+
+@formula
+def azimuth_cosine(wi: Direction, wo: Direction) -> Number:
+    """Return t̂·t̂0, the cosine between the tangential parts of −ωi and ωo."""
+    return geometry(wi, wo).dot
+
+
+@formula
+def power(jones: Jones) -> Number:
+    """Return N = ½ Σ|J|², the power of unpolarised light of unit power."""
+    ss, sp, ps, pp = jones
+    return 0.5 * (squared(ss) + squared(sp) + squared(ps) + squared(pp))
+
+
+def _blended(geometry: Geometry, index: Index, heights: Heights | None) -> Jones:
+    """Return 2 cosθi cosθo J of eq. 6, for which `heights` are given."""
+    assert heights is not None
+    weight = kirchhoff_weight(heights.kappa, heights.variance, normal_reflectance(index))
+    return mixed(kirchhoff(geometry, index), small_slope(geometry, index), weight)
+
+
+def roughness(table: RoughnessTable) -> RoughnessTable:
+    """Return σ_q² of a surface, a statistic for models: the table's own."""
+    return table
+
+
+@dataclass(frozen=True)
+class Model:
+    """A boundary model: a formula in the common arithmetic, for every language.
+
+    Attributes
     ----------
-    wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or
-        the index under a film, `fresnel.Filmed`.
+    name : as parameters and commands call the model.
+    jones : 2 cosθi cosθo J of a geometry, an index and `Heights`; heights are None where the model
+        has no statistic.
+    statistic : from the table's σ_q² to the model's own statistic, looked up by q; None of a model
+        that does not depend on the heights.
+    power : ½ Σ|J|² of the same arguments, where it is shorter than by `jones`.
+    has_second_order : whether the second order of small slope belongs to the model.
     """
-    s_in, s_out = polarisation_axes(wi, wo)
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    # t̂ is s turned by 90°, so products of the s axes equal products of t̂
-    (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
-    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
-    products = [
-        jones_matrix(
-            ss=-there.s * came.s * dot,
-            sp=there.s * came.x * cross,
-            ps=there.x * came.s * cross,
-            pp=there.x * came.x * dot - came.normal * there.p * came.p * sine * sine0,
-        )
-        * came.contrast[..., None, None]
-        for came, there in zip(
-            faces(incident[..., 2], sine0**2, index),
-            faces(outgoing[..., 2], sine**2, index),
-            strict=True,
-        )
-    ]
-    return np.asarray(sum(products[1:], products[0]))
+
+    name: str
+    jones: Callable[[Geometry, Index, Heights | None], Jones]
+    statistic: Callable[[RoughnessTable], RoughnessTable] | None = None
+    power: Callable[[Geometry, Index], Number] | None = None
+    has_second_order: bool = False
 
 
-def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
-    """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
-
-    Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
-    those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
-    4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
-    """
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    total = incident + outgoing
-    # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
-    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
-    cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
-    if isinstance(index, Filmed):
-        index = index.tilted(0.5 * total[..., 2] / cos_half)
-    return facet_matrices(incident, outgoing, *amplitudes(cos_half, index))
+#: Boundary models by name. The first is the default of a material with an index.
+MODELS: dict[str, Model] = {}
 
 
-def facet_matrices(wi: ArrayLike, wo: ArrayLike, r_s: Complex, r_p: Complex) -> Complex:
-    """Jones matrices (..., 2, 2) of facets that mirror ωi to ωo with coefficients r_s, r_p."""
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    s_in, s_out = polarisation_axes(incident, outgoing)
-    axis, total = facet_axis(incident, outgoing, s_in), incident + outgoing
-    zero = np.zeros_like(r_s)
-    facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
-    turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
-    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
-    scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
-    return np.asarray(scale[..., None, None] * turned)
+def register(model: Model) -> None:
+    """Enter a boundary model in `MODELS`, where every consumer finds it."""
+    MODELS[model.name] = model
 
 
-Matrices = Callable[[ArrayLike, ArrayLike, Index], Complex]
-
-#: Boundary models by name: their Jones matrices (..., 2, 2) from ωi, ωo and the index. Those of
-#: `small_slope` are blended with Kirchhoff's by the roughness (`blend`); no others depend on the
-#: heights. The first is the default of a material with an index.
-MODELS: dict[str, Matrices] = {"small_slope": small_slope, "kirchhoff": kirchhoff}
+register(Model("small_slope", _blended, roughness, has_second_order=True))
+register(Model("kirchhoff", lambda g, index, heights: kirchhoff(g, index), power=kirchhoff_power))
 
 
-def matrices_of(model: str) -> Matrices:
-    """Return the Jones matrices of a model by name; refuse an unknown name."""
-    return MODELS[checked_model(model)]
+def model_of(name: str, models: Iterable[str] = MODELS) -> Model:
+    """Return a model by name; refuse an unknown name."""
+    return MODELS[checked_model(name, models)]
 
 
 def checked_model(model: str, models: Iterable[str] = MODELS) -> str:
@@ -127,73 +269,3 @@ def checked_model(model: str, models: Iterable[str] = MODELS) -> str:
     if model not in (names := tuple(models)):
         raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(names)}")
     return model
-
-
-def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
-    """Unit vectors s = ẑ×d/|ẑ×d| of the incident and the outgoing light, (..., 3) each.
-
-    Along the normal any axis would do: s is taken from the other direction, or y if both directions
-    are the normal (light in the x–z plane).
-    """
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    incident, outgoing = np.broadcast_arrays(incident, outgoing)
-    s_in, slanted_in = _horizontal(-incident)
-    s_out, slanted_out = _horizontal(outgoing)
-    y = np.array([0.0, 1.0, 0.0])
-    first = np.where(slanted_in, s_in, np.where(slanted_out, s_out, y))
-    return first, np.where(slanted_out, s_out, first)
-
-
-def unpolarised(jones: ArrayLike) -> Real:
-    """N = ½ Σ|J|², the power of unpolarised light of unit power after `jones`, (...)."""
-    entries = np.asarray(jones, np.complex128)
-    return np.asarray(0.5 * np.sum(np.abs(entries) ** 2, axis=(-2, -1)), np.float64)
-
-
-def mueller(jones: ArrayLike) -> Real:
-    """Mueller matrices (..., 4, 4) of Jones matrices, for Mitsuba's Stokes vectors.
-
-    S = (|E_s|²+|E_p|², |E_s|²−|E_p|², 2 Re E_s E_p*, 2 Im E_s E_p*): with axes (s, p, d) and time
-    as above, S₃ > 0 turns clockwise for an observer who looks into the light.
-    """
-    entries = np.asarray(jones, np.complex128)
-    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and the Stokes vector is a linear map of it
-    pairs = np.einsum("...ik,...jl->...ijkl", entries, entries.conj())
-    coherency = pairs.reshape(*entries.shape[:-2], 4, 4)
-    stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
-    return np.asarray((stokes @ coherency @ np.linalg.inv(stokes)).real, np.float64)
-
-
-def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
-    """ẑ×d normalised (arbitrary along the normal), and whether d differs from the normal."""
-    x, y = _xy(direction)
-    length = np.hypot(x, y)
-    slanted = length > _NORMAL
-    safe = np.where(slanted, length, 1.0)
-    return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), slanted[..., None]
-
-
-def facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
-    """s of a facet that mirrors ωi to ωo, normal to both; `fallback` where they are parallel."""
-    # (ωi+ωo)×(−ωi) = ωi×ωo: the direction of ẑ×d with the half vector for ẑ
-    normal = np.cross(incident, outgoing)
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    apart = length > _NORMAL
-    return np.where(apart, normal / np.where(apart, length, 1.0), fallback)
-
-
-def turn(to: Real, start: Real, direction: Real) -> Complex:
-    """Matrix (..., 2, 2) from components along (start, d×start) to those along (to, d×to)."""
-    cosine = np.sum(to * start, axis=-1)
-    sine = np.sum(to * np.cross(direction, start), axis=-1)
-    return jones_matrix(ss=cosine, sp=sine, ps=-sine, pp=cosine)
-
-
-def jones_matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
-    """[[ss, sp], [ps, pp]]; the first letter is the outgoing polarisation."""
-    entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
-    return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
-
-
-def _xy(vector: Real) -> tuple[Real, Real]:
-    return vector[..., 0], vector[..., 1]

@@ -1,17 +1,17 @@
-"""Fresnel's coefficients of a flat interface, bare or under a thin film (NumPy, float64).
+"""Fresnel's coefficients of a flat interface, bare or under a thin film, in any arithmetic.
 
-Time exp(−iωt), so an absorbing index is n + ik with k ≥ 0.
+Time exp(−iωt), so an absorbing index is n + ik with k ≥ 0. An index that is real by its type is of
+a medium without total reflection. Sums are written so that none cancels in single precision.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-Complex = NDArray[np.complex128]
+from .arithmetic import Number, formula, is_complex, of, squared
 
 
 @dataclass(frozen=True)
@@ -20,39 +20,36 @@ class Filmed:
 
     Attributes
     ----------
-    index : (...) n + ik of the material over that of the medium above the film.
-    film : (...) n + ik of the film over that of the medium above it.
-    depth : (...) 2πd/λ with the film's thickness d and the wavelength λ in the medium above it. The
+    index : n + ik of the material over that of the medium above the film.
+    film : n + ik of the film over that of the medium above it.
+    depth : 2πd/λ with the film's thickness d and the wavelength λ in the medium above it. The
         film's lower face is the upper one displaced by d along the vertical.
     """
 
-    index: ArrayLike
-    film: ArrayLike
-    depth: ArrayLike
+    index: Number
+    film: Number
+    depth: Number
 
-    def tilted(self, cosine: ArrayLike) -> Filmed:
+    def tilted(self, cosine: Number) -> Filmed:
         """Return the film on a facet whose normal has this cosine to the vertical."""
-        return Filmed(self.index, self.film, np.asarray(self.depth) * np.asarray(cosine))
+        return Filmed(self.index, self.film, self.depth * cosine)
 
     def __getitem__(self, key: Any) -> Filmed:
-        """Select elements of all three parts, broadcast to one shape."""
+        """Select elements of all three parts, which are NumPy's, broadcast to one shape."""
         return Filmed(*(part[key] for part in np.broadcast_arrays(*self.parts)))
 
     @property
-    def parts(self) -> tuple[Complex, Complex, Complex]:
-        """Index, film and depth as arrays."""
-        material, film, depth = (
-            np.asarray(part, np.complex128) for part in (self.index, self.film, self.depth)
-        )
-        return material, film, depth
+    def parts(self) -> tuple[Any, Any, Any]:
+        """Index and film as complex arrays, and depth as a real one, of NumPy's."""
+        material, film = (np.asarray(part, np.complex128) for part in (self.index, self.film))
+        return material, film, np.real(np.asarray(self.depth))
 
 
-#: Index n + ik over that of the medium above, of any shape, or of a material under a film.
-Index = ArrayLike | Filmed
+#: Index n + ik over that of the medium above, or of a material under a film.
+Index: TypeAlias = Number | Filmed
 
 
-@dataclass(frozen=True)
-class Face:
+class Face(NamedTuple):
     """Fields at one interface for light that comes down with unit amplitude, over twice its cosine.
 
     Attributes
@@ -63,52 +60,59 @@ class Face:
     x, p : tangential field of p light, and its magnetic one over that medium's ε.
     """
 
-    contrast: Complex
-    normal: Complex
-    s: Complex
-    x: Complex
-    p: Complex
+    contrast: Number
+    normal: Number
+    s: Number
+    x: Number
+    p: Number
 
 
-def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Face]:
+class _Layer(NamedTuple):
+    """Waves in a film: ε of material and film, q in the film, r_s and r_p there and back."""
+
+    epsilon: Number
+    film: Number
+    within: Number
+    once: Number
+    back_s: Number
+    back_p: Number
+
+
+def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
     """Return fields at the interface of a material, or at both interfaces of its film.
 
     Films are those of Born and Wolf, Principles of Optics, section 1.6.4.
+
+    Parameters
+    ----------
+    cosine, square : of the angle of incidence, and of its sine the square.
     """
-    q, square = np.asarray(cosine, np.float64), np.asarray(squared_sine, np.float64)
     if not isinstance(index, Filmed):
-        n = np.asarray(index, np.complex128)
-        epsilon = n * n
+        epsilon = index * index
         inside = decaying_root(epsilon - square)
-        p = 1.0 / (epsilon * q + inside)
-        return [Face(epsilon - 1.0, epsilon, 1.0 / (q + inside), inside * p, p)]
-    epsilon, film, within, once, back_s, back_p = _film(square, index)
+        xp = of(inside)
+        p = xp.reciprocal(epsilon * cosine + inside)
+        return [Face(epsilon - 1.0, epsilon, xp.reciprocal(inside + cosine), inside * p, p)]
+    epsilon, film, within, once, back_s, back_p = _layer(square, index)
+    reciprocal = of(within).reciprocal
     there_s, there_p = back_s * once * once, back_p * once * once
-    s = 1.0 / (q + within + (q - within) * there_s)
-    p = 1.0 / (film * q + within + (film * q - within) * there_p)
+    s = reciprocal(within + cosine - (within - cosine) * there_s)
+    p = reciprocal(film * cosine + within + (film * cosine - within) * there_p)
+    x, into_s, into_p = within * p, s * once, p * once
     return [
-        Face(film - 1.0, film, s * (1 + there_s), within * p * (1 - there_p), p * (1 + there_p)),
+        Face(film - 1.0, film, s * (1.0 + there_s), x * (1.0 - there_p), p * (1.0 + there_p)),
         Face(
             epsilon - film,
-            film / epsilon,
-            s * once * (1 + back_s),
-            within * p * once * (1 - back_p),
-            p * once * (1 + back_p),
+            film * reciprocal(epsilon),
+            into_s * (1.0 + back_s),
+            within * into_p * (1.0 - back_p),
+            into_p * (1.0 + back_p),
         ),
     ]
 
 
-def _film(square: NDArray[np.float64], index: Filmed) -> tuple[Complex, ...]:
-    """ε of material and film, q of the film, one passage's phase, r_s and r_p of the lower face."""
-    material, film, depth = index.parts
-    epsilon, layer = material * material, film * film
-    below, within = decaying_root(epsilon - square), decaying_root(layer - square)
-    r_s = (within - below) / (within + below)
-    r_p = (epsilon * within - layer * below) / (epsilon * within + layer * below)
-    return epsilon, layer, within, np.exp(1j * within * depth), r_s, r_p
-
-
-def amplitudes(cos_theta: ArrayLike, index: Index) -> tuple[Complex, Complex]:
+@formula
+def amplitudes(cosine: Number, square: Number, index: Index) -> tuple[Number, Number]:
     """Amplitude coefficients (r_s, r_p) of reflection, of opposite signs at normal incidence.
 
     Born and Wolf, Principles of Optics, section 1.5.2 (eq. 21a); complex index as in section 14.2;
@@ -116,51 +120,62 @@ def amplitudes(cos_theta: ArrayLike, index: Index) -> tuple[Complex, Complex]:
 
     Parameters
     ----------
-    cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
-    index : n + ik of the material over that of the medium above it; broadcasts with `cos_theta`.
+    cosine, square : of the angle of incidence, 0 to 1, and of its sine the square.
+    index : over that of the medium above.
     """
-    cosine = np.asarray(cos_theta, np.float64)
-    if isinstance(index, Filmed):
-        _, film, within, once, back_s, back_p = _film(1.0 - cosine * cosine, index)
-        pairs = (cosine, back_s), (film * cosine, back_p)
-        r_s, r_p = (
-            (q - within + (q + within) * back * once * once)
-            / (q + within + (q - within) * back * once * once)
-            for q, back in pairs
+    if not isinstance(index, Filmed):
+        epsilon = index * index
+        inside = decaying_root(epsilon - square)  # n cosθ of the refracted wave
+        reciprocal = of(inside).reciprocal
+        r_s = -((inside - cosine) * reciprocal(inside + cosine))
+        return r_s, (epsilon * cosine - inside) * reciprocal(epsilon * cosine + inside)
+    _, film, within, once, back_s, back_p = _layer(square, index)
+    twice, r = once * once, []
+    for q, back in ((cosine, back_s), (film * cosine, back_p)):
+        there = back * twice
+        r.append(
+            ((within + q) * there - (within - q))
+            * of(within).reciprocal(within + q - (within - q) * there)
         )
-        return r_s, r_p
-    n = np.asarray(index, np.complex128)
-    inside = decaying_root(n * n - (1.0 - cosine * cosine))  # n cosθ of the refracted wave
-    r_s = (cosine - inside) / (cosine + inside)
-    r_p = (n * n * cosine - inside) / (n * n * cosine + inside)
-    return r_s, r_p
+    return r[0], r[1]
 
 
-def decaying_root(square: Complex) -> Complex:
-    """The root q' whose wave exp(i q' |z|) decays, or else travels, away from the surface."""
-    root = np.sqrt(square)
-    return np.where(root.imag < 0, -root, root)
+def _layer(square: Number, index: Filmed) -> _Layer:
+    epsilon, film = index.index * index.index, index.film * index.film
+    below, within = decaying_root(epsilon - square), decaying_root(film - square)
+    xp = of(within, index.depth)
+    outer, inner = epsilon * within, film * below
+    phase, decay = within.real * index.depth, xp.exp(-(within.imag * index.depth))
+    once = xp.complex(xp.cos(phase) * decay, xp.sin(phase) * decay)
+    back_s = (within - below) * xp.reciprocal(within + below)
+    back_p = (outer - inner) * xp.reciprocal(outer + inner)
+    return _Layer(epsilon, film, within, once, back_s, back_p)
 
 
-def reflectance(cos_theta: ArrayLike, index: Index) -> NDArray[np.float64]:
-    """Fresnel reflectance for unpolarised light, the mean of both polarisations.
+@formula
+def decaying_root(square: Number) -> Number:
+    """Return the root whose wave exp(i root |z|) decays, or else travels, away from the surface."""
+    xp = of(square)
+    if not is_complex(square):
+        return xp.sqrt(xp.maximum(square, 0.0))
+    # The larger part from a sum, the other from the product: neither cancels
+    length = xp.sqrt(squared(square))
+    larger = xp.sqrt(0.5 * (length + xp.absolute(square.real)))
+    smaller = 0.5 * square.imag / xp.maximum(larger, 1e-20)
+    travels = square.real >= 0.0
+    return xp.complex(xp.where(travels, larger, smaller), xp.where(travels, smaller, larger))
 
-    Born and Wolf, Principles of Optics, section 1.5.2 (eq. 20 and 21), with a complex index
-    (section 14.2).
 
-    Parameters
-    ----------
-    cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
-    index : n + ik of the material over that of the medium above it; broadcasts with `cos_theta`.
-        Infinity is a perfect conductor.
-    """
-    cosine = np.asarray(cos_theta, np.float64)
+@formula
+def reflectance(cosine: Number, index: Index) -> Number:
+    """Reflectance for unpolarised light, the mean of both polarisations; as `amplitudes`."""
+    r_s, r_p = amplitudes(cosine, 1.0 - cosine * cosine, index)
+    return 0.5 * (squared(r_s) + squared(r_p))
+
+
+@formula
+def normal_reflectance(index: Index) -> Number:
+    """Return R₀ of eq. 9, the reflectance along the normal."""
     if isinstance(index, Filmed):
-        return _mean_power(*amplitudes(cosine, index))
-    n = np.asarray(index, np.complex128)
-    perfect = np.isinf(n)
-    return np.where(perfect, 1.0, _mean_power(*amplitudes(cosine, np.where(perfect, 1.0, n))))
-
-
-def _mean_power(r_s: Complex, r_p: Complex) -> NDArray[np.float64]:
-    return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2))
+        return squared(amplitudes(1.0, 0.0, index)[0])
+    return squared((index - 1.0) * of(index).reciprocal(index + 1.0))

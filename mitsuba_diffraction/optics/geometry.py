@@ -1,4 +1,4 @@
-"""Directions to diffraction coordinates, and the factors outside the integral (NumPy only)."""
+"""Directions to diffraction coordinates, the factors outside the integral, and shadowing."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
+from .arithmetic import Number, formula, of
 
 Array = NDArray[np.float64]
 
 #: A window of `coherence_width` spans four standard deviations of its amplitude.
 WIDTHS_PER_SIGMA = 4.0
+# Smallest normal number of single precision
+_SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 def sigma_of(coherence_width: float) -> float:
@@ -79,3 +82,18 @@ def kirchhoff_factor(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, sigma:
     lam = np.asarray(wavelength, np.float64) * 1e-3
     area = np.pi * sigma**2
     return np.where(above, one_plus_dot**2 / (lam**2 * area * w**2 * cos_i * cos_o), 0.0)
+
+
+@formula
+def vcavity(cos_i: Number, cos_o: Number, one_plus_dot: Number) -> Number:
+    """Return the shadowing of long V-shaped grooves with level edges, in any arithmetic.
+
+    It is min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)).
+
+    Torrance and Sparrow 1967 (the form is Blinn's, 1977; Stam 1999, appendix, uses it for
+    diffraction). With ωi + ωo = |ωi + ωo| h and |ωi + ωo|² = 2(1 + ωi·ωo) =: 2·one_plus_dot,
+    (n·h)/(ωo·h) = (cosθi + cosθo)/(1 + ωi·ωo). Symmetric in the two directions.
+    """
+    xp = of(cos_i, cos_o, one_plus_dot)
+    edge = xp.maximum(one_plus_dot, _SMALLEST)
+    return xp.minimum(1.0, 2.0 * (cos_i + cos_o) * xp.minimum(cos_i, cos_o) / edge)

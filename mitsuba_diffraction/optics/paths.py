@@ -16,9 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import boundary, coat, through
-from .boundary import Complex, Real
-from .fresnel import Filmed, amplitudes, reflectance
+from . import boundary, through
+from .blend import Real
+from .boundary import Direction, Heights, Jones
+from .coat import refracted, transmittances, transmitted
+from .fresnel import Filmed, reflectance
 
 
 @dataclass(frozen=True)
@@ -115,36 +117,57 @@ class Path:
         one_plus_dot = 0.5 * (self.tangential(cos_i, cos_o, cos_turn) ** 2 + w**2)  # times m²
         return np.asarray(common * one_plus_dot**2)
 
-    def matrices(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> list[Complex]:
-        """Return K and B of small slope, which are blended, or another model's matrix alone.
+    def power(
+        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, heights: Heights | None
+    ) -> Real:
+        """Return N, the mean power of the Jones matrix.
 
-        All cosines broadcast; matrices are (..., 2, 2).
+        All cosines broadcast; heights : of the model's, None if it does not depend on them.
         """
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
         sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
-        sin_turn = np.sqrt(1.0 - cos_turn**2)
-        wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
-        wo = np.stack([sin_o * cos_turn, sin_o * sin_turn, cos_o], axis=-1)
-        names = ("kirchhoff", "small_slope") if self.model == "small_slope" else (self.model,)
+        wi = sin_i, np.zeros_like(sin_i), cos_i
+        wo = sin_o * cos_turn, sin_o * np.sqrt(1.0 - cos_turn**2), cos_o
+        pair, jones = self._jones(wi, wo, heights)
+        return np.asarray(boundary.power(jones) / (2.0 * pair.cos_i * pair.cos_o) ** 2)
+
+    def _jones(
+        self, wi: Direction, wo: Direction, heights: Heights | None
+    ) -> tuple[boundary.Geometry, Jones]:
+        """Return the geometry at the structure, and 2 cosθi cosθo J as seen from outside."""
         if self.let_through:
+            n = self._real
             above, below = (wo, wi) if self.came.number else (wi, wo)
-            below = below * [1.0, 1.0, -1.0]
-            return [through.matrices(name, above, below, self._real, self.thin) for name in names]
+            x, y, z = refracted(below, n) if self.thin else below
+            inside = x, y, -z
+            pair = boundary.geometry(above, inside)
+            jones = through.MODELS[self.model](
+                pair, above, inside, n, through.outside_square(pair, n), heights
+            )
+            return pair, through.out_of_sheet(jones, n, above[2], below[2]) if self.thin else jones
+        model = boundary.model_of(self.model)
         if self.thin:  # the flat side lies over the structure as the face of a coat does
             n = self.came.at_structure
             assert self.index is not None
             assert not isinstance(self.index, Filmed)  # no coat lies on it
-            return [coat.matrices(boundary.MODELS[name], wi, wo, n, self.index) for name in names]
-        assert self.index is not None
-        return [boundary.matrices_of(name)(wi, wo, self.index) for name in names]
+            pair = boundary.geometry(refracted(wi, n), refracted(wo, n))
+            jones = model.jones(pair, self.index, heights)
+            faces = (transmittances(direction[2], n) for direction in (wi, wo))
+            return pair, transmitted(jones, pair, self.index, *faces)
+        pair = boundary.geometry(wi, wo)
+        return pair, model.jones(pair, self.index, heights)
 
     def flat_transmittance(self, cos_i: Real, cos_o: Real) -> Real:
         """Return G of order 0 that is let through: the flat surface's at both directions."""
-        came, left = (
-            through.flat_transmittances(cosine, self._real, self.thin, side.number)
+        n = self._real
+        outer = [
+            cosine
+            if self.thin or not side.number  # else measured in the dielectric
+            else np.sqrt(np.maximum(1.0 - n**2 * (1.0 - cosine**2), 0.0))
             for cosine, side in ((cos_i, self.came), (cos_o, self.left))
-        )
-        return np.asarray(np.mean(np.sqrt(came * left), axis=0))
+        ]
+        came, left = (through.flat_transmittances(cosine, n, self.thin) for cosine in outer)
+        return 0.5 * (np.sqrt(came[0] * left[0]) + np.sqrt(came[1] * left[1]))
 
     def face_reflectance(self, cos_i: Real, cos_o: Real, cos_turn: Real | float = -1.0) -> Real:
         """Return G of the flat face of a sheet or a coat for light that it reflects outside."""
@@ -180,6 +203,6 @@ class Returned(Path):
         """Return G: T² R/(1 − R²) of either direction, the mean of both polarisations."""
         shares = []
         for cosine in (cos_i, cos_o):
-            back = np.abs(np.stack(amplitudes(cosine, self.sheet))) ** 2
-            shares.append(np.mean((1.0 - back) * back / (1.0 + back), axis=0))
+            passed = transmittances(np.asarray(cosine), self.sheet)
+            shares.append(0.5 * sum(t * (1.0 - t) / (2.0 - t) for t in passed))
         return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)

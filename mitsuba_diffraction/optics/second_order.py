@@ -13,7 +13,8 @@ spectrum of (∂_l h)² exp(−iQh). For unpolarised light the power of the firs
 
     |1 + s (c_l r_l + c_t r_t)|²,   c = −Q/4 Σ B* C / Σ |B|²,   r = a* D / |a|²,
 
-with s the share of small slope in the model (`blend.weight`). This is eq. (10) of docs/theory.md.
+with s the weight of small slope in the model (`blend.small_slope_weight`), eq. (10) of
+docs/theory.md.
 
 - c depends on the directions and the index alone. It is symmetric in ωi and ωo, and even in the
   azimuth between them.
@@ -33,8 +34,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from .arithmetic import Number, formula, of
 from .fresnel import decaying_root
 
+#: Real and imaginary part of two complex numbers, of a coefficient along and one across.
+Parts = tuple[Number, Number, Number, Number]
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -133,7 +137,7 @@ class Perturbation:
 
 def _wave(tangential: Real, index: complex) -> Complex:
     """Wave vectors (..., 3) that go up in a medium, or decay."""
-    normal = decaying_root(index**2 - np.sum(tangential**2, axis=-1) + 0j)
+    normal = np.asarray(decaying_root(index**2 - np.sum(tangential**2, axis=-1) + 0j))
     return np.concatenate([tangential, normal[..., None]], axis=-1)
 
 
@@ -217,14 +221,33 @@ def interpolated(index: float, wi: ArrayLike, wo: ArrayLike) -> Complex:
     return np.asarray(table(np.stack(angles, axis=-1)))
 
 
-def factor(coefficients: ArrayLike, ratios: ArrayLike, share: ArrayLike) -> Real:
+def factor(coefficients: ArrayLike, ratios: ArrayLike, small_slope_weight: ArrayLike) -> Real:
     """|1 + s (c_l r_l + c_t r_t)|², (...), the factor on the power of unpolarised light.
 
     Parameters
     ----------
     coefficients, ratios : c and r, (..., 2).
-    share : s, (...).
+    small_slope_weight : s, (...).
     """
-    both = np.asarray(coefficients) * np.asarray(ratios)
-    added = np.asarray(share) * np.sum(both, axis=-1)
-    return np.abs(1.0 + added / np.maximum(1.0, np.abs(added) / LIMIT)) ** 2
+    c, r = np.asarray(coefficients), np.asarray(ratios)
+    parts = [(x.real, x.imag) for pair in (c, r) for x in (pair[..., 0], pair[..., 1])]
+    change = added_power((*parts[0], *parts[1]), (*parts[2], *parts[3]), small_slope_weight)
+    return np.asarray(1.0 + change)
+
+
+@formula
+def added_power(c: Parts, r: Parts, weight: Number) -> Number:
+    """Return |1 + weight (c_l r_l + c_t r_t)|² − 1, where what is added is at most `LIMIT`.
+
+    Parameters
+    ----------
+    c, r : real and imaginary parts of the two coefficients, and of the two ratios.
+    weight : s, with whatever multiplies r.
+    """
+    real = weight * (c[0] * r[0] - c[1] * r[1] + c[2] * r[2] - c[3] * r[3])
+    imaginary = weight * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
+    xp = of(real)
+    square = xp.fma(real, real, imaginary * imaginary)
+    length = xp.sqrt(xp.maximum(square, 1e-20))
+    clipped = xp.minimum(1.0, LIMIT * xp.reciprocal(length))
+    return clipped * xp.fma(clipped, square, 2.0 * real)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from . import blend, boundary
 from .blend import RoughnessTable, ScaleRoughness
+from .fresnel import normal_reflectance
 from .geometry import wavenumber
 from .second_order import factor, interpolated
 from .slope_ratios import CellSums, SlopeRatios
@@ -21,6 +22,7 @@ from .slope_ratios import CellSums, SlopeRatios
 AUTO_FROM = 0.05
 
 _INDEX = 1.5
+_MODEL = boundary.MODELS["small_slope"]
 _THETA, _GRAZING = np.radians(60.0), np.radians(85.0)
 # Eight azimuths; the offset keeps symmetric gratings from repeating one of them
 _AZIMUTHS = 2.0 * np.pi * (np.arange(8) + 0.25) / 8
@@ -59,13 +61,15 @@ def colour_change(
             normal = np.sqrt(1.0 - squares[leaves])
             wo = np.concatenate([tangential[leaves], normal[:, None]], axis=1)
             kappa = wave * (wi[2] + normal)
-            share = blend.weight(kappa, roughness.at(np.hypot(*q[leaves].T)), _INDEX)
-            jones = blend.jones(wi, wo, _INDEX, share)
-            # Power of an order: 4 cosθi cosθo N |a|² / w²
-            power = normal * boundary.unpolarised(jones) / (wi[2] + normal) ** 2
+            heights = boundary.Heights(kappa, roughness.at(np.hypot(*q[leaves].T)))
+            pair = boundary.geometry(tuple(wi), tuple(wo.T))
+            jones = _MODEL.jones(pair, _INDEX, heights)
+            s = blend.small_slope_weight(*heights, normal_reflectance(_INDEX))
+            # Power of an order: 4 cosθi cosθo N |a|² / w², over cosθi
+            power = boundary.power(jones) / (normal * (wi[2] + normal) ** 2)
             power *= _powers(sums, leaves, kappa)
             c = interpolated(_INDEX, wi, wo)
-            change = factor(c, ratios.at(q[leaves], kappa), share) - 1.0
+            change = factor(c, ratios.at(q[leaves], kappa), s) - 1.0
             changed += float(np.sum(power * np.abs(change)))
             total += float(np.sum(power))
     return changed / total if total > 0.0 else 0.0

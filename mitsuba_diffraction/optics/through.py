@@ -1,4 +1,4 @@
-"""Jones matrices of light that goes through a dielectric boundary (NumPy, float64).
+"""Jones matrices of light that goes through a dielectric boundary in any arithmetic.
 
 With w = n cosθt − cosθi, lengths over 2π/λ and q = 2π/λ (ωi + n ωo) tangential, light that goes
 from above into a dielectric of index n has the BTDF
@@ -31,16 +31,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import ArrayLike
+from .arithmetic import Number, of
+from .blend import kirchhoff_weight
+from .boundary import Direction, Geometry, Heights, Jones, facets, mixed
+from .coat import Powers, transmittances
+from .fresnel import decaying_root, normal_reflectance
 
-from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
-from .coat import refracted
-from .fresnel import amplitudes, decaying_root
 
-
-def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
-    """Jones matrices of first order, (..., 2, 2).
+def small_slope(geometry: Geometry, n: Number, outside: Number) -> Jones:
+    """Return 2 cosθi cosθt B of first order.
 
     With t0, t the tangential parts of −ωi and n ωo and γ0, γ, γ0', γ' the normal ones above and
     inside (γ beyond the critical angle is imaginary),
@@ -52,113 +51,106 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
 
     Parameters
     ----------
-    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric.
-    index : real, of the dielectric over that of the medium above it.
+    geometry : of ωi above the surface and ωo below it, in the dielectric.
+    n : real, of the dielectric over that of the medium above it.
+    outside : γ² above the surface of the light below it; complex where it may be negative
+        (`outside_square`).
     """
-    s_in, s_out = polarisation_axes(wi, wo)
-    n = float(index)
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    sine0 = np.hypot(incident[..., 0], incident[..., 1])
-    sine = n * np.hypot(outgoing[..., 0], outgoing[..., 1])
-    q0, q_inside = incident[..., 2], -n * outgoing[..., 2]
-    q = decaying_root(np.asarray(1.0 - sine**2, np.complex128))
-    q0_inside = np.sqrt(np.maximum(n * n - sine0**2, 0.0))
-    dot = np.sum(s_in * s_out, axis=-1)
-    cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
-    s0, s = 1.0 / (q0 + q0_inside), 1.0 / (q + q_inside)
-    p0, p = 1.0 / (n * n * q0 + q0_inside), n / (n * n * q + q_inside)
-    rows = [
-        [s * s0 * dot, -s * q0_inside * p0 * cross],
-        [q * p * s0 * cross, p * p0 * (q * q0_inside * dot + sine * sine0)],
-    ]
-    matrix = np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
-    return np.asarray((n * n - 1.0) * matrix)
+    xp = of(n, geometry.cos_i)
+    epsilon, q0, q_inside = n * n, geometry.cos_i, -(n * geometry.cos_o)
+    q, q0_inside = decaying_root(outside), xp.sqrt(epsilon - geometry.square_i)
+    contrast = (epsilon - 1.0) * -2.0 * geometry.cos_i * geometry.cos_o
+    s0, p0 = xp.reciprocal(q0 + q0_inside), xp.reciprocal(epsilon * q0 + q0_inside)
+    s = contrast * of(q).reciprocal(q + q_inside)
+    p = contrast * n * of(q).reciprocal(epsilon * q + q_inside)
+    dot, cross, sines = geometry.dot, geometry.cross, n * geometry.sines
+    return (
+        s * (s0 * dot),
+        -(s * (q0_inside * p0 * cross)),
+        q * p * (s0 * cross),
+        p * p0 * (q * (q0_inside * dot) + sines),
+    )
 
 
-def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
-    """Jones matrices of the tangent plane, (..., 2, 2); 0 where no facet refracts ωi to ωo."""
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    n = float(index)
-    s_in, s_out = polarisation_axes(incident, outgoing)
-    total = -(incident + n * outgoing)
-    length = np.linalg.norm(total, axis=-1, keepdims=True)
-    normal = total / np.maximum(length, 1e-12) * np.sign(n - 1.0)
-    cos_in = np.sum(incident * normal, axis=-1)
-    cos_out = -np.sum(outgoing * normal, axis=-1)
-    refracts = (cos_in > 0) & (cos_out > 0)
-    cos_in = np.where(refracts, cos_in, 1.0)
-    # The normal along −(ωi + n ωo): (ωi + n ωo)×ωi is along ωo×ωi, reversed for n > 1
-    axis = facet_axis(outgoing, incident, s_in)
-    scale = np.where(refracts, cos_out * cos_in * length[..., 0], 0.0)
-    scale /= -incident[..., 2] * outgoing[..., 2]
-    t_s, t_p = scale / (cos_in + n * cos_out), scale / (n * cos_in + cos_out)
-    zero = np.zeros_like(t_s)
-    facet = np.stack([t_s, zero, zero, t_p], axis=-1).reshape(*t_s.shape, 2, 2)
-    return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
+def outside_square(geometry: Geometry, n: Number) -> Number:
+    """Return the squared cosine above the surface of the light below it, negative if reflected."""
+    return 1.0 - n * n * geometry.square_o
 
 
-#: Boundary models of light that goes through, by name, as `boundary.MODELS`.
-MODELS: dict[str, Callable[[ArrayLike, ArrayLike, float], Complex]] = {
-    "small_slope": small_slope,
-    "kirchhoff": kirchhoff,
+def kirchhoff(geometry: Geometry, wi: Direction, wo: Direction, n: Number) -> Jones:
+    """Return 2 cosθi cosθt K of the tangent plane; 0 where no facet refracts ωi to ωo."""
+    x, y, z = (-(a + n * b) for a, b in zip(wi, wo, strict=True))
+    xp = of(x, y, z)
+    length = xp.sqrt(x * x + y * y + z * z)
+    inverse = xp.reciprocal(xp.maximum(length, 1e-6))
+    cos_in = (wi[0] * x + wi[1] * y + wi[2] * z) * inverse
+    cos_out = -((wo[0] * x + wo[1] * y + wo[2] * z) * inverse)
+    refracts = (cos_in > 0.0) & (cos_out > 0.0)
+    cos_in = xp.where(refracts, cos_in, 1.0)
+    scale = xp.where(refracts, 2.0 * cos_in * cos_out * length, 0.0)
+    t_s = scale * xp.reciprocal(cos_in + n * cos_out)
+    return facets(geometry, t_s, scale * xp.reciprocal(n * cos_in + cos_out))
+
+
+def _blended(
+    geometry: Geometry,
+    wi: Direction,
+    wo: Direction,
+    n: Number,
+    outside: Number,
+    heights: Heights | None,
+) -> Jones:
+    """Return 2 cosθi cosθt J, blended as reflected light is (eq. 6 and 9)."""
+    assert heights is not None
+    weight = kirchhoff_weight(heights.kappa, heights.variance, normal_reflectance(n))
+    return mixed(kirchhoff(geometry, wi, wo, n), small_slope(geometry, n, outside), weight)
+
+
+Formula = Callable[[Geometry, Direction, Direction, Number, Number, Heights | None], Jones]
+#: Formulas of `boundary.MODELS` for light that goes through, by name: 2 cosθi cosθt J of the
+#: geometry, ωi above the surface, ωo in the dielectric, n, γ² of `small_slope`, and `Heights`.
+MODELS: dict[str, Formula] = {
+    "small_slope": _blended,
+    "kirchhoff": lambda geometry, wi, wo, n, outside, heights: kirchhoff(geometry, wi, wo, n),
 }
 
 
-def matrices(model: str, wi: ArrayLike, wo: ArrayLike, index: float, thin: bool = False) -> Complex:
-    """Jones matrices (..., 2, 2) of a model by name, of an interface or a thin sheet.
-
-    wi, wo : above and below the surface, (..., 3); below a sheet, beyond its flat other side.
-    """
-    if not thin:
-        return MODELS[model](wi, wo, index)
-    down = np.array([1.0, 1.0, -1.0])
-    inside = refracted(np.asarray(wo, np.float64) * down, index) * down
-    return out_of_sheet(MODELS[model](wi, inside, index), wi, wo, index)
-
-
-def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:
-    """Jones matrices of order 0, (..., 2, 2), whose mean power is N_0.
+def order_0(geometry: Geometry, came: Powers, left: Powers) -> Jones:
+    """Return the matrix of order 0, whose mean power is N_0.
 
     The entries are products of √√T of either direction and polarisation, turned from one plane of
     incidence to the other. The matrix is symmetric, and √T in the refracted direction.
 
     Parameters
     ----------
-    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric or,
-        if `thin`, beyond the flat other side of a sheet.
+    came, left : `flat_transmittances` of ωi and of ωo.
     """
-    s_in, s_out = polarisation_axes(wi, wo)
-    cosines = np.asarray(wi, np.float64)[..., 2], -np.asarray(wo, np.float64)[..., 2]
-    came, left = (
-        flat_transmittances(cosine, index, thin, side) ** 0.25
-        for side, cosine in enumerate(cosines)
+    xp = of(*came, *left)
+    # at the critical angle and beyond, the root's derivative would be infinite
+    (s_in, p_in), (s_out, p_out) = (
+        [xp.sqrt(xp.sqrt(xp.maximum(t, 1e-14))) for t in end] for end in (came, left)
     )
-    dot = np.sum(s_in * s_out, axis=-1)
-    cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
-    rows = [
-        [left[0] * came[0] * dot, -left[0] * came[1] * cross],
-        [left[1] * came[0] * cross, left[1] * came[1] * dot],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2).astype(np.complex128)
+    dot, cross = geometry.dot, geometry.cross
+    return s_out * s_in * dot, -(s_out * p_in * cross), p_out * s_in * cross, p_out * p_in * dot
 
 
-def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) -> Real:
-    """Transmittances of s and p light by the flat surface, (2, ...).
+def flat_transmittances(cosine: Number, n: Number, thin: bool) -> Powers:
+    """Return transmittances of s and p light by the flat surface.
 
     Parameters
     ----------
-    cosine : of the direction to the normal, where it is measured: in the dielectric if below.
-    index : of the dielectric over that of the medium above it.
-    thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
-    side : 0 above the surface, 1 below.
+    cosine : of the direction above the surface, or beyond the flat other side of a sheet.
+    thin : whether light passes a sheet: T/(2 − T), the sum over its reflections to and fro.
     """
-    relative = 1.0 / index if side and not thin else index
-    back = np.minimum(np.abs(np.stack(amplitudes(cosine, relative))) ** 2, 1.0)
-    return np.asarray((1.0 - back) / (1.0 + back) if thin else 1.0 - back)
+    s, p = transmittances(cosine, n)
+    if not thin:
+        return s, p
+    reciprocal = of(s).reciprocal
+    return s * reciprocal(2.0 - s), p * reciprocal(2.0 - p)
 
 
-def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
-    """Jones matrices (..., 2, 2) of light that leaves a thin sheet through its flat other side.
+def out_of_sheet(jones: Jones, n: Number, above: Number, below: Number) -> Jones:
+    """Return the matrix of light that leaves a thin sheet through its flat other side.
 
     The flat side transmits T. Light that goes to and fro between the sides, as between two flat
     mirrors of reflectances R, adds up to 1/(1 − R R) (Born and Wolf, section 7.6, without
@@ -168,11 +160,10 @@ def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -
 
     Parameters
     ----------
-    wi, wo : outside of the sheet, above and below, (..., 3).
+    above, below : cosines of the directions outside of the sheet, on its two sides.
     """
-    came, left = (
-        np.abs(np.stack(amplitudes(np.abs(np.asarray(w)[..., 2]), index), axis=-1)) ** 2
-        for w in (wi, wo)
+    came, left = transmittances(above, n), transmittances(below, n)
+    factors = [t * of(t).reciprocal(t + other - t * other) for t in left for other in came]
+    return tuple(
+        entry * of(factor).sqrt(factor) for entry, factor in zip(jones, factors, strict=True)
     )
-    both = left[..., :, None] * came[..., None, :]
-    return np.asarray(np.sqrt((1.0 - left[..., :, None]) / (1.0 - both)) * np.asarray(jones))

@@ -9,9 +9,10 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..optics.boundary import MODELS
 from ..settings import COHERENCES, SURFACE, checked
 from . import support
-from .boundary import MODELS, Boundary, SmallSlope, boundary_of
+from .boundary import Boundary, boundary_of
 from .directions import SHADOWINGS
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
 from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
@@ -91,11 +92,11 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     flat: Reflectance | UnderCoat | UnderFilm = filmed
     if coat is not None and isinstance(material, Dielectric | Conductor):
         flat = UnderCoat(material, coat)
-    boundary = boundary_of(model, filmed, surface.table)
+    boundary = boundary_of(model, filmed, surface.table.roughness)
     second_order = None
     if may_have_second_order and isinstance(material, Dielectric):
         ratios = ratios_of_second_order(props, surface.table)
-        if ratios is not None and isinstance(boundary, SmallSlope):
+        if ratios is not None and boundary.model.has_second_order:
             second_order = SecondOrder(material, boundary, ratios)
     return Parameters(
         surface=surface,

@@ -1,4 +1,4 @@
-"""Pairs of directions in the patch's frame, and the shadowing of grooves (Dr.Jit)."""
+"""Pairs of directions in the patch's frame (Dr.Jit)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from .types import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
 
 SHADOWINGS = ("none", "vcavity")
-
-_SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 @dataclass(frozen=True)
@@ -110,17 +107,3 @@ class TablePoint:
     w: Float
     cos_i: Float = 1.0
     cos_o: Float = 1.0
-
-
-def vcavity(cos_i: Float, cos_o: Float, one_plus_dot: Float) -> Float:
-    """Return the shadowing of long V-shaped grooves with level edges.
-
-    It is min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)).
-
-    Torrance and Sparrow 1967 (the form is Blinn's, 1977; Stam 1999, appendix, uses it for
-    diffraction). With ωi + ωo = |ωi + ωo| h and |ωi + ωo|² = 2(1 + ωi·ωo) =: 2·one_plus_dot,
-    (n·h)/(ωo·h) = (cosθi + cosθo)/(1 + ωi·ωo). Symmetric in the two directions.
-    """
-    least = dr.minimum(cos_i, cos_o)
-    edge = dr.maximum(one_plus_dot, _SMALLEST)
-    return dr.minimum(1.0, 2.0 * (cos_i + cos_o) * least / edge)

@@ -24,7 +24,7 @@ from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, SmallSlope
+from .boundary import Boundary
 from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
@@ -83,7 +83,7 @@ class EnergyModel:
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self._material = conserving, boundary.material
         self._warned, self._coat = False, coat
-        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
+        self._filmed = isinstance(self._material, UnderFilm) and boundary.model.has_second_order
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 

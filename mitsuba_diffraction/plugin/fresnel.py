@@ -1,14 +1,9 @@
-"""Reflectance and fields of interfaces (Dr.Jit), the twin of `optics.fresnel`.
-
-Power reflectance of a dielectric, a conductor or a perfect mirror; fields at a flat interface, or
-at both of a film.
-"""
+"""Materials: a dielectric, a conductor or a perfect mirror; indices and reflectance (Dr.Jit)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -16,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics import fresnel
 from ..optics.colour import LONGEST, SHORTEST, metal_tint
+from ..optics.fresnel import normal_reflectance
 from ..optics.materials import TISSUES
 from .conductors import (
     extended_texture,
@@ -29,105 +24,6 @@ from .conductors import (
 )
 from .parameter_changes import Bounded, Changeable, ObjectValues, children
 from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
-
-
-@dataclass(frozen=True)
-class Filmed:
-    """The index of a material under a thin film (`optics.fresnel.Filmed`), for one channel."""
-
-    index: Number
-    film: Number
-    depth: Float
-
-    def tilted(self, cosine: Float) -> Filmed:
-        """Return the film's index on a facet whose normal has this cosine to the vertical."""
-        return Filmed(self.index, self.film, self.depth * cosine)
-
-
-#: An index, or that of a material under a film.
-Index = Number | Filmed
-
-
-class Face(NamedTuple):
-    """See `optics.fresnel.Face`."""
-
-    contrast: Number
-    normal: Number
-    s: Number
-    x: Number
-    p: Number
-
-
-def faces(q: Float, square: Float, index: Index) -> list[Face]:
-    """Return fields at the interface, or at both of a film, for a cosine and a squared sine."""
-    if not isinstance(index, Filmed):
-        epsilon = index * index
-        inside = root(epsilon - square)
-        p = dr.rcp(epsilon * q + inside)
-        return [Face(epsilon - 1.0, epsilon, dr.rcp(q + inside), inside * p, p)]
-    epsilon, film, within, once, back_s, back_p = _film(square, index)
-    there_s, there_p = back_s * once * once, back_p * once * once
-    s = dr.rcp(within + q + (q - within) * there_s)
-    p = dr.rcp(film * q + within + (film * q - within) * there_p)
-    x, into_s, into_p = within * p, s * once, p * once
-    return [
-        Face(film - 1.0, film, s * (1.0 + there_s), x * (1.0 - there_p), p * (1.0 + there_p)),
-        Face(
-            epsilon - film,
-            film * dr.rcp(epsilon),
-            into_s * (1.0 + back_s),
-            within * into_p * (1.0 - back_p),
-            into_p * (1.0 + back_p),
-        ),
-    ]
-
-
-def amplitudes(cosine: Float, square: Float, index: Index) -> tuple[Number, Number]:
-    """Return r_s and r_p for the cosine and the squared sine of the angle of incidence."""
-    if not isinstance(index, Filmed):
-        epsilon = index * index
-        inside = root(epsilon - square)
-        return (cosine - inside) * dr.rcp(cosine + inside), (
-            (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside)
-        )
-    _, film, within, once, back_s, back_p = _film(square, index)
-    pairs = []
-    for q, back in ((mi.Complex2f(cosine, 0.0), back_s), (film * cosine, back_p)):
-        there = back * once * once
-        pairs.append(
-            (q - within + (q + within) * there) * dr.rcp(q + within + (q - within) * there)
-        )
-    return pairs[0], pairs[1]
-
-
-def _film(square: Float, index: Filmed) -> tuple[Number, ...]:
-    """ε of material and film, q of the film, one passage's phase, r_s and r_p of the lower face."""
-    epsilon, film = index.index * index.index, index.film * index.film
-    below, within = root(epsilon - square), root(film - square)
-    outer, inner = epsilon * within, film * below
-    sin, cos = dr.sincos(within.real * index.depth)
-    decay = dr.exp(-within.imag * index.depth)
-    once = mi.Complex2f(cos * decay, sin * decay)
-    r_s = (within - below) * dr.rcp(within + below)
-    return epsilon, film, within, once, r_s, (outer - inner) * dr.rcp(outer + inner)
-
-
-def squared(x: Number) -> Float:
-    """Return |x|²."""
-    return dr.fma(x.real, x.real, dr.square(x.imag)) if dr.is_complex_v(x) else dr.square(x)
-
-
-def root(square: Number) -> Number:
-    """Return the root whose wave decays, or else travels, away from the surface."""
-    if not dr.is_complex_v(square):
-        return dr.safe_sqrt(square)
-    # The larger part from a sum, the other from the product: neither cancels
-    length = dr.sqrt(squared(square))
-    larger = dr.sqrt(0.5 * (length + dr.abs(square.real)))
-    smaller = 0.5 * square.imag / dr.maximum(larger, 1e-20)
-    travels = square.real >= 0.0
-    return mi.Complex2f(dr.select(travels, larger, smaller), dr.select(travels, smaller, larger))
-
 
 #: Bounds of ratios of refractive indices: beyond, squares leave single precision's range.
 INDICES = (1e-3, 1e3)
@@ -308,7 +204,7 @@ class Conductor:
         if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
             return
         medium = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
-        spectrum, channels = (fresnel.reflectance(1.0, index / medium) for index in self._spectrum)
+        spectrum, channels = (normal_reflectance(index / medium) for index in self._spectrum)
         self.tint = [mi.Color3f(rgb) for rgb in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
         dr.make_opaque(self.tint)
 

@@ -1,6 +1,6 @@
 """Layers over the structure, and the light for a BSDF beneath it (Dr.Jit).
 
-A flat clear coat, the twin of `optics.coat`; a thin film that is coherent with the material, see
+A flat clear coat (`optics.coat`); a thin film that is coherent with the material, see
 `optics.fresnel.Filmed`; and how much light reaches a nested BSDF.
 """
 
@@ -14,10 +14,13 @@ import mitsuba as mi
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..optics.arithmetic import is_complex
+from ..optics.coat import refracted
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ..optics.fresnel import Filmed, reflectance
 from ..optics.geometry import wavenumber
 from .directions import Pair
-from .fresnel import INDEX_PARTS, Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
+from .fresnel import INDEX_PARTS, Conductor, Dielectric, Reflectance
 from .parameter_changes import Bounded
 from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
@@ -35,7 +38,7 @@ class CoatedPair(Pair):
 
     def __init__(self, outer: Pair, n: Float) -> None:
         self._outer, self.n = outer, n
-        self.wi, self.wo = refracted(outer.wi, n), refracted(outer.wo, n)
+        self.wi, self.wo = (mi.Vector3f(*refracted(w, n)) for w in (outer.wi, outer.wo))
         self.frame, self.uv = outer.frame, outer.uv
         self.cos_i, self.cos_o = self.wi.z, self.wo.z
         self.w = n * (self.cos_i + self.cos_o)
@@ -76,29 +79,6 @@ class UnderCoat:
 
     def __str__(self) -> str:
         return f"{self.material} under coat[eta = {dr.slice(self.coat.eta):.5g}]"
-
-
-def transmittances(cosine: Float, n: Float) -> tuple[Float, Float]:
-    """Return T_s and T_p of a face for the cosine of the angle outside; equal both ways."""
-    inside = dr.safe_sqrt(dr.fma(cosine, cosine, n * n - 1.0))
-    outside = 4.0 * cosine * inside
-    below = dr.fma(n * n, cosine, inside)
-    return outside * dr.rcp(dr.square(cosine + inside)), n * n * outside * dr.rcp(dr.square(below))
-
-
-def bounced(face: tuple[Float, Float], structure: tuple[Float, Float]) -> Float:
-    """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
-    # At Brewster's angle R is 0 to rounding
-    ends = [dr.safe_sqrt(r * rho) for r, rho in zip(face, structure, strict=True)]
-    left = dr.fma(-ends[0], ends[1], 1.0)
-    return dr.rcp(dr.maximum(left, dr.maximum(*structure) * (1.0 - dr.minimum(*face))))
-
-
-def refracted(direction: Vector3f, n: Float) -> Vector3f:
-    """Return a direction that points away from the surface, within a coat of index n."""
-    x, y = direction.x / n, direction.y / n
-    # Grazing light would come to lie in the face where the coat is none
-    return mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - dr.fma(x, x, y * y), 1e-12)))
 
 
 #: Path there and back, nm, over which light interferes: λ²/Δλ at 550 nm of a band of 25 nm.
@@ -175,9 +155,7 @@ class UnderFilm:
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R of the flat film for the cosine of the angle of incidence, unpolarised."""
-        square = dr.fma(-cos_theta, cos_theta, 1.0)
-        pairs = [amplitudes(cos_theta, square, index) for index in self.indices(si, active)]
-        powers = [0.5 * (squared(r_s) + squared(r_p)) for r_s, r_p in pairs]
+        powers = [reflectance(cos_theta, index) for index in self.indices(si, active)]
         return mi.UnpolarizedSpectrum(self.summed(powers))
 
     def indices(self, si: Interaction, active: Mask) -> list[Filmed]:
@@ -260,7 +238,7 @@ def _thickness_refusal(value: float) -> str:
 
 
 def _complex(index: Number) -> Number:
-    return index if dr.is_complex_v(index) else mi.Complex2f(index, 0.0)
+    return index if is_complex(index) else mi.Complex2f(index, 0.0)
 
 
 def _between(values: list[Number], wavelengths: list[float]) -> list[Number]:

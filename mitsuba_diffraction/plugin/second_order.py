@@ -1,8 +1,8 @@
 """The second order of small slope as a factor on the power of orders (Dr.Jit).
 
-The twin of `optics.second_order`: c is looked up once for a pair of directions, r for each channel
-at k (u, v) and κ. A factor on the heights multiplies κ by the factor and r by its square; a
-factor on lengths in the plane divides r, a product of slopes, by its square.
+The formula is `optics.second_order.added_power`: c is looked up once for a pair of directions, r
+for each channel at k (u, v) and κ. A factor on the heights multiplies κ by the factor and r by its
+square; a factor on lengths in the plane divides r, a product of slopes, by its square.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.second_order import LIMIT, NODES, coefficient_table
+from ..optics.blend import small_slope_weight
+from ..optics.fresnel import normal_reflectance
+from ..optics.second_order import NODES, added_power, coefficient_table
 from ..optics.second_order_change import applies
 from ..optics.slope_ratios import SlopeRatios
 from ..settings import checked
 from ..tables.table import DiffractionTable
-from .boundary import SmallSlope
+from .boundary import Boundary
 from .directions import Pair
 from .fresnel import Dielectric
 from .memory import index_between, read_record, upload
-from .types import Float, Index, Kind, Number, Properties
+from .types import Float, Index, Kind, Properties
 
 #: Step to which indices are rounded for c.
 INDEX_STEP = 0.01
@@ -62,7 +64,7 @@ class SecondOrder:
     Parameters
     ----------
     material : the surface's dielectric.
-    boundary : its model, which has the share of small slope in an order.
+    boundary : its model, which sees the heights.
     ratios : slope ratios of its heights.
 
     Attributes
@@ -70,7 +72,7 @@ class SecondOrder:
     index : index of the coefficients c, rounded to `INDEX_STEP`.
     """
 
-    def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
+    def __init__(self, material: Dielectric, boundary: Boundary, ratios: SlopeRatios) -> None:
         self._material, self._boundary, self.index = material, boundary, math.nan
         self._cell, self._orders, self._middle = ratios.cell, ratios.orders, ratios.middle
         self._first = ratios.kappa[0]
@@ -89,19 +91,17 @@ class SecondOrder:
 
     def added(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
         """|1 + s (c_l r_l + c_t r_t)|² − 1 for each channel."""
-        indices: list[Number] = [self._material.eta]
-        shares = self._boundary.shares(pair, height_scale, wavenumbers, indices)
         c = self._coefficients.at(self._angles(pair))
-        factors = []
-        for k, share in zip(wavenumbers, shares, strict=True):
+        reflected = normal_reflectance(self._material.eta)
+        scale = dr.square(height_scale * dr.rcp(pair.frame.stretch))
+        changes = []
+        heights = self._boundary.heights(pair, height_scale, wavenumbers)
+        for k, each in zip(wavenumbers, heights, strict=True):
+            assert each is not None
             r = self._ratios.at(self._place(pair, height_scale, k))
-            scale = (1.0 - share) * dr.square(height_scale * dr.rcp(pair.frame.stretch))
-            real = scale * (c[0] * r[0] - c[1] * r[1] + c[2] * r[2] - c[3] * r[3])
-            imaginary = scale * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
-            square = dr.fma(real, real, imaginary * imaginary)
-            least = dr.minimum(1.0, LIMIT * dr.rsqrt(dr.maximum(square, 1e-20)))
-            factors.append(least * dr.fma(least, square, 2.0 * real))
-        return factors
+            weight = scale * small_slope_weight(each.kappa, each.variance, reflected)
+            changes.append(added_power(tuple(c), tuple(r), weight))
+        return changes
 
     def _angles(self, pair: Pair) -> list[Float]:
         """θi, θo and the azimuth of ωo from that of −ωi, in nodes."""

@@ -14,10 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..optics import boundary
+from ..optics.blend import ScaleRoughness
+from ..optics.boundary import Heights, Model, geometry
+from ..optics.boundary import model_of as registered_model
 from ..optics.fresnel import Filmed
-from ..optics.geometry import kirchhoff_factor
+from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..settings import COHERENCES
+from . import boundary
 from . import coat as coats
 from . import film as films
 from . import model as models
@@ -132,7 +135,7 @@ def mueller(
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
     They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
-    `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
+    `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(width_of(coherence_width, field), coherence, place, len(light.wavelength))
@@ -189,7 +192,11 @@ def _lit(
 ) -> Real:
     """Measured light of directions above the surface."""
     if isinstance(index, Filmed):
-        jones = films.jones(field, light, index, material.model)
+        jones = (
+            films.jones(field, light, index)
+            if material.model == "small_slope"
+            else _matrices(field, light, index, material.model)
+        )
         power = window_power(field, *light, *window)
         return models.reflected(light, window.sigma, power, jones, measure)
     if material.coat is not None:
@@ -209,10 +216,30 @@ def _structure(
 ) -> tuple[Real, Complex]:
     """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
     if material.model != "small_slope":
-        matrices = boundary.matrices_of(material.model)
-        return window_power(field, *light, *window), matrices(light.wi, light.wo, index)
+        return window_power(field, *light, *window), _matrices(field, light, index, material.model)
     s = models.share(field, light, index)
     jones = models.blended(models.kirchhoff(light, index), models.small_slope(light, index), s)
     if material.second_order:
         return models.ensemble_power(field, light, window.sigma, (index, s)), jones
     return window_power(field, *light, *window), jones
+
+
+def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:
+    """J of Kirchhoff's facets, or of another model by its own formula."""
+    if name == "kirchhoff":
+        return boundary.kirchhoff(light.wi, light.wo, index)
+    return registered(registered_model(name), field, light, index)
+
+
+def registered(model: Model, field: HeightField, light: Light, index: Complex | Filmed) -> Complex:
+    """J (n, 2, 2) of a registered model by its own formula, for heights without a table."""
+    (x0, y0, z0), (x, y, z) = light.wi.T, light.wo.T
+    heights = None
+    if model.statistic is not None:
+        k = wavenumber(light.wavelength)
+        q = k * np.hypot(x0 + x, y0 + y)
+        exact = ScaleRoughness.from_heights(field.heights, field.pixel_size)
+        heights = Heights(k * (z0 + z), model.statistic(exact.table(float(q.max()))).at(q))
+    entries = model.jones(geometry((x0, y0, z0), (x, y, z)), index, heights)
+    ss, sp, ps, pp = (entry / (2 * z0 * z) for entry in entries)
+    return boundary.jones_matrix(ss=ss, sp=sp, ps=ps, pp=pp)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..optics.coat import refracted, transmitted
 from ..optics.geometry import wavenumber
 from . import model
+from .fresnel import amplitudes
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -47,3 +47,38 @@ def reflected(
     face = model.kirchhoff(light, np.asarray(coat, complex))
     flat = 4 * np.pi**2 * sigma**4 * lobe
     return structure + model.reflected(light, sigma, flat, face, measure)
+
+
+def refracted(direction: ArrayLike, n: float) -> Real:
+    """A unit vector (..., 3) above the face as it is in the coat, of relative index n."""
+    outside = np.asarray(direction, np.float64)
+    x, y = outside[..., 0] / n, outside[..., 1] / n
+    return np.stack([x, y, np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))], axis=-1)
+
+
+def transmitted(
+    jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, n: float, index: ArrayLike
+) -> Complex:
+    """Jones matrices (..., 2, 2) of the structure in the coat, as seen from outside the coat.
+
+    wi, wo : directions outside the coat, (..., 3).
+    index : (...) of the structure over that of the coat.
+    """
+    (back0, sent0), (back, sent) = (_mirrors(np.asarray(w, np.float64), n, index) for w in (wi, wo))
+    passed = (1.0 - back)[..., :, None] * (1.0 - back0)[..., None, :]
+    both = np.sqrt((back * sent)[..., :, None] * (back0 * sent0)[..., None, :])
+    most = np.maximum(sent[..., :, None], sent0[..., None, :])
+    least = most * (1.0 - np.minimum(back[..., :, None], back0[..., None, :]))
+    matrix = np.asarray(jones, np.complex128)
+    return np.asarray(np.sqrt(passed / np.maximum(1.0 - both, least)) * matrix)
+
+
+def _mirrors(outside: Real, n: float, index: ArrayLike) -> tuple[Real, Real]:
+    """R_s and R_p of the face, the same from both sides, and of the flat structure, (..., 2)."""
+    within = refracted(outside, n)[..., 2]
+    face, structure = amplitudes(outside[..., 2], n), amplitudes(within, index)
+    return _powers(*face), _powers(*structure)
+
+
+def _powers(r_s: Complex, r_p: Complex) -> Real:
+    return np.asarray(np.abs(np.stack([r_s, r_p], axis=-1)) ** 2)

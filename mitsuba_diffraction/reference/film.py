@@ -6,23 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..heights.field import HeightField
-from ..optics import blend, boundary
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
 from ..optics.mean_second_order import mean_gain
+from . import boundary
 from . import model as models
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def jones(field: HeightField, light: models.Light, film: Filmed, model: str) -> Complex:
-    """J of the filmed boundary; by small slope times √(g(ωi) g(ωo)), the mean second order."""
+def jones(field: HeightField, light: models.Light, film: Filmed) -> Complex:
+    """J of the filmed boundary by small slope, times √(g(ωi) g(ωo)), the mean second order."""
     wi, wo, wavelength = light
-    if model != "small_slope":
-        return boundary.matrices_of(model)(wi, wo, film)
-    matrices = blend.jones(wi, wo, film, models.share(field, light, film))
+    matrices = boundary.blended(wi, wo, film, models.share(field, light, film))
     gain = _mean_gain(field, (wi[:, 2], wo[:, 2]), wavelength, film)
     return matrices * np.sqrt(gain)[:, None, None]
 

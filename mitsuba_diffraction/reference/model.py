@@ -37,10 +37,11 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
-from ..optics.boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
-from ..optics.fresnel import Index, amplitudes, decaying_root, reflectance
+from ..optics.fresnel import Index
 from ..optics.second_order import slope_coefficients
 from ..optics.slope_ratios import Slopes, along
+from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
+from .fresnel import amplitudes, decaying_root, reflectance
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

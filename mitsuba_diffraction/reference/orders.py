@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import DiffractionError
-from ..optics.fresnel import reflectance
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from .arguments import directions_of
+from .fresnel import reflectance
 
 Real = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 

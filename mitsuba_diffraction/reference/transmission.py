@@ -7,12 +7,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..optics import blend, boundary, through
-from ..optics.coat import refracted
+from ..optics import through as formulas
+from ..optics.blend import ScaleRoughness
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import checked
+from . import boundary, through
 from .arguments import directions_of, index_of, model_of, width_of
+from .coat import refracted
 from .integral import screen_power
+from .model import blended
 
 
 def btdf(
@@ -39,7 +42,7 @@ def btdf(
     width = width_of(coherence_width, field)
     checked("coherence", coherence)
     first, second, lam = directions_of(wi, wo, wavelength)
-    model = model_of(model, index_of(eta, 0.0, lam, None), through.MODELS)
+    model = model_of(model, index_of(eta, 0.0, lam, None), formulas.MODELS)
     if not 1.0 < float(eta) < np.inf:
         raise DiffractionError(f"eta={eta} must be one real index above 1")
     swapped = first[:, 2:] < 0
@@ -53,11 +56,12 @@ def btdf(
         inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
     k, total = wavenumber(lam), above + eta * inside
     kappa, sigma = -k * total[:, 2], sigma_of(width)
-    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
+    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
-        s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]
-        jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
+        variance = roughness.at(k * np.hypot(*total[:, :2].T))
+        s = boundary.small_slope_weight(kappa, variance, eta)
+        jones = blended(jones, through.small_slope(above, inside, eta), s)
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
     screens = [np.exp(1j * phase * field.heights) for phase in kappa]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.fresnel import amplitudes as fresnel
+from ..optics import fresnel
 from .materials import Material
 from .stations import Complex, Real, Station
 
@@ -127,7 +127,9 @@ class _FlatSide:
         lit, leaves = within > 0.0, outside > 0.0
         z_within = np.sqrt(np.where(lit, within, 1.0))
         z_outside = np.sqrt(np.where(leaves, outside, 1.0))
-        r = np.stack(fresnel(z_within / index, 1.0 / index), axis=-1) * lit[:, None]
+        cosine = z_within / index
+        face = fresnel.amplitudes(cosine, 1.0 - cosine * cosine, 1.0 / index)
+        r = np.stack(face, axis=-1).astype(np.complex128) * lit[:, None]
         t = np.sqrt(np.maximum(1.0 - np.abs(r) ** 2, 0.0)) * (lit & leaves)[:, None]
         down, up = (self._turn(sign * z_within, index) for sign in (-1.0, 1.0))
         below, rising = (self._turn(sign * z_outside, 1.0) for sign in (-1.0, 1.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import boundary, fresnel
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from mitsuba_diffraction.reference import boundary, fresnel
 from tests.support.directions import polar
 from tests.support.matrices import MATRICES, REVERSED, pairs
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.reference import fresnel
 
 COSINES = np.cos(np.radians([0.0, 20.0, 45.0, 70.0, 89.0]))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.second_order import (
     Perturbation,
     factor,
@@ -13,6 +12,7 @@ from mitsuba_diffraction.optics.second_order import (
     obliqueness,
     slope_coefficients,
 )
+from mitsuba_diffraction.reference import boundary
 from tests.support.directions import polar
 
 KERATIN = 1.56

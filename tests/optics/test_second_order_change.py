@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import gratings
-from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.second_order import factor, slope_coefficients
 from mitsuba_diffraction.optics.second_order_change import applies, colour_change
 from mitsuba_diffraction.optics.slope_ratios import CellGrid, CellSums, Slopes, along
+from mitsuba_diffraction.reference import boundary
 from tests.support.directions import polar
 
 VISIBLE = (360.0, 830.0)
@@ -49,8 +50,8 @@ def order_by_order(field) -> float:
                 a, *products = np.fft.fft2(functions).reshape(4, -1)[:, n] / (nx * ny)
                 if abs(a) < 1e-9:  # along the grooves there is no light
                     continue
-                share = blend.weight(wave * w, roughness.at(np.hypot(*q[n])), 1.5)
-                power = wo[2] * boundary.unpolarised(blend.jones(wi, wo, 1.5, share)) / w**2
+                share = boundary.small_slope_weight(wave * w, roughness.at(np.hypot(*q[n])), 1.5)
+                power = wo[2] * boundary.unpolarised(boundary.blended(wi, wo, 1.5, share)) / w**2
                 power *= abs(a) ** 2
                 r = slopes.gate * along(q[n], np.array(products)) / a
                 c = slope_coefficients(wi, wo[None], 1.5)[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import boundary, fresnel, through
+from mitsuba_diffraction.reference import boundary, fresnel, through
 from tests.support.directions import polar
 from tests.support.matrices import pairs
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Energy
 from mitsuba_diffraction.tables.energy.materials import Reflector

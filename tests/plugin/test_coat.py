@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import Array, as_single, polar
 from tests.support.lanes import evaluated, interaction, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs

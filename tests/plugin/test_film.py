@@ -18,10 +18,11 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
+from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.mean_second_order import limited, mean_gain
 from mitsuba_diffraction.plugin.layers import Channels
+from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.film import mean_exponents
 from tests.support.directions import as_single, polar
 from tests.support.lanes import evaluated, interaction, refusal

@@ -94,7 +94,7 @@ def test_matrices_are_the_reference_s(polarised, model, material):
     if "coat_ior" in material:
         index = index | {"coat": material["coat_ior"]}
     # light arrives along ωo where radiance is followed
-    s_in, s_out = md.optics.boundary.polarisation_axes(wo, wi)
+    s_in, s_out = md.reference.boundary.polarisation_axes(wo, wi)
     before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
     for n, lam in enumerate(LAM):
         exact = reference.mueller(

@@ -10,6 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import blend, second_order
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
+from mitsuba_diffraction.reference import boundary
 from tests.support.directions import lit_pairs, polar, rough_patch
 from tests.support.lanes import brdf_values, interaction, refusal, vectors
 
@@ -86,7 +87,7 @@ def test_the_factor_is_that_of_its_numpy_twin(variant, scale):
     wave = wavenumber(lam)
     q, kappa = wave[:, None] * (wi + wo)[:, :2], wave * (wi + wo)[:, 2] * scale
     roughness = blend.ScaleRoughness.from_heights(scale * PATCH.heights, PATCH.pixel_size)
-    share = blend.weight(kappa / scale, roughness.at(np.hypot(*q.T)), 1.56)
+    share = boundary.small_slope_weight(kappa / scale, roughness.at(np.hypot(*q.T)), 1.56)
     ratios = scale**2 * bsdf.table.slope_ratios.at(q, kappa)
     factor = second_order.factor(second_order.interpolated(1.56, wi, wo), ratios, share)
     found, first = brdf_values(bsdf, *light), brdf_values(plain, *light)

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.reference import fresnel
 from tests.support.directions import polar, rough_patch
 
 #: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics import blend, boundary, second_order
+from mitsuba_diffraction.optics import blend, second_order
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
 from mitsuba_diffraction.optics.slope_ratios import Slopes, along
-from mitsuba_diffraction.reference import model
+from mitsuba_diffraction.reference import boundary, model
 from tests.support.directions import rough_patch
 from tests.support.matrices import pairs
 
@@ -29,9 +29,9 @@ def test_matrices_are_those_of_the_tables(index):
     variance = blend.ScaleRoughness.from_heights(FIELD.heights, FIELD.pixel_size).at(
         np.hypot(*total[:, :2].T)
     )
-    assert s == pytest.approx(blend.weight(total[:, 2], variance, index))
+    assert s == pytest.approx(boundary.small_slope_weight(total[:, 2], variance, index))
     both = model.blended(model.kirchhoff(LIGHT, index), model.small_slope(LIGHT, index), s)
-    assert both == pytest.approx(blend.jones(WI, WO, index, s))
+    assert both == pytest.approx(boundary.blended(WI, WO, index, s))
 
 
 def test_factors_are_those_of_the_plugin_s_twin():

@@ -7,7 +7,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.boundary import small_slope
+from mitsuba_diffraction.reference.boundary import small_slope
 from mitsuba_diffraction.solve.listing import list_orders
 from tests.support.orders import shallow_grating, thin_grating
 

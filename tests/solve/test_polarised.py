@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics.boundary import mueller, small_slope
+from mitsuba_diffraction.reference.boundary import mueller, small_slope
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import sinusoidal

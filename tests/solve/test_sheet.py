@@ -7,9 +7,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.optics.geometry import sigma_of
-from mitsuba_diffraction.optics.through import flat_transmittances
+from mitsuba_diffraction.reference.fresnel import reflectance
+from mitsuba_diffraction.reference.through import flat_transmittances
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of

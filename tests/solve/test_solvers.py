@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics.boundary import turn
-from mitsuba_diffraction.optics.fresnel import amplitudes as fresnel
+from mitsuba_diffraction.reference.boundary import turn
+from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.materials import material_of

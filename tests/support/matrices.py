@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.reference import boundary
 from tests.support.directions import uniform_directions
 
 MATRICES = (boundary.small_slope, boundary.kirchhoff)

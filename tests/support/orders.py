@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.boundary import mueller, polarisation_axes, small_slope, turn
+from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, small_slope, turn
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions

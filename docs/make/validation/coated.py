@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.optics.fresnel import amplitudes
 from mitsuba_diffraction.progress import Progress, silent
+from mitsuba_diffraction.reference.fresnel import amplitudes
 
 from . import integral, rayleigh
 from .cases import ALUMINIUM, COAT, FEW_WAVELENGTHS, PROFILES, Grating, Scan, index_of, order_sines

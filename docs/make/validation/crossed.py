@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.reference import boundary
 
 #: Orders closer to the horizon than this cosine are not returned.
 HORIZON = 0.01

@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.blend import ScaleRoughness
-from mitsuba_diffraction.optics.fresnel import Filmed, decaying_root
+from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.optics.mean_second_order import mean_gain
 from mitsuba_diffraction.progress import Progress, silent
+from mitsuba_diffraction.reference.fresnel import decaying_root
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
 from .compare import GRAZING

@@ -10,7 +10,7 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
     η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
 For a mirror this is R; for m = 0 of any grating R·|a_0|². Kirchhoff's model has
-R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.optics.boundary`. The
+R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.boundary`. The
 default has the second order on dielectrics, from what a table holds of it: `second_order`.
 """
 
@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
-from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.colour import SHORTEST
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.optics.second_order import factor, interpolated
 from mitsuba_diffraction.optics.slope_ratios import CellGrid, CellSums, SlopeRatios
+from mitsuba_diffraction.reference import boundary
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
@@ -126,8 +127,8 @@ def jones_of(
     if model == "small_slope_alone":
         return boundary.small_slope(wi, wo, index)
     if model == "half_and_half":
-        return blend.jones(wi, wo, index, 0.5)
-    return blend.jones(wi, wo, index, share_of(field, index, wi, wo, wavelength))
+        return boundary.blended(wi, wo, index, 0.5)
+    return boundary.blended(wi, wo, index, share_of(field, index, wi, wo, wavelength))
 
 
 def share_of(
@@ -141,7 +142,7 @@ def share_of(
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
-    return np.asarray(blend.weight(k * total[:, 2], variance, index))
+    return np.asarray(boundary.small_slope_weight(k * total[:, 2], variance, index))
 
 
 def second_order(

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.progress import Progress, silent
+from mitsuba_diffraction.reference import boundary
 
 from . import crossed, rayleigh
 from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index

@@ -25,10 +25,10 @@ from scipy.signal import resample
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics import boundary
-from mitsuba_diffraction.optics.fresnel import decaying_root
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.second_order import axes
+from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.reference.fresnel import decaying_root
 
 from .crossed import HORIZON, Orders, is_crossed, lowest_orders
 

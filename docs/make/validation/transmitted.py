@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import DiffractionTable, gratings, reference
 from mitsuba_diffraction.analysis.energy import sides_summary
 from mitsuba_diffraction.heights.recipes import Recipe
-from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
+from mitsuba_diffraction.reference import boundary
 
 from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating

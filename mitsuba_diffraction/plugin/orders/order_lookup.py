@@ -9,6 +9,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...optics.coat import transmittances
 from ...optics.orders import (
     cell_wavelengths,
     order_cell,
@@ -17,7 +18,6 @@ from ...optics.orders import (
 )
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners, least_c
-from ..layers import transmittances
 from ..memory import index_between, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 

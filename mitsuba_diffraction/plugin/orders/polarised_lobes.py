@@ -16,13 +16,15 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...optics.arithmetic import squared
+from ...optics.boundary import SAME_DIRECTION, Jones
+from ...optics.coat import refracted, transmittances
+from ...optics.fresnel import amplitudes
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import matrices
 from ...tables.orders.polarised import ODD
-from ..boundary import LEVEL, Jones, mueller, turn, turned
+from ..boundary import mueller, turn, turned
 from ..directions import Pair
-from ..fresnel import amplitudes, squared
-from ..layers import refracted, transmittances
 from ..memory import read, read_record, upload
 from ..types import Context, Float, Mask, Spectrum, Vector3f
 from .lobes import Lit, SpectralLobes
@@ -149,7 +151,7 @@ class _Path:
     def _passage(self, outside: Vector3f, enters: bool) -> Jones:
         """Return the Jones matrix of the coat's face between the axes outside and inside."""
         sign = -1.0 if enters else 1.0
-        inside = sign * refracted(sign * outside, mi.Float(self._index))
+        inside = sign * mi.Vector3f(*refracted(sign * outside, mi.Float(self._index)))
         powers = transmittances(dr.abs(outside.z), mi.Float(self._index))
         inverse = dr.rcp(dr.maximum(0.5 * (powers[0] + powers[1]), _MIN_DIVISOR))
         through_s, through_p = (dr.sqrt(power * inverse) for power in powers)
@@ -171,9 +173,9 @@ def _across(axis: Vector3f, direction: Vector3f) -> Vector3f:
 def _level(direction: Vector3f) -> Vector3f:
     """Return s = ẑ×d/|ẑ×d|, y along the normal."""
     square = dr.square(direction.x) + dr.square(direction.y)
-    inverse = dr.rsqrt(dr.maximum(square, LEVEL))
+    inverse = dr.rsqrt(dr.maximum(square, SAME_DIRECTION))
     level = mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)
-    return dr.select(square > LEVEL, level, mi.Vector3f(0.0, 1.0, 0.0))
+    return dr.select(square > SAME_DIRECTION, level, mi.Vector3f(0.0, 1.0, 0.0))
 
 
 def _product(a: Jones, b: Jones) -> Jones:

@@ -71,4 +71,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     thin, model = flag(props, "thin", False), choice(props, "model", tuple(through.MODELS))
     # Light below the surface has the wavelength λ/n
     surface = read_surface(props, provider, float(dr.slice(material.eta)), second_order=False)
-    return Parameters(surface, material, boundary_of(model, material, surface.table), thin)
+    return Parameters(
+        surface, material, boundary_of(model, material, surface.table.roughness), thin
+    )

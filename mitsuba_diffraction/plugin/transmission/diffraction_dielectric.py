@@ -65,11 +65,15 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
+from ...optics import through
+from ...optics.boundary import Geometry, Jones, geometry, power
+from ...optics.coat import transmittances
+from ...optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
+from ..boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
 from ..description import Surface
 from ..directions import Pair, PatchFrame, TablePoint
-from ..fresnel import Inside, squared
-from ..layers import CoatedPair, transmittances
+from ..fresnel import Inside
+from ..layers import CoatedPair
 from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
@@ -90,11 +94,6 @@ from .crossing import (
     Crossing,
     Sides,
     Turned,
-    crossing_axes,
-    first_order,
-    order_0,
-    out_of_sheet,
-    tangent_plane,
 )
 from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
@@ -124,10 +123,8 @@ class DiffractionDielectric(DiffractingSurface):
         super().__init__(props, read.surface, read.material)
         self.material, self.thin, self.boundary = read.material, read.thin, read.boundary
         inside = Inside(self.material, self.thin)
-        self.inner_boundary: Boundary = (
-            self.boundary.of(inside) if isinstance(self.boundary, SmallSlope) else Kirchhoff(inside)
-        )
-        self.mirror = Kirchhoff(self.material)
+        self.inner_boundary = self.boundary.of(inside)
+        self.mirror = Boundary(KIRCHHOFF, self.material)
         self._energy = None
         if read.surface.energy_conserving:
             self._energy = DielectricEnergy(
@@ -162,22 +159,23 @@ class DiffractionDielectric(DiffractingSurface):
         frame = self.frame_at(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
+        scale = self.scale_at(si, active)
+        change, where = None, (self.power.wavenumbers(si), scale)
         if self._energy is not None and self._energy.scales_order_0:
             change = self._energy.order_0_scale((si.wi, wo), frame, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, si, wo, frame, lit, change)
+                side, orders = reflected(ctx, si, wo, frame, scale, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
-            passed = self._transmitted(ctx, si, crossing, change) * dr.abs(cos_o)
+            passed = self._transmitted(ctx, si, crossing, scale, change) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
-            orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
+            orders = self.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         if self._energy is not None and self._energy.attenuates:
             # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
@@ -245,13 +243,14 @@ class DiffractionDielectric(DiffractingSurface):
         si: Interaction,
         wo: Vector3f,
         frame: PatchFrame,
+        scale: Float,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        scale, pair = self.scale_at(si, lit), Pair(si, wo, frame, lit)
+        pair = Pair(si, wo, frame, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
-        value = self.lobe(ctx, si, pair, self.boundary, power, lit)
+        value = self.lobe(ctx, si, pair, self.boundary, power, scale, lit)
         if self.thin:
             value += self._returned(si, pair, scale, change)
         return value, self.power.density(pair, scale, si)
@@ -262,16 +261,17 @@ class DiffractionDielectric(DiffractingSurface):
         si: Interaction,
         wo: Vector3f,
         frame: PatchFrame,
+        scale: Float,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
-        n, scale = self.material.eta, self.scale_at(si, lit)
+        n = self.material.eta
         if self.thin:
             outer = Turned(si, wo, frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             power = self.geometry(pair) * self._power(si, pair, scale, change)
-            value = self.lobe(ctx, si, pair, self.inner_boundary, power, lit)
+            value = self.lobe(ctx, si, pair, self.inner_boundary, power, scale, lit)
             face = self.face(ctx, si, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             return value, self.power.density(outer, scale * n, si)
@@ -279,7 +279,7 @@ class DiffractionDielectric(DiffractingSurface):
         power = self.geometry(inner) * self._power(si, inner.place, scale, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
-        value = self.lobe(ctx, si, inner, self.inner_boundary, power, lit) * dr.square(n)
+        value = self.lobe(ctx, si, inner, self.inner_boundary, power, scale, lit) * dr.square(n)
         return value, self.power.density(inner, scale * n, si) * dr.square(n)
 
     def _returned(
@@ -316,19 +316,20 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         crossing: Crossing,
+        scale: Float,
         change: Colour | None,
     ) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        point, scale = crossing.place, self.scale_at(si, crossing.active)
+        point = crossing.place
         power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
         zeroth = dr.minimum(zeroth, power)  # speckle may be dark
-        axes = crossing_axes(-crossing.above, crossing.inside)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
-        others = self._factor(ctx, si, crossing, axes, self._matrices(si, crossing, axes))
-        flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
+        pair = geometry(crossing.above, crossing.inside)
+        others = self._factor(ctx, si, crossing, self._matrices(si, crossing, scale, pair))
+        flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
         outside = mi.Float(self.area_factor * crossing.frame.area)
@@ -342,44 +343,39 @@ class DiffractionDielectric(DiffractingSurface):
         return dr.select(crossing.active, value * outside, 0.0)
 
     def _matrices(
-        self,
-        si: Interaction,
-        crossing: Crossing,
-        axes: tuple[Vector3f, Vector3f],
+        self, si: Interaction, crossing: Crossing, scale: Float, pair: Geometry
     ) -> list[Jones]:
         """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
-        tangent = tangent_plane(crossing, axes)
-        if not isinstance(self.boundary, SmallSlope):
-            return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
-        first = first_order(crossing, axes, self.thin)
-        shares = self.boundary.shares(
-            crossing.place,
-            self.scale_at(si, crossing.active),
-            self.power.wavenumbers(si),
-            [crossing.n],
-        )
-        blended = [
-            tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
-            for share in shares
-        ]
-        return [out_of_sheet(jones, crossing) for jones in blended] if self.thin else blended
+        n, above, below = crossing.n, crossing.above, crossing.below
+        heights = self.boundary.heights(crossing.place, scale, self.power.wavenumbers(si))
+        # Beyond the critical angle light decays outside; from outside none arrives there
+        outside = outside_square(pair, n)
+        outside = outside if self.thin else mi.Complex2f(outside, 0.0)
+        formula = through.MODELS[self.boundary.model.name]
+        matrices = [formula(pair, above, crossing.inside, n, outside, each) for each in heights]
+        if not self.thin:
+            return matrices
+        return [out_of_sheet(jones, n, above.z, -below.z) for jones in matrices]
+
+    def _order_0(self, crossing: Crossing, pair: Geometry) -> Jones:
+        """Return the matrix of order 0."""
+        n, above = crossing.n, crossing.above.z
+        outer = -crossing.below.z if self.thin else dr.safe_sqrt(outside_square(pair, n))
+        ends = (flat_transmittances(cosine, n, self.thin) for cosine in (above, outer))
+        return order_0(pair, *ends)
 
     def _factor(
-        self,
-        ctx: Context,
-        si: Interaction,
-        crossing: Crossing,
-        axes: tuple[Vector3f, Vector3f],
-        matrices: list[Jones],
+        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
     ) -> Spectrum:
         """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
-            powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
+            powers = [power(jones) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
         # light that goes up is that which goes down, reversed: with other s, so other signs
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
         ends = -crossing.above, crossing.below
+        axes = polarisation_axes(-crossing.above, crossing.inside)
         light = tuple(
             dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
         )

@@ -6,14 +6,14 @@ The roughness of the heights decides the share of small slope's matrix in N (`op
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from ...optics import blend, boundary, fresnel
 from ...optics.blend import RoughnessTable
-from ...optics.boundary import Complex
+from ...optics.boundary import Heights, model_of
+from ...optics.fresnel import Filmed
 from ...optics.mean_second_order import mean_gain
 from ...optics.paths import Path
 from ..directional import Real
@@ -67,7 +67,7 @@ class Gain:
         if self.path.index is None:
             return common
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
-        return common * self._ratio(self.path.matrices(*ends), *ends)
+        return common * self._ratio(*ends)
 
     def order_0(self, cos_i: Real, cos_o: Real, power: Real, cos_turn: Real) -> Real:
         """Return the share of order 0 that goes to directions across its lobe.
@@ -85,30 +85,31 @@ class Gain:
     def _table(self) -> Real:
         """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS); finer of a thick film."""
         polar = POLAR if advance(self.path.index) < THICK else 2 * POLAR - 1
-        return self._ratio(_matrices_at_nodes(self.path, polar), *_nodes(polar))
+        return self._ratio(*_nodes(polar))
 
-    def _ratio(self, matrices: list[Complex], cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
-        """G over `Path.common`, from the path's matrices at these cosines."""
+    def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
+        """G over `Path.common` at these cosines."""
         path, k = self.path, self.wavenumber
         assert path.index is not None
         w = np.maximum(path.width(cos_i, cos_o), path.least)
-        jones = matrices[0]
-        if path.model == "small_slope":
-            variance = self.roughness.at(k * path.tangential(cos_i, cos_o, cos_turn))
-            s = blend.weight(k * w * self.height_scale, variance, path.index)[..., None, None]
-            jones = (1.0 - s) * jones + s * matrices[1]
+        model, heights = model_of(path.model), None
+        if model.statistic is not None:
+            q = k * path.tangential(cos_i, cos_o, cos_turn)
+            variance = model.statistic(self.roughness).at(q)
+            heights = Heights(k * w * self.height_scale, variance)
         q_i, q_o = path.came.normal(cos_i), path.left.normal(cos_o)
         common = path.common(cos_i, cos_o, cos_turn)
-        ratio = 4.0 * q_i * q_o / (w**2 * common) * boundary.unpolarised(jones)
-        if isinstance(path.index, fresnel.Filmed) and path.model == "small_slope":
+        ratio = 4.0 * q_i * q_o / (w**2 * common)
+        ratio = ratio * path.power(cos_i, cos_o, cos_turn, heights)
+        if isinstance(path.index, Filmed) and model.has_second_order:
             film = path.index, self.roughness, k, self.height_scale
             ratio = ratio * mean_gain(cos_i, *film) * mean_gain(cos_o, *film)
         return np.asarray(ratio)
 
 
-def advance(index: complex | fresnel.Filmed | None) -> float:
+def advance(index: complex | Filmed | None) -> float:
     """Phase (rad) by which a film's fringe advances from the normal to the horizon."""
-    if not isinstance(index, fresnel.Filmed):
+    if not isinstance(index, Filmed):
         return 0.0
     _, film, depth = (np.max(np.real(part)) for part in index.parts)
     return float(2.0 * depth * (film - np.sqrt(max(film**2 - 1.0, 0.0))))
@@ -119,8 +120,3 @@ def _nodes(polar: int) -> tuple[Real, Real, Real]:
     angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, polar) ** 2)  # denser towards grazing
     cosine = np.maximum(np.cos(angle), LEAST_COSINE)
     return cosine[:, None, None], cosine[:, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
-
-
-@lru_cache(maxsize=4)  # as many as a dielectric has, the same at all wavelengths
-def _matrices_at_nodes(path: Path, polar: int) -> list[Complex]:
-    return path.matrices(*_nodes(polar))

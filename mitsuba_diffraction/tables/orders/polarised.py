@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics.boundary import mueller
+from ...reference.boundary import mueller
 from . import cells
 from .cells import Array
 

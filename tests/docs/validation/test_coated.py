@@ -7,7 +7,7 @@ import pytest
 
 from docs.make.validation import coated
 from docs.make.validation.cases import COAT, order_sines
-from mitsuba_diffraction.optics.fresnel import amplitudes
+from mitsuba_diffraction.reference.fresnel import amplitudes
 
 
 def made(matrix: np.ndarray, series: str) -> np.ndarray:

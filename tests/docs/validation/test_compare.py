@@ -11,7 +11,7 @@ from docs.make.validation.compare import Comparison, compare
 from docs.make.validation.model import order_efficiencies
 from docs.make.validation.solutions import Solutions, shipped
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
-from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.reference import fresnel
 
 
 def compared(material: str, **limits_of: tuple[float, float]) -> Comparison:

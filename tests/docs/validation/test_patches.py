@@ -20,7 +20,7 @@ from docs.make.validation.patches import (
 )
 from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.optics import boundary, fresnel
+from mitsuba_diffraction.reference import boundary, fresnel
 
 
 @pytest.fixture(scope="module")

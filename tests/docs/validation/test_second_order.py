@@ -12,7 +12,7 @@ from docs.make.validation.second_order import MODELS, amplitudes, cases_of_cells
 from docs.make.validation.second_order_factor import MODELS as FACTOR
 from docs.make.validation.second_order_factor import compare_cells
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.reference import boundary
 
 pytestmark = pytest.mark.thorough
 

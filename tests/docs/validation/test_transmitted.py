@@ -7,7 +7,7 @@ import pytest
 
 from docs.make.validation import rayleigh, transmitted
 from mitsuba_diffraction import HeightField, reference
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.reference import boundary
 from tests.support.directions import polar
 
 pytestmark = pytest.mark.thorough

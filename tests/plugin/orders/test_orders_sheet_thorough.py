@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.optics.through import flat_transmittances
+from mitsuba_diffraction.reference.through import flat_transmittances
 from mitsuba_diffraction.tables.orders import Band, cells
 from tests.support.chi_square import DISPERSED, Case, chi_square
 from tests.support.orders import (

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.boundary import mueller
-from mitsuba_diffraction.optics.fresnel import amplitudes
+from mitsuba_diffraction.reference.boundary import mueller
+from mitsuba_diffraction.reference.fresnel import amplitudes
 from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.directions import Array, as_single, polar
 from tests.support.orders import load, shallow_grating

@@ -12,7 +12,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import as_single, rough_patch

@@ -9,18 +9,20 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.optics import blend, boundary, fresnel, second_order
+from mitsuba_diffraction.optics import second_order
+from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.realtime.glsl.packing import (
+    pack_boundary,
     pack_colours,
     pack_conductor,
     pack_powers,
     pack_responses,
-    pack_roughness,
     pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from mitsuba_diffraction.reference import boundary, fresnel
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import as_single, uniform_directions
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
@@ -54,7 +56,7 @@ def factor(
 ) -> NDArray[np.float64]:
     """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
     s = share(table, kind, wi + wo, lam)
-    jones = blend.jones(wi[:, None], wo[:, None], index(kind, lam), s)
+    jones = boundary.blended(wi[:, None], wo[:, None], index(kind, lam), s)
     scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
     return boundary.unpolarised(jones) * scale[:, None] ** 2
 
@@ -65,7 +67,9 @@ def share(
     """What small slope has of the blend, (n, m)."""
     k = wavenumber(lam)
     q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
-    return blend.weight(HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam))
+    return boundary.small_slope_weight(
+        HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam)
+    )
 
 
 def twice(
@@ -102,7 +106,9 @@ def shaded(
     paired = Packed((Texture("directions", directions),), {"height_scale": HEIGHTS}, {"PAIRED": ""})
     if kind == "twice":
         paired |= pack_second_order(1.5, table.slope_ratios)
-    return probed(gl, method, parts | pack_roughness(table.roughness) | paired, at)
+    return probed(
+        gl, method, parts | pack_boundary(MODELS["small_slope"], table.roughness) | paired, at
+    )
 
 
 @pytest.mark.parametrize("kind", MATERIALS)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
+from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]

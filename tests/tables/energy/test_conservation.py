@@ -7,8 +7,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
 from mitsuba_diffraction.tables.energy.gain import Gain
 from mitsuba_diffraction.tables.energy.materials import Reflector

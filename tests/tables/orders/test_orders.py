@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
 from mitsuba_diffraction.tables.orders.grids import rows, wavelength_of
 from mitsuba_diffraction.tables.orders.table import Counts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.boundary import mueller, small_slope
+from mitsuba_diffraction.reference.boundary import mueller, small_slope
 from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.orders import groove_matrices, shallow_grating
 from tests.support.stokes import REVERSAL

@@ -1,0 +1,167 @@
+"""Jones matrices K and B of a boundary, bare or filmed: the judge of `optics.boundary` (float64).
+
+`reference.model` has the same matrices for a bare material in their shortest form.
+
+Conventions: time is exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
+d = −ωi, then along d = ωo. The axes are s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is
+right-handed, as Mitsuba's bases are. Then r_s and r_p of a mirror have opposite signs at normal
+incidence. Row 0 and column 0 of a matrix are s, row 1 and column 1 are p: E_out = J E_in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..optics.fresnel import Filmed, Index
+from .fresnel import amplitudes, faces, reflectance
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# sinθ below which a direction is the normal itself: its azimuth is rounding
+_NORMAL = 1e-12
+
+
+def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
+    """Jones matrices B of the first-order small-slope approximation, (..., 2, 2), eq. 8 by fields.
+
+    Parameters
+    ----------
+    wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
+    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or
+        the index under a film, `optics.fresnel.Filmed`.
+    """
+    s_in, s_out = polarisation_axes(wi, wo)
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
+    # t̂ is s turned by 90°, so products of the s axes equal products of t̂
+    (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
+    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
+    products = [
+        jones_matrix(
+            ss=-there.s * came.s * dot,
+            sp=there.s * came.x * cross,
+            ps=there.x * came.s * cross,
+            pp=there.x * came.x * dot - came.normal * there.p * came.p * sine * sine0,
+        )
+        * came.contrast[..., None, None]
+        for came, there in zip(
+            faces(incident[..., 2], sine0**2, index),
+            faces(outgoing[..., 2], sine**2, index),
+            strict=True,
+        )
+    ]
+    return np.asarray(sum(products[1:], products[0]))
+
+
+def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
+    """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
+
+    Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
+    those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
+    4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
+    """
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    total = incident + outgoing
+    # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
+    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
+    cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
+    if isinstance(index, Filmed):
+        index = index.tilted(0.5 * total[..., 2] / cos_half)
+    return facet_matrices(incident, outgoing, *amplitudes(cos_half, index))
+
+
+def facet_matrices(wi: ArrayLike, wo: ArrayLike, r_s: Complex, r_p: Complex) -> Complex:
+    """Jones matrices (..., 2, 2) of facets that mirror ωi to ωo with coefficients r_s, r_p."""
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    s_in, s_out = polarisation_axes(incident, outgoing)
+    axis, total = facet_axis(incident, outgoing, s_in), incident + outgoing
+    zero = np.zeros_like(r_s)
+    facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
+    turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
+    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
+    scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
+    return np.asarray(scale[..., None, None] * turned)
+
+
+def small_slope_weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
+    """s of eq. 9 for κ (rad/µm) and σ_q² (µm²), any shapes that broadcast; a film counts in R₀."""
+    roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
+    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
+
+
+def blended(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
+    """(1−s) K + s B of eq. 6, (..., 2, 2); arguments as for `small_slope`, s (...)."""
+    weight = np.asarray(s, np.float64)[..., None, None]
+    return np.asarray((1 - weight) * kirchhoff(wi, wo, index) + weight * small_slope(wi, wo, index))
+
+
+def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
+    """Unit vectors s = ẑ×d/|ẑ×d| of the incident and the outgoing light, (..., 3) each.
+
+    Along the normal any axis would do: s is taken from the other direction, or y if both directions
+    are the normal (light in the x–z plane).
+    """
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    incident, outgoing = np.broadcast_arrays(incident, outgoing)
+    s_in, slanted_in = _horizontal(-incident)
+    s_out, slanted_out = _horizontal(outgoing)
+    y = np.array([0.0, 1.0, 0.0])
+    first = np.where(slanted_in, s_in, np.where(slanted_out, s_out, y))
+    return first, np.where(slanted_out, s_out, first)
+
+
+def unpolarised(jones: ArrayLike) -> Real:
+    """N = ½ Σ|J|², the power of unpolarised light of unit power after `jones`, (...)."""
+    entries = np.asarray(jones, np.complex128)
+    return np.asarray(0.5 * np.sum(np.abs(entries) ** 2, axis=(-2, -1)), np.float64)
+
+
+def mueller(jones: ArrayLike) -> Real:
+    """Mueller matrices (..., 4, 4) of Jones matrices, for Mitsuba's Stokes vectors.
+
+    S = (|E_s|²+|E_p|², |E_s|²−|E_p|², 2 Re E_s E_p*, 2 Im E_s E_p*): with axes (s, p, d) and time
+    as above, S₃ > 0 turns clockwise for an observer who looks into the light.
+    """
+    entries = np.asarray(jones, np.complex128)
+    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and the Stokes vector is a linear map of it
+    pairs = np.einsum("...ik,...jl->...ijkl", entries, entries.conj())
+    coherency = pairs.reshape(*entries.shape[:-2], 4, 4)
+    stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
+    return np.asarray((stokes @ coherency @ np.linalg.inv(stokes)).real, np.float64)
+
+
+def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
+    """ẑ×d normalised (arbitrary along the normal), and whether d differs from the normal."""
+    x, y = _xy(direction)
+    length = np.hypot(x, y)
+    slanted = length > _NORMAL
+    safe = np.where(slanted, length, 1.0)
+    return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), slanted[..., None]
+
+
+def facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
+    """s of a facet that mirrors ωi to ωo, normal to both; `fallback` where they are parallel."""
+    # (ωi+ωo)×(−ωi) = ωi×ωo: the direction of ẑ×d with the half vector for ẑ
+    normal = np.cross(incident, outgoing)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    apart = length > _NORMAL
+    return np.where(apart, normal / np.where(apart, length, 1.0), fallback)
+
+
+def turn(to: Real, start: Real, direction: Real) -> Complex:
+    """Matrix (..., 2, 2) from components along (start, d×start) to those along (to, d×to)."""
+    cosine = np.sum(to * start, axis=-1)
+    sine = np.sum(to * np.cross(direction, start), axis=-1)
+    return jones_matrix(ss=cosine, sp=sine, ps=-sine, pp=cosine)
+
+
+def jones_matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
+    """[[ss, sp], [ps, pp]]; the first letter is the outgoing polarisation."""
+    entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
+    return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
+
+
+def _xy(vector: Real) -> tuple[Real, Real]:
+    return vector[..., 0], vector[..., 1]
