@@ -217,8 +217,6 @@ from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
-from numpy.typing import NDArray
 
 from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
@@ -472,11 +470,11 @@ class Diffraction(DiffractingSurface):
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
         return self._energy is not None and self._energy.conserving
 
-    def _energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+    def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.scale`."""
         if self._energy is None or not self._energy.conserving or self.coat is not None:
             return None
-        return self._energy.brightness(height_scale)
+        return self._energy.scale(height_scale)
 
     def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.reflected`."""

@@ -136,6 +136,7 @@ def _instantiated(
     try:
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **parameters)
+            _check_films(state)
             fit_meshes(state, Path(folder))
             put_materials(state, materials)
             mi.parser.transform_all(config, state)
@@ -191,19 +192,32 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError(
             f"--sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
-    _check_film(sensors[index])
     return sensors[index]
 
 
-def _check_film(sensor: Any) -> None:
-    """Refuse a film whose pictures would exceed the memory of this machine."""
-    width, height = (int(length) for length in sensor.film().crop_size())
-    needed = width * height * _BYTES_PER_PIXEL
-    if needed > memory():
-        raise DiffractionError(
-            f"a picture of {width} x {height} pixels needs some {needed / 1e9:.3g} GB, and this "
-            f"machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most scenes)"
+def _check_films(state: Any) -> None:
+    """Refuse films whose pictures would exceed the memory of this machine.
+
+    state : `mi.parser.ParserState`; nothing is loaded yet, since that may take minutes.
+    """
+    import mitsuba as mi
+
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        width, height = (
+            node.props.get(f"crop_{name}", node.props.get(name, default))
+            for name, default in (("width", 768), ("height", 576))  # Mitsuba's
         )
+        if not isinstance(width, int) or not isinstance(height, int):
+            continue  # Mitsuba names the type that it expects
+        needed = width * height * _BYTES_PER_PIXEL
+        if needed > memory():
+            raise DiffractionError(
+                f"a picture of {width} x {height} pixels needs some {needed / 1e9:.3g} GB, and "
+                f"this machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most "
+                "scenes)"
+            )
 
 
 def plain_text(error: BaseException) -> str:
