@@ -123,11 +123,11 @@ def of_shaders(described: Surface) -> object:
     return packed.uniforms, packed.definitions, textures, scale, axis
 
 
-#: Features that tables, mixes and textures of Mitsuba have: tests of scenes and tables show them.
+#: Features of tables, mixes, textures and users' models: tests of these show them.
 ELSEWHERE = {
     Feature.HEIGHTS, Feature.ORDERS, Feature.MIX, Feature.LIMITED, Feature.PATCH,
     Feature.VARYING_WEIGHTS, Feature.VARYING_LENGTH, Feature.VARYING_ORIENTATION,
-    Feature.DIELECTRIC, Feature.SMALL_SLOPE,
+    Feature.DIELECTRIC, Feature.SMALL_SLOPE, Feature.OWN_MODEL,
 }  # fmt: skip
 
 
