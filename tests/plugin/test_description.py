@@ -112,7 +112,7 @@ def test_consumer_shows_a_feature_or_refuses_it_in_one_line(chosen, consumer):
 def of_osl(described: Surface) -> object:
     shader = shader_of(described)
     arrays = {name: pixels.tobytes() for name, pixels in shader.textures.items()}
-    return shader.constants, list(shader.arrays), shader.sockets, arrays
+    return shader.formulas, shader.constants, list(shader.arrays), shader.sockets, arrays
 
 
 def of_shaders(described: Surface) -> object:
