@@ -42,7 +42,7 @@ class CoupledWaves:
         if (np.diff(profile.x) < 0).any():
             raise DiffractionError(
                 f"{profile.name} is undercut, which coupled waves in layers cannot solve; use "
-                "--solver integral"
+                "method=integral"
             )
         self.period, self.harmonics = profile.period, harmonics
         levels = np.unique(profile.z)
@@ -64,7 +64,7 @@ class CoupledWaves:
         """Return the amplitudes between all channels; see `stations.Solver`."""
         if station.indices is None:
             raise DiffractionError(
-                "coupled waves need a material with an index; use --solver integral for a perfect "
+                "coupled waves need a material with an index; use method=integral for a perfect "
                 "conductor"
             )
         pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
