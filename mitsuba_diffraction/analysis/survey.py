@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import tempfile
 import time
 import warnings
@@ -30,7 +31,7 @@ from ..progress import Progress, silent
 from ..tables.build.checks import warnings_of
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
-from .iridescence import WINDOW, diffracted_light
+from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
 from .repeats import sample_of, scan_files, write_repeats
@@ -39,7 +40,7 @@ from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 5
+VERSION = 6
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -137,9 +138,14 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     diffracted = diffracted_light(table, Light(job.theta, phi))
     row["diffracted"] = diffracted.share
-    # a smaller scan has too few orders of its own: chance decides
+    index, floor = diffracted.iridescence(), chance_iridescence(table, Light(job.theta, phi))
+    row |= {"iridescence": index, "iridescence_by_chance": floor}
+    # colour beyond chance, weighed by how much of the light has it
+    row["iridescent_light"] = (
+        math.sqrt(index**2 - floor**2) * row["diffracted"] if (index > floor) else ""
+    )
     enough = widest_window(patches) >= 0.99 * WINDOW
-    row["iridescence"] = diffracted.iridescence() if enough else ""
+    row["ranked_among"] = f"scans {'from' if enough else 'below'} {WINDOW:g} µm"
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": _exr(table), ".png": _png(measured)}
 
@@ -179,9 +185,10 @@ def run_survey(
 ) -> list[dict[str, Any]]:
     """Measure every scan that the folder does not have yet, and write the results of all.
 
-    The folder holds `survey.csv`, a row for each scan; `samples.csv`, means and standard errors of
-    repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a map (.png) and a
-    row (.json) of each scan. They are named by the content of the scan and its treatment.
+    The folder holds `survey.csv`, a row for each scan, sorted by `ranked`; `samples.csv`, means and
+    standard errors of repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a
+    map (.png) and a row (.json) of each scan. They are named by the content of the scan and its
+    treatment.
 
     Parameters
     ----------
@@ -241,8 +248,24 @@ def run_survey(
         progress(done, len(todo), "scans")
     result = write_rows(folder / TABLE, named, rows)
     write_repeats(folder / SAMPLES, result)
-    write_sheets(folder, result)
+    ranking = ranked(result)
+    write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
+    write_sheets(folder, ranking)
     return result
+
+
+def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Sort rows: wide scans before narrow ones, each by iridescent light; failed scans last.
+
+    The index of scans below `iridescence.WINDOW` has fewer orders in each direction, so that
+    chance has a larger part in it: they are ranked among themselves.
+    """
+
+    def place(row: Mapping[str, Any]) -> tuple[bool, bool, float]:
+        narrow = "below" in row.get("ranked_among", "")
+        return bool(row["reason"]), narrow, -(row.get("iridescent_light") or 0.0)
+
+    return sorted(rows, key=place)
 
 
 def _files_of(file: Path) -> SceneFiles:
