@@ -187,6 +187,7 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
     """Return a formula's argument, and add its leaves to the function's parameters."""
     if isinstance(argument, str):
         symbol = Symbol(argument, "name", (scope.take(name),), scope)
+        scope.program.complex_numbers |= argument == "complex"
         parameters.append(symbol)
         return symbol if argument != "vector" else components_of(scope, symbol)
     if isinstance(argument, tuple):
