@@ -27,7 +27,7 @@ def crops_of(path: Path, options: LoadOptions, count: int) -> list[HeightField]:
         If the file is a recipe, or the crops have fewer than `FEWEST_PIXELS` a side.
     """
     if kind_of(path) is FileKind.RECIPE:
-        raise DiffractionError(f"'{path}' is a recipe; --crops is for files of heights")
+        raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")
     raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
     whole = load_heights(path, raw)
     treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)

@@ -65,12 +65,12 @@ def set_variant(name: str | None) -> str:
         name += "_ad_spectral"
     if name not in mi.variants():
         raise DiffractionError(
-            f"--mode: there is no variant {name!r}; there are {', '.join(mi.variants())}"
+            f"there is no variant {name!r}; there are {', '.join(mi.variants())}"
         )
     backend = name.partition("_")[0]
     if backend in _GPUS and not dr.has_backend(getattr(dr.JitBackend, _GPUS[backend])):
         raise DiffractionError(
-            f"--mode {name}: no {_GPUS[backend]} device answers; use "
+            f"variant {name}: no {_GPUS[backend]} device answers; use "
             f"{name.replace(backend, 'llvm', 1)}, or install the driver of the GPU"
         )
     if backend == "llvm":
@@ -98,7 +98,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     check_parameters(file, parameters)
     for name in _TAKEN:
         if name in parameters:
-            raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
+            raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         scene = _instantiated(file, parameters, materials, box_filter)
     except (RuntimeError, UnicodeDecodeError) as error:
@@ -158,7 +158,7 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
         warn(
             f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "
             "there and turns from triangle to triangle; give the mesh directions with "
-            "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+            "the command 'tangents', or unwrap it so that u runs the way the patch's x "
             "axis shall"
         )
 
@@ -190,7 +190,7 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError("the scene has no sensor; add a <sensor>")
     if not 0 <= index < len(sensors):
         raise DiffractionError(
-            f"--sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
+            f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
     return sensors[index]
 
@@ -271,7 +271,7 @@ def _words(error: BaseException) -> str:
 def _no_ply(match: re.Match[str]) -> str:
     """Say what to do about a mesh of another format where a PLY is expected."""
     file = PurePath(match["file"])
-    todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
+    todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
     if not match["why"].startswith("invalid PLY"):
         return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
@@ -289,5 +289,5 @@ def _unused(match: re.Match[str]) -> str:
     return (
         f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
         f"declares it: write ${names[0]} where its value is to go, or leave "
-        f"{', '.join(names)} out of -D, --animate and --turn"
+        f"{', '.join(names)} out"
     )

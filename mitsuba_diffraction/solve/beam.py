@@ -144,8 +144,8 @@ class _Lights:
             total = float(row[:, 0].sum())
             if total > MOST_EXCESS:
                 raise DiffractionError(
-                    f"efficiencies of a solution sum to {total:.4g}; use a higher --resolution, or "
-                    "another --solver"
+                    f"efficiencies of a solution sum to {total:.4g}; use a higher resolution, or "
+                    "another method"
                 )
             both /= np.maximum(both.sum(axis=0), 1.0)
             values[n, j - np.arange(len(row)) - orders[0]] = np.maximum(both, 0.0)

@@ -49,7 +49,7 @@ class CoupledWaves:
         if (np.diff(profile.x) < 0).any():
             raise DiffractionError(
                 f"{profile.name} is undercut, which coupled waves in layers cannot solve; use "
-                "--solver integral"
+                "method=integral"
             )
         self.period, self.harmonics = profile.period, harmonics
         levels = np.unique(profile.z)
@@ -77,7 +77,7 @@ class CoupledWaves:
         """Return the amplitudes between all channels; see `stations.Solver`."""
         if station.indices is None:
             raise DiffractionError(
-                "coupled waves need a material with an index; use --solver integral for a perfect "
+                "coupled waves need a material with an index; use method=integral for a perfect "
                 "conductor"
             )
         indices = np.stack([station.indices, *station.films], axis=-1)

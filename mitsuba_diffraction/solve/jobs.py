@@ -63,9 +63,9 @@ class Problem:
         if self.resolution > MOST_RESOLUTION[self.method]:
             raise DiffractionError(
                 f"{self.grating.profile.name} would be solved at resolution {self.resolution}, and "
-                f"--solver {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
+                f"method {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
                 "its lengths are in µm; it may be too deep, or too rough, for the shortest "
-                "wavelength; slopes may be solved by --solver chandezon"
+                "wavelength; slopes may be solved by method=chandezon"
             )
 
 
@@ -156,7 +156,7 @@ def solve_place(problem: Problem, place: Place) -> Solved:
         raise
     except (ValueError, np.linalg.LinAlgError) as error:  # numbers that are not finite
         raise DiffractionError(
-            f"--solver {problem.method} cannot solve {grating.profile.name} "
+            f"method {problem.method} cannot solve {grating.profile.name} "
             f"({one_line(str(error))}); check that its line neither touches nor nearly touches "
             "itself"
         ) from error

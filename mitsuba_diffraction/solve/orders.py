@@ -119,7 +119,7 @@ def solve_orders(
     if not isinstance(profile, Profile):
         raise DiffractionError(
             f"solve_orders: expected a profile, as of md.profiles.lamellar, got {quoted(profile)}; "
-            "a recipe is solved by 'mitsuba-diffraction solve'"
+            "a recipe is solved by the command 'solve'"
         )
     how, work = settings or Settings(), jobs or Jobs()
     tell = announce or silent
@@ -189,7 +189,7 @@ def _refuse_or_warn(error: Measured, how: Settings) -> None:
     )
     if not how.accept:
         raise DiffractionError(
-            f"{text}; --accept writes it as it is, without solving again; or use a larger "
+            f"{text}; accept=True writes it as it is, without solving again; or use a larger "
             "tolerance, or fewer wavelengths"
         )
     warn(text)
@@ -212,7 +212,7 @@ def _solved_at_nodes(
         problem = finer_problem(problem)
     raise DiffractionError(
         f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
-        "use another --solver, a higher --resolution, or a smoother profile"
+        "use another method, a higher resolution, or a smoother profile"
     )
 
 

@@ -81,7 +81,7 @@ class SolvedRecipe:
         if content.get("method") != SOLVED:
             raise DiffractionError(
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
-                "mitsuba-diffraction precompute"
+                "DiffractionTable.build"
             )
         for key in content:
             if key not in _KEYS:
