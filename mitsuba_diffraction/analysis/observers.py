@@ -14,14 +14,8 @@ M. Vorobyev and D. Osorio, Receptor noise as a determinant of colour thresholds,
 N. S. Hart, J. C. Partridge, I. C. Cuthill and A. T. D. Bennett, Visual pigments, oil droplets,
 ocular media and cone photoreceptor distribution in two species of passerine bird, J. Comp. Physiol.
 A 186, 375-387 (2000): blue tit, `avian_uv`.
-N. S. Hart, Vision in the peafowl, J. Exp. Biol. 205, 3925-3935 (2002): `avian_v`.
-H. R. Barbour, M. A. Archer, N. S. Hart, N. Thomas, S. A. Dunlop, L. D. Beazley and J. Shand,
-Retinal characteristics of the ornate dragon lizard, J. Comp. Neurol. 450, 334-344 (2002): `lizard`.
 A. J. Sillman, V. I. Govardovskii, P. Röhlich, J. A. Southard and E. R. Loew, The photoreceptors and
 visual pigments of the garter snake, J. Comp. Physiol. A 181, 89-101 (1997): `snake`.
-J. Neitz, T. Geist and G. H. Jacobs, Color vision in the dog, Visual Neuroscience 3, 119-125 (1989).
-D. Peitsch, A. Fietz, H. Hertel, J. de Souza, D. F. Ventura and R. Menzel, The spectral input
-systems of hymenopteran insects, J. Comp. Physiol. A 170, 23-40 (1992): `bee`.
 """
 
 from __future__ import annotations
@@ -116,13 +110,7 @@ EYES = {
         (371.0, 448.0, 502.0, 563.0), (1.0, 2.0, 2.0, 4.0), "TCYR", (300.0, 413.0, 507.0, 572.0),
         bird_media(),
     ),
-    "avian_v": lambda: _modelled(
-        (421.0, 457.0, 505.0, 567.0), (1.0, 1.9, 2.2, 2.1), "TCYR", (300.0, 449.0, 511.0, 569.0)
-    ),
-    "lizard": lambda: _modelled((360.0, 440.0, 493.0, 571.0), (1.0, 1.0, 3.5, 6.0)),
     "snake": lambda: _modelled((360.0, 482.0, 554.0), (1.0, 1.0, 12.0), names="uml"),
-    "dog": lambda: _modelled((429.0, 555.0), (1.0, 9.0), names="sl"),
-    "bee": lambda: _modelled((344.0, 436.0, 544.0), (1.0, 0.5, 4.4), names="uml"),
 }  # fmt: skip
 
 

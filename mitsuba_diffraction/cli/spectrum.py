@@ -57,8 +57,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--observer", metavar="ANIMAL|CSV",
-        help="also quantum catches and contrasts (JND) of an eye: avian_uv, avian_v, lizard, "
-        "snake, dog, bee, or a file of wavelengths (nm) and a column of sensitivities a receptor",
+        help="also quantum catches and contrasts (JND) of an eye: avian_uv, snake, or a "
+        "file of wavelengths (nm) and a column of sensitivities a receptor",
     )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
