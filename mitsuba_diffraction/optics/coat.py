@@ -52,35 +52,43 @@ def transmittances(cosine: Number, n: Number) -> Powers:
 
 @formula
 def bounced(face: Powers, structure: Powers) -> Number:
-    """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
+    """Return G of light that bounces, from √R of the face and √ρ of the structure for both ways."""
     xp = of(*face, *structure)
-    # At Brewster's angle R is 0 to rounding
-    first, second = (
-        xp.sqrt(xp.maximum(r * rho, 0.0)) for r, rho in zip(face, structure, strict=True)
-    )
+    first, second = face[0] * structure[0], face[1] * structure[1]
     largest, least = xp.maximum(*structure), xp.minimum(*face)
-    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * (1.0 - least)))
+    passed = xp.fma(-least, least, 1.0)
+    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * largest * passed))
 
 
 def transmitted(
-    jones: Jones, geometry: Geometry, index: Index, came: Powers, left: Powers
+    jones: Jones, geometry: Geometry, index: Index, n: Number, came: Number, left: Number
 ) -> Jones:
     """Return √(T T G) J, the structure's matrix as seen from outside of the coat.
 
     Parameters
     ----------
     jones, geometry, index : of the structure in the coat; index over that of the coat.
-    came, left : `transmittances` of the incident and of the outgoing light.
+    n : index of the coat over that of the medium above.
+    came, left : cosines of the incident and of the outgoing light outside.
     """
-    mirror_i = amplitudes(geometry.cos_i, geometry.square_i, index)
-    mirror_o = amplitudes(geometry.cos_o, geometry.square_o, index)
-    factors = []
+    # √R by amplitudes: 1 − T would lose it at Brewster's angle
+    faces = [_mirrors(c, 1.0 - c * c, n) for c in (came, left)]
+    mirrors = [
+        _mirrors(geometry.cos_i, geometry.square_i, index),
+        _mirrors(geometry.cos_o, geometry.square_o, index),
+    ]
+    passed, factors = (transmittances(came, n), transmittances(left, n)), []
     for out in range(2):
         for into in range(2):
-            through = came[into], left[out]
-            structure = squared(mirror_i[into]), squared(mirror_o[out])
-            again = bounced((1.0 - through[0], 1.0 - through[1]), structure)
-            factors.append(through[0] * through[1] * again)
+            again = bounced((faces[0][into], faces[1][out]), (mirrors[0][into], mirrors[1][out]))
+            factors.append(passed[0][into] * passed[1][out] * again)
     return tuple(
         entry * of(factor).sqrt(factor) for entry, factor in zip(jones, factors, strict=True)
     )
+
+
+def _mirrors(cosine: Number, square: Number, index: Index) -> Powers:
+    """Return |r_s| and |r_p| of a flat interface."""
+    # at 0 the root's derivative would be infinite
+    s, p = (of(r).maximum(squared(r), 1e-30) for r in amplitudes(cosine, square, index))
+    return of(s).sqrt(s), of(p).sqrt(p)
