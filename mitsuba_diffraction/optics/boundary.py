@@ -200,6 +200,12 @@ def mixed(first: Jones, second: Jones, weight: Number) -> Jones:
 
 
 @formula
+def azimuth_cosine(wi: Direction, wo: Direction) -> Number:
+    """Return t̂·t̂0, the cosine between the tangential parts of −ωi and ωo."""
+    return geometry(wi, wo).dot
+
+
+@formula
 def power(jones: Jones) -> Number:
     """Return N = ½ Σ|J|², the power of unpolarised light of unit power."""
     ss, sp, ps, pp = jones

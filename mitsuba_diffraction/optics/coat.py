@@ -22,8 +22,10 @@ although the face returns all of it and some leaves in the end (docs/validation/
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .arithmetic import Number, formula, of, squared
-from .boundary import Direction, Geometry, Jones
+from .boundary import Direction, Geometry, Heights, Jones, geometry, power
 from .fresnel import Index, amplitudes
 
 #: Powers of both polarisations, s and p.
@@ -52,43 +54,94 @@ def transmittances(cosine: Number, n: Number) -> Powers:
 
 @formula
 def bounced(face: Powers, structure: Powers) -> Number:
-    """Return G of light that bounces, from √R of the face and √ρ of the structure for both ways."""
+    """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
     xp = of(*face, *structure)
-    first, second = face[0] * structure[0], face[1] * structure[1]
+    # At Brewster's angle R is 0 to rounding
+    first, second = (
+        xp.sqrt(xp.maximum(r * rho, 0.0)) for r, rho in zip(face, structure, strict=True)
+    )
     largest, least = xp.maximum(*structure), xp.minimum(*face)
-    passed = xp.fma(-least, least, 1.0)
-    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * largest * passed))
+    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * (1.0 - least)))
 
 
 def transmitted(
-    jones: Jones, geometry: Geometry, index: Index, n: Number, came: Number, left: Number
+    jones: Jones, geometry: Geometry, index: Index, came: Powers, left: Powers
 ) -> Jones:
     """Return √(T T G) J, the structure's matrix as seen from outside of the coat.
 
     Parameters
     ----------
     jones, geometry, index : of the structure in the coat; index over that of the coat.
-    n : index of the coat over that of the medium above.
-    came, left : cosines of the incident and of the outgoing light outside.
+    came, left : `transmittances` of the incident and of the outgoing light.
     """
-    # √R by amplitudes: 1 − T would lose it at Brewster's angle
-    faces = [_mirrors(c, 1.0 - c * c, n) for c in (came, left)]
-    mirrors = [
-        _mirrors(geometry.cos_i, geometry.square_i, index),
-        _mirrors(geometry.cos_o, geometry.square_o, index),
-    ]
-    passed, factors = (transmittances(came, n), transmittances(left, n)), []
+    mirror_i = amplitudes(geometry.cos_i, geometry.square_i, index)
+    mirror_o = amplitudes(geometry.cos_o, geometry.square_o, index)
+    factors = []
     for out in range(2):
         for into in range(2):
-            again = bounced((faces[0][into], faces[1][out]), (mirrors[0][into], mirrors[1][out]))
-            factors.append(passed[0][into] * passed[1][out] * again)
+            through = came[into], left[out]
+            structure = squared(mirror_i[into]), squared(mirror_o[out])
+            again = bounced((1.0 - through[0], 1.0 - through[1]), structure)
+            factors.append(through[0] * through[1] * again)
     return tuple(
         entry * of(factor).sqrt(factor) for entry, factor in zip(jones, factors, strict=True)
     )
 
 
-def _mirrors(cosine: Number, square: Number, index: Index) -> Powers:
-    """Return |r_s| and |r_p| of a flat interface."""
-    # at 0 the root's derivative would be infinite
-    s, p = (of(r).maximum(squared(r), 1e-30) for r in amplitudes(cosine, square, index))
-    return of(s).sqrt(s), of(p).sqrt(p)
+def cosine_within(cosine: Number, n: Number) -> Number:
+    """Return the cosine in a coat of relative index n, for the cosine outside."""
+    return of(cosine, n).sqrt(of(cosine, n).maximum(cosine * cosine + (n * n - 1.0), 1e-12)) / n
+
+
+def coated_reflectance(face: Number, beneath: Number) -> Number:
+    """Return 1 − T T/(1 − R R), the reflectance of a flat coated interface.
+
+    face, beneath : reflectances of the coat's face and of the interface beneath it.
+    """
+    # Mirrors that reflect everything let nothing through
+    less = of(face, beneath).maximum(1.0 - face * beneath, 1e-6)
+    return 1.0 - (1.0 - face) * (1.0 - beneath) * of(less).reciprocal(less)
+
+
+def pair_power(
+    jones: Callable[[Geometry, Index, Heights], Jones] | None,
+    wi: Direction,
+    wo: Direction,
+    index: Index,
+    kappa: Number,
+    variance: Number,
+    came: Powers | None = None,
+    left: Powers | None = None,
+) -> Number:
+    """Return N' of a boundary model for a pair of directions, eq. 5 and 6.
+
+    Parameters
+    ----------
+    jones : of a `boundary.Model`; None of a perfect reflector.
+    wi, wo, index : of the structure, in the coat if it has one.
+    kappa, variance : see `boundary.Heights`.
+    came, left : transmittances of the coat, see `transmitted`; None without a coat.
+    """
+    pair = geometry(wi, wo)
+    if jones is None:
+        return pair.one_plus_dot * pair.one_plus_dot
+    matrix = jones(pair, index, Heights(kappa, variance))
+    if came is not None and left is not None:
+        matrix = transmitted(matrix, pair, index, came, left)
+    return power(matrix)
+
+
+def relative_power(
+    jones: Callable[[Geometry, Index, Heights], Jones],
+    wi: Direction,
+    wo: Direction,
+    index: Index,
+    kappa: Number,
+    variance: Number,
+    came: Powers | None = None,
+    left: Powers | None = None,
+) -> Number:
+    """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
+    # not 0 of opposite grazing directions
+    edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
+    return pair_power(jones, wi, wo, index, kappa, variance, came, left) / (edge * edge)

@@ -152,7 +152,8 @@ class Path:
             assert not isinstance(self.index, Filmed)  # no coat lies on it
             pair = boundary.geometry(refracted(wi, n), refracted(wo, n))
             jones = model.jones(pair, self.index, heights)
-            return pair, transmitted(jones, pair, self.index, n, wi[2], wo[2])
+            faces = (transmittances(direction[2], n) for direction in (wi, wo))
+            return pair, transmitted(jones, pair, self.index, *faces)
         pair = boundary.geometry(wi, wo)
         return pair, model.jones(pair, self.index, heights)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import DiffractionError
-from .symbols import Symbol, kind_of, kinds_of, leaves_of
+from .symbols import Scope, Symbol, kind_of, kinds_of, leaves_of
 
 _WIDTH = 100
 _JOINT = "\xa0"  # no line break
@@ -32,57 +32,120 @@ class Function:
     text : its definition.
     callees : names of functions that it calls.
     result : kinds of the results, in tuples as the formula returns them.
+    used : whether each number of the formula's arguments is a parameter.
     """
 
     name: str
     text: str
     callees: set[str]
     result: Any
+    used: list[bool]
 
 
 class Printer:
     """Text of a function from the symbols of its results."""
 
-    def __init__(self, scope: Any) -> None:
-        self._scope, self._dialect = scope, scope.dialect
+    def __init__(self, scope: Scope, all_parameters: bool = True) -> None:
+        self._scope, self._dialect, self._all = scope, scope.dialect, all_parameters
         self._uses: dict[int, int] = {}
         self._variables: dict[int, str] = {}
         self._lines: list[str] = []
 
     def function(self, parameters: list[Symbol], result: Any, comment: str) -> Function:
         """Print a function; result : number, or tuple of numbers."""
-        scope, types = self._scope, self._dialect.types
-        leaves = list(leaves_of(result, scope))
+        leaves = list(leaves_of(result, self._scope))
         structure = kind_of(result)
         kinds = list(kinds_of(structure))
         for leaf in leaves:
             self._count(leaf)
-        results = self._results(leaves, kinds) if len(leaves) > 1 else []
-        outputs = {id(leaf): name for leaf, (_, name) in zip(leaves, results, strict=False)}
-        for symbol in scope.order:
+        results = self._results(leaves, kinds, result) if len(leaves) > 1 else []
+        self._body(leaves, [name for _, name in results])
+        used = [self._all or self._uses.get(id(p), 0) > 0 for p in parameters]
+        head = [p for p, u in zip(parameters, used, strict=True) if u]
+        kind = "void" if results else self._dialect.types[kinds[0]]
+        text = self._written(self._scope.name, kind, head, results, comment)
+        return Function(self._scope.name, text, self._scope.callees, structure, used)
+
+    def staged(
+        self,
+        parameters: list[Symbol],
+        result: Symbol,
+        late: Sequence[str],
+        names: Sequence[str],
+        comment: str,
+    ) -> tuple[Function, Function]:
+        """Print two functions, see `programs.Program.add_staged`."""
+        kept, order = {id(p) for p in parameters if p.parts[0] in late}, self._scope.order
+        for symbol in order:
+            if any(id(part) in kept for part in symbol.parts):
+                kept.add(id(symbol))
+        self._count(result)
+        needed = [s for s in (*parameters, *order) if self._uses.get(id(s)) and s.kind != "call"]
+        read = {
+            id(part) for s in order if id(s) in kept and id(s) in self._uses for part in s.parts
+        }
+        ready = [s for s in needed if id(s) in read and id(s) not in kept]
+        stored = [(s.kind, f"pair_{self._scope.take(_name_of(s, 'value'))}") for s in ready]
+        first = Printer(self._scope)
+        for symbol in ready:
+            first._count(symbol)
+        first._body(ready, [name for _, name in stored])
+        early = [p for p in parameters if id(p) not in kept]
+        values = "".join(f"{self._dialect.types[kind]} {name};\n" for kind, name in stored)
+        text = first._written(names[0], "void", early, [], f"Prepare `{names[1]}`.")
+        second = Printer(self._scope)
+        second._variables = {id(s): name for s, (_, name) in zip(ready, stored, strict=True)}
+        second._count(result)
+        second._body([result], [])
+        last = [p for p in parameters if id(p) in kept]
+        body = second._written(names[1], self._dialect.types[result.kind], last, [], comment)
+        callees, structure = self._scope.callees, result.kind
+        return (
+            Function(names[0], f"{values}\n{text}", callees, (), [True] * len(early)),
+            Function(names[1], body, callees, structure, [True] * len(last)),
+        )
+
+    def _body(self, leaves: list[Any], names: list[str]) -> None:
+        """Print the statements that assign results, or return the only one without a name."""
+        outputs = {id(leaf): name for leaf, name in zip(leaves, names, strict=False)}
+        for symbol in self._scope.order:
             self._statement(symbol, outputs)
-        for leaf, (_, name) in zip(leaves, results, strict=False):
+        for leaf, name in zip(leaves, names, strict=False):
             if self._variables.get(id(leaf)) != name:
                 self._line(f"{name} = {self.text(leaf)};")
-        if not results:
+        if not names:
             self._line(f"return {self.text(leaves[0])};")
+
+    def _written(
+        self,
+        name: str,
+        kind: str,
+        parameters: list[Symbol],
+        results: list[tuple[str, str]],
+        comment: str,
+    ) -> str:
+        """Return the function with its head and comment."""
+        types = self._dialect.types
         words = [f"{types[p.kind]} {p.parts[0]}" for p in parameters]
         words += [f"{self._dialect.result} {types[kind]} {name}" for kind, name in results]
         words = [word.replace(" ", _JOINT) for word in words]
-        head = f"{'void' if results else types[kinds[0]]} {scope.name}({', '.join(words)})"
+        head = f"{kind} {name}({', '.join(words)})"
         lines = textwrap.wrap(comment, _WIDTH - 3, initial_indent="// ", subsequent_indent="// ")
         lines += textwrap.wrap(head, _WIDTH, subsequent_indent=" " * (head.index("(") + 1))
-        text = "\n".join([*lines, "{", *self._lines, "}", ""]).replace(_JOINT, " ")
-        return Function(scope.name, text, scope.callees, structure)
+        return "\n".join([*lines, "{", *self._lines, "}", ""]).replace(_JOINT, " ")
 
-    def _results(self, leaves: list[Any], kinds: list[str]) -> list[tuple[str, str]]:
-        names = [getattr(leaf, "name", None) or f"result{n}" for n, leaf in enumerate(leaves)]
-        return [(k, self._scope.take(n)) for k, n in zip(kinds, names, strict=True)]
+    def _results(self, leaves: list[Any], kinds: list[str], result: Any) -> list[tuple[str, str]]:
+        fields = getattr(result, "_fields", ())
+        if len(fields) != len(leaves):
+            fields = [_name_of(leaf, f"result{n}") for n, leaf in enumerate(leaves)]
+        return [(k, self._scope.take(n)) for k, n in zip(kinds, fields, strict=True)]
 
     def _count(self, value: Any) -> None:
         """Count the uses of an expression and its parts."""
         uses = self._uses.get(id(value), 0)
         self._uses[id(value)] = uses + 1
+        if id(value) in self._variables:
+            return
         if not uses and hasattr(value, "operation") and value.operation != "name":
             for part in value.parts:
                 self._count(part)
@@ -90,7 +153,7 @@ class Printer:
     def _statement(self, symbol: Symbol, outputs: Mapping[int, str]) -> None:
         """Print a variable, if the expression is one."""
         uses = self._uses.get(id(symbol), 0)
-        if not uses:
+        if not uses or id(symbol) in self._variables:
             return
         if symbol.kind == "call":
             self._call(symbol, outputs)
@@ -107,9 +170,7 @@ class Printer:
         names, declared = [], dict[str, list[str]]()
         results = [s for s in self._scope.order if s.operation == "result" and s.parts[0] is call]
         for symbol in results:
-            name = outputs.get(id(symbol)) or self._scope.take(
-                symbol.name or f"part{symbol.parts[1]}"
-            )
+            name = outputs.get(id(symbol)) or self._scope.take(_name_of(symbol))
             if id(symbol) not in outputs:
                 declared.setdefault(self._dialect.types[symbol.kind], []).append(name)
             self._variables[id(symbol)] = name
@@ -206,6 +267,14 @@ class Printer:
 
     def _ratio(self, divisor: Any) -> str:
         return f"(1.0 / {self.text(divisor, 8)})"
+
+
+def _name_of(value: Any, otherwise: str = "") -> str:
+    """Return the name of a symbol: its variable's, or its function's and a number."""
+    if not isinstance(value, Symbol) or value.operation != "result":
+        return getattr(value, "name", None) or otherwise
+    call, number = value.parts
+    return value.name or f"{call.parts[0]}{number}"
 
 
 def _one(value: Any) -> bool:

@@ -37,10 +37,14 @@ from .symbols import (
 
 @dataclass
 class Program:
-    """Functions in a dialect, those that a function calls before it."""
+    """Functions in a dialect, those that a function calls before it.
+
+    complex_numbers : whether a function has complex numbers; their operations then come first.
+    """
 
     dialect: Dialect
     functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
+    complex_numbers: bool = False
 
     def add(
         self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
@@ -61,17 +65,55 @@ class Program:
         DiffractionError
             If the formula cannot be written, with its line.
         """
+        return self._add(formula, arguments, name, comment)
+
+    def _add(
+        self,
+        formula: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        name: str = "",
+        comment: str = "",
+        *,
+        all_parameters: bool = True,
+    ) -> Function:
         formula = getattr(formula, "__wrapped__", formula)
-        key = (formula, name, *map(_key, arguments))
+        key = (formula, name, all_parameters, *map(_key, arguments))
         if key not in self.functions:
             scope = Scope(self, formula, name or formula.__name__.lstrip("_"))
-            self.functions[key] = scope.write(arguments, comment or _comment(formula))
+            parameters, result = scope.run(arguments)
+            printer = Printer(scope, all_parameters)
+            self.functions[key] = printer.function(parameters, result, comment or _comment(formula))
         return self.functions[key]
+
+    def add_staged(
+        self,
+        formula: Callable[..., Any],
+        *arguments: Any,
+        late: Sequence[str],
+        names: Sequence[str],
+    ) -> None:
+        """Write a formula as two functions: one prepares all that some parameters do not change.
+
+        The prepared values are global variables, for languages that have them.
+
+        Parameters
+        ----------
+        formula, arguments : as for `add`; the result is one number.
+        late : parameters of the second function; the others are those of the first.
+        names : of both functions.
+        """
+        scope = Scope(self, formula, names[1])
+        parameters, result = scope.run(arguments)
+        first, second = Printer(scope).staged(parameters, result, late, names, _comment(formula))
+        for function in (first, second):
+            self.functions[(formula, function.name)] = function
 
     @property
     def text(self) -> str:
         """Source of all functions."""
-        return "\n".join(function.text for function in self.functions.values())
+        texts = dict.fromkeys(function.text for function in self.functions.values())
+        prelude = [self.dialect.prelude] if self.complex_numbers else []
+        return "\n".join([*prelude, *texts])
 
 
 class Scope:
@@ -89,6 +131,7 @@ class Scope:
         """Return the symbol of an expression, which may be known already."""
         key = (kind, operation, *(id(p) if isinstance(p, Symbol) else p for p in parts))
         if key not in self.expressions:
+            self.program.complex_numbers |= kind == "complex"
             self._check(parts)
             self.expressions[key] = symbol = Symbol(kind, operation, parts, self)
             self.order.append(symbol)
@@ -101,8 +144,9 @@ class Scope:
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Write a call of another formula, and the formula itself if it is new."""
-        function = self.program.add(formula, *map(kind_of, values))
+        function = self.program._add(formula, tuple(map(kind_of, values)), all_parameters=False)
         leaves = [leaf for value in values for leaf in leaves_of(value)]
+        leaves = [leaf for leaf, used in zip(leaves, function.used, strict=True) if used]
         results = self.call(function.name, leaves, list(kinds_of(function.result)))
         return structured(function.result, iter(results))
 
@@ -115,8 +159,8 @@ class Scope:
             results = [self.expression(k, "result", (call, n)) for n, k in enumerate(kinds)]
         return [components_of(self, r) if r.kind == "vector" else r for r in results]
 
-    def write(self, arguments: Sequence[Any], comment: str) -> Function:
-        """Run the formula on symbols and print it."""
+    def run(self, arguments: Sequence[Any]) -> tuple[list[Symbol], Any]:
+        """Run the formula on symbols; return those of its parameters, and its result."""
         parameters: list[Symbol] = []
         names = list(inspect.signature(self.formula).parameters)
         values = [
@@ -124,13 +168,12 @@ class Scope:
             for name, argument in zip(names, arguments, strict=False)
         ]
         with _active(self), _local_names(self):
-            result = self.formula(*values)
-        return self._printed(parameters, result, comment)
+            return parameters, self.formula(*values)
 
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.dialect.reserved or name == self.name:
+        if name in self.dialect.reserved or name in {self.name, *self.callees}:
             name += "_"
         numbered, n = name, 1
         while numbered in self.taken:
@@ -138,9 +181,6 @@ class Scope:
             numbered = f"{name.rstrip('_')}_{n}"
         self.taken.add(numbered)
         return numbered
-
-    def _printed(self, parameters: list[Symbol], result: Any, comment: str) -> Function:
-        return Printer(self).function(parameters, result, comment)
 
 
 def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol]) -> Any:

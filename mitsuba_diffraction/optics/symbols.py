@@ -198,6 +198,10 @@ def _part(which: str, value: Symbol) -> Any:
     return current().expression("float", which, (value,))
 
 
+class _UnknownFunctionError(DiffractionError, AttributeError):
+    """Function that no shader has; formulas may ask by `hasattr`."""
+
+
 class Symbols:
     """Arithmetic of symbols, see `arithmetic`."""
 
@@ -241,7 +245,10 @@ class Symbols:
         if name.startswith("__"):
             raise AttributeError(name)
         if name not in _FUNCTIONS:
-            refuse(f"no shader has the function {name}")
+            try:
+                refuse(f"no shader has the function {name}")
+            except DiffractionError as error:
+                raise _UnknownFunctionError(str(error)) from None
         return lambda *values: _node(_FUNCTIONS[name], *values)
 
 

@@ -18,15 +18,17 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
+from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
-from .orders import interpolation_error, order_constants, order_texture
+from .orders import interpolation_error, order_constants, order_formulas, order_texture
 from .patch import (
     energy_texture,
     mean_transmittance,
     patch_constants,
     patch_error,
+    patch_formulas,
     patch_textures,
 )
 from .sockets import (
@@ -49,6 +51,7 @@ OSL = Consumer(
             Feature.HEIGHTS, Feature.ORDERS, Feature.MIRROR, Feature.DIELECTRIC, Feature.RARER,
             Feature.CONDUCTOR, Feature.SMALL_SLOPE, Feature.KIRCHHOFF, Feature.HEIGHT_SCALE,
             Feature.LATERAL_SCALE, Feature.ORIENTATION, Feature.ENERGY_SCALE,
+            Feature.OWN_MODEL,
         }
     ),
     "export the surface without, or render it with Mitsuba",
@@ -105,6 +108,7 @@ class Shader:
     Attributes
     ----------
     source : name of the file in `shaders`.
+    formulas : functions of `optics` that it calls.
     constants : macros.
     arrays : declarations of parameters that are constant arrays.
     sockets : inputs.
@@ -113,6 +117,7 @@ class Shader:
     """
 
     source: str
+    formulas: str
     constants: Mapping[str, Any]
     arrays: Sequence[str]
     sockets: Sequence[Socket]
@@ -205,6 +210,7 @@ def _orders(described: Surface, table: OrderTable) -> Shader:
     error = interpolation_error(table, texture)
     return Shader(
         "orders.osl",
+        order_formulas(),
         order_constants(table, texture),
         [array_parameter("int", "Starts", texture.starts)],
         [window_socket(described.coherence_width), *common_sockets(described.orientation.number)],
@@ -221,22 +227,25 @@ def _patch(described: Surface) -> Shader:
     if material is not None and material.index is not None:
         index = material.index(drawn_spectrum().wavelengths)
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
+    model = None if index is None else MODELS[described.model]
+    statistic = table.roughness
+    if model is not None and model.statistic is not None:
+        statistic = model.statistic(statistic)
     arrays = {
         "Eta": np.real(parts),
         "Absorption": np.imag(parts),
-        "Roughness": table.roughness.nodes,
+        "Statistic": statistic.nodes,
         "Order0": textures.order_0,
     }
-    constants = patch_constants(table, textures, described.lateral_scale.number)
+    constants = patch_constants(table, textures, statistic, described.lateral_scale.number)
     files: dict[str, NDArray[Any]] = {"PowersFile": textures.powers, "DrawsFile": textures.draws}
     if (energy := energy_texture(described)) is not None:
         constants |= energy.constants
         files["EnergyFile"] = energy.pixels
-    constants["PERFECT"] = int(index is None)
-    constants["SMALL_SLOPE"] = int(described.model == "small_slope")
     constants["PIGMENT_SHARE"] = mean_transmittance(index)
     return Shader(
         "patch.osl",
+        patch_formulas(model),
         constants,
         [array_parameter("float", name, values) for name, values in arrays.items()],
         [
@@ -269,7 +278,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
     )
     own = own.replace("SHADER(PARAMETERS)", f"{name}(\n    " + ",\n    ".join(parameters) + "\n)")
     head = _HEAD.format(surface=one_line(shader.surface), version=version("mitsuba_diffraction"))
-    return head + "\n".join(lines) + "\n\n" + common + "\n" + own
+    return "\n".join([head + "\n".join(lines), "", common, shader.formulas, own])
 
 
 def _literal(value: float | int) -> str:

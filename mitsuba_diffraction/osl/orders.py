@@ -8,6 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.dialects import OSL
+from ..optics.orders import (
+    cell_wavelengths,
+    order_cell,
+    smooth_coordinate,
+    wavelength_coordinate,
+)
+from ..optics.programs import Program
 from ..tables.orders import OrderTable, cells
 from ..tables.orders.grids import face_transmittance, least_c, rows
 from ..tables.orders.table import Counts
@@ -126,6 +134,16 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
         "LEAST": 1e-5,
         "PIGMENT_SHARE": _mean_remainder(table),
     }
+
+
+def order_formulas() -> str:
+    """Return the functions of `optics.orders` that `shaders/orders.osl` calls."""
+    program = Program(OSL)
+    for formula, count in (
+        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 5), (wavelength_coordinate, 4),
+    ):  # fmt: skip
+        program.add(formula, *["float"] * count)
+    return program.text
 
 
 def _samples(period: float) -> int:

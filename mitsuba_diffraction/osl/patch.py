@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.blend import NODES_PER_OCTAVE
+from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ..optics.boundary import Model
+from ..optics.coat import pair_power
+from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
+from ..optics.programs import Program
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
 from ..tables.powers import order_0_power
@@ -155,14 +159,14 @@ def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, f
 
 
 def patch_constants(
-    table: DiffractionTable, textures: PatchTextures, stretch: float
+    table: DiffractionTable, textures: PatchTextures, statistic: RoughnessTable, stretch: float
 ) -> dict[str, float | int]:
     """Return the constants of `shaders/patch.osl`; lengths in µm.
 
+    statistic : of the heights, see `boundary.Model`.
     stretch : factor on lengths in the patch's plane.
     """
     rows, columns = table.grid.shape
-    roughness = table.roughness
     return {
         "DRAWS": DRAWS,
         "ORDERS": rows * columns,
@@ -179,12 +183,34 @@ def patch_constants(
         "BANDED": BANDED,
         "DRAWS_WIDTH": DRAWS_WIDTH,
         "DRAWS_ROWS": textures.rows,
-        "FIRST_OCTAVE": roughness.first,
+        "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
-        "ROUGHNESS_NODES": len(roughness.nodes),
+        "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
     }
+
+
+def patch_formulas(model: Model | None) -> str:
+    """Return the functions of `optics` that `shaders/patch.osl` calls.
+
+    model : of the boundary; None of a perfect reflector.
+
+    Raises a DiffractionError if the model's formula cannot be written in OSL.
+    """
+    program = Program(OSL)
+    jones = None if model is None else model.jones
+    program.add(
+        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
+    )
+    flat = reflectance if model is not None else _everything
+    program.add(flat, "float", "complex", name="flat_reflectance")
+    return program.text
+
+
+def _everything(cosine: Any, index: Any) -> float:
+    """Return the reflectance of a perfect reflector."""
+    return 1.0
 
 
 def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -27,7 +27,7 @@ from ..optics.boundary import (
     model_of,
     power,
 )
-from ..optics.coat import transmitted
+from ..optics.coat import Powers, transmittances, transmitted
 from .directions import Pair, TablePoint
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import CoatedPair, UnderFilm
@@ -157,13 +157,13 @@ class LightPath:
     pair : geometry at the structure.
     ends : directions of travel outside.
     above : whether light stays above the surface.
-    passed : index of a coat, and cosines outside at both ends; empty without a coat.
+    passed : transmittances of a coat's face at both ends; empty without a coat.
     """
 
     pair: Geometry
     ends: tuple[Vector3f, Vector3f]
     above: bool
-    passed: tuple[Float, ...]
+    passed: tuple[Powers, ...]
 
     @classmethod
     def of(cls, pair: Pair, mode: mi.TransportMode) -> LightPath:
@@ -173,9 +173,9 @@ class LightPath:
         ends, cosines = [outer.wi, outer.wo], [outer.cos_i, outer.cos_o]
         if mode != mi.TransportMode.Importance:
             inner, ends, cosines = inner[::-1], ends[::-1], cosines[::-1]
-        passed: tuple[Float, ...] = ()
+        passed: tuple[Powers, ...] = ()
         if isinstance(pair, CoatedPair):
-            passed = pair.n, *cosines
+            passed = tuple(transmittances(cosine, pair.n) for cosine in cosines)
         side = mi.Vector3f(1.0, 1.0, 1.0 if outer.above else -1.0)
         travel = -ends[0] * side, ends[1] * side
         return cls(geometry(*inner), travel, outer.above, passed)

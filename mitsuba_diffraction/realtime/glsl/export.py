@@ -194,7 +194,10 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
     second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
     look_up = "orders.glsl" if "ORDERS" in definitions else "pair.glsl"
-    files = ["library.glsl", "formulas", "boundary.glsl", "layers.glsl", *second_order, look_up]
+    files = [
+        "library.glsl", "formulas", "reflectance.glsl", "boundary.glsl", "layers.glsl",
+        *second_order, look_up,
+    ]  # fmt: skip
     shared = "".join(constants) + resolved(
         "\n".join(part(name, definitions) for name in files), definitions
     )

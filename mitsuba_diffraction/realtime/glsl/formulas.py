@@ -6,9 +6,20 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ...optics.blend import small_slope_weight
+from ...optics.boundary import MODELS, Model, azimuth_cosine
+from ...optics.coat import (
+    coated_reflectance,
+    cosine_within,
+    refracted,
+    relative_power,
+    transmittances,
+)
 from ...optics.colour import encoded_colour
 from ...optics.dialects import GLSL
 from ...optics.display import shown_colour
+from ...optics.fresnel import normal_reflectance, reflectance
+from ...optics.geometry import vcavity
 from ...optics.orders import (
     cell_wavelengths,
     lobe_falloff,
@@ -20,29 +31,55 @@ from ...optics.orders import (
     wavenumber_step,
 )
 from ...optics.programs import Program
+from ...optics.second_order import added_power
 
-_NUMBER = "float"
-_ORDERS: dict[Callable[..., Any], int] = {
-    order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
-    order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
+#: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
+_REAL: dict[str, dict[Callable[..., Any], int]] = {
+    "ORDERS": {
+        order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
+        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
+    },
+    "FACE": {transmittances: 2},
+    "COATED": {transmittances: 2, cosine_within: 2, coated_reflectance: 2},
+    "VCAVITY": {vcavity: 3},
+    "SECOND_ORDER": {small_slope_weight: 3},
 }  # fmt: skip
-#: Definitions that the formulas of a shader depend on.
-_DECISIVE = ("DISPLAYED", "NATURAL", "ORDERS")
+_KINDS = {"1": "float", "2": "complex"}
 
 
 def formulas(definitions: Mapping[str, str]) -> str:
-    """Return the functions that a shader with these definitions calls, after `library.glsl`."""
-    return _formulas(frozenset(name for name in _DECISIVE if name in definitions))
+    """Return the functions that a shader with these definitions calls, after `library.glsl`.
+
+    Raises a DiffractionError if the formula of a boundary model cannot be written in GLSL.
+    """
+    names = {*_REAL, "DISPLAYED", "NATURAL"} & set(definitions)
+    model = MODELS[definitions["BOUNDARY"]] if "BOUNDARY" in definitions else None
+    return _formulas(frozenset(names), _KINDS.get(definitions.get("SURFACE_KIND", "0")), model)
 
 
-@functools.cache
-def _formulas(definitions: frozenset[str]) -> str:
+@functools.lru_cache(maxsize=64)
+def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
     program = Program(GLSL)
     program.add(encoded_colour, "vector")
-    if "DISPLAYED" in definitions:
-        shown = shown_colour if "NATURAL" in definitions else encoded_colour
+    if "DISPLAYED" in names:
+        shown = shown_colour if "NATURAL" in names else encoded_colour
         program.add(shown, "vector", name="displayed")
-    if "ORDERS" in definitions:
-        for formula, count in _ORDERS.items():
-            program.add(formula, *[_NUMBER] * count)
+    for name in sorted(names & _REAL.keys()):
+        for formula, count in _REAL[name].items():
+            program.add(formula, *["float"] * count)
+    if "COATED" in names:
+        program.add(refracted, "vector", "float")
+    if index is not None:
+        program.add(reflectance, "float", index, name="interface_reflectance")
+    if index is not None and "SECOND_ORDER" in names:
+        program.add(normal_reflectance, index)
+        program.add(azimuth_cosine, "vector", "vector")
+        program.add(added_power, ("float",) * 4, ("float",) * 4, "float")
+    if index is not None and model is not None:
+        coat = ("float",) * 2 if "COATED" in names else None
+        program.add_staged(
+            relative_power, model.jones, "vector", "vector", index, "float", "float", coat, coat,
+            late=("kappa", "variance") + (("index",) if index == "complex" else ()),
+            names=("begin_boundary", "boundary_factor"),
+        )  # fmt: skip
     return f"{program.text}\n"

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Material, Surface
@@ -17,11 +18,11 @@ from .lobes import colour_power, pack_lobes
 from .maps import evaluated
 from .packing import (
     pack_beneath,
+    pack_boundary,
     pack_colours,
     pack_conductor,
     pack_energy,
     pack_powers,
-    pack_roughness,
     pack_second_order,
 )
 from .texels import Packed, Uniform
@@ -63,8 +64,8 @@ class Modelled:
             uniforms["coat"] = self._coat
             uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
         packed = Packed((), uniforms, definitions)
-        if described.model == "small_slope":
-            packed |= pack_roughness(described.patch.roughness)
+        if described.model != "kirchhoff" or described.coat is not None:
+            packed |= pack_boundary(MODELS[described.model], described.patch.roughness)
         if (second := described.second_order) is not None:
             packed |= pack_second_order(second.index, second.ratios)
         return packed | _reflectance(described.material)

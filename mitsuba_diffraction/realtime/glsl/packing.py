@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ...optics.boundary import Model
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
@@ -246,19 +247,26 @@ def pack_conductor(
     )
 
 
-def pack_roughness(roughness: RoughnessTable) -> Packed:
-    """Pack the roughness that determines the blend of small slope with Kirchhoff."""
-    nodes = roughness.nodes.astype(np.float32)
+def pack_boundary(model: Model, roughness: RoughnessTable) -> Packed:
+    """Pack a boundary model with its statistic of the heights.
+
+    roughness : σ_q² of the surface.
+    """
+    name = {"BOUNDARY": model.name}
+    if model.statistic is None:
+        return Packed((), {}, name)
+    statistic = model.statistic(roughness)
+    nodes = statistic.nodes.astype(np.float32)
     pairs = np.zeros((len(nodes) - 1, 4), np.float32)
     pairs[:, 0], pairs[:, 1] = nodes[:-1], nodes[1:]
     return Packed(
-        (listed("roughness", pairs),),
+        (listed("statistic", pairs),),
         {
-            "first_octave": roughness.first,
+            "first_octave": statistic.first,
             "last_node": float(len(nodes) - 1),
             "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
         },
-        {"SMALL_SLOPE": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},
+        {**name, "STATISTIC": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},
     )
 
 

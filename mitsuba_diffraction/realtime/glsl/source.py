@@ -85,7 +85,7 @@ def fragment_parts(
     known = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl", "formulas", "frame.glsl", "boundary.glsl"]
+    shared = ["library.glsl", "formulas", "reflectance.glsl", "frame.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
     if "SHADOWED" in known:

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.optics import second_order
+from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.realtime.glsl.packing import (
+    pack_boundary,
     pack_colours,
     pack_conductor,
     pack_powers,
     pack_responses,
-    pack_roughness,
     pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
@@ -105,7 +106,9 @@ def shaded(
     paired = Packed((Texture("directions", directions),), {"height_scale": HEIGHTS}, {"PAIRED": ""})
     if kind == "twice":
         paired |= pack_second_order(1.5, table.slope_ratios)
-    return probed(gl, method, parts | pack_roughness(table.roughness) | paired, at)
+    return probed(
+        gl, method, parts | pack_boundary(MODELS["small_slope"], table.roughness) | paired, at
+    )
 
 
 @pytest.mark.parametrize("kind", MATERIALS)

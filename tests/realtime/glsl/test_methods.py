@@ -17,18 +17,19 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_beneath,
+    pack_boundary,
     pack_colours,
     pack_conductor,
     pack_energy,
     pack_powers,
     pack_responses,
-    pack_roughness,
     pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.source import (
@@ -239,7 +240,7 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         definitions |= pack_energy([scale, scale]).definitions
         ratio = DirectionalTable(np.array([550.0]), scale[None])
         definitions |= pack_beneath([ratio, ratio]).definitions
-        definitions |= pack_roughness(table.roughness).definitions
+        definitions |= pack_boundary(MODELS["small_slope"], table.roughness).definitions
         definitions |= pack_second_order(1.5, table.slope_ratios).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:

@@ -21,13 +21,12 @@ float row_lit;                   // 0 beyond the table's wavelengths, else 1
 
 #ifdef FACE
 
-// Unpolarised transmittance of the layer's face, for the cosine outside (Fresnel).
+// Unpolarised transmittance of the layer's face, for the cosine outside.
 float through_face(float cosine)
 {
-    float squared = superstrate * superstrate;
-    float inside = sqrt(max(cosine * cosine + squared - 1.0, 0.0));
-    vec2 below = vec2(cosine + inside, squared * cosine + inside);
-    return 2.0 * cosine * inside * dot(vec2(1.0, squared), 1.0 / (below * below));
+    float s, p;
+    transmittances(cosine, superstrate, s, p);
+    return 0.5 * (s + p);
 }
 
 #endif

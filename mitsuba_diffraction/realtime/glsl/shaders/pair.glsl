@@ -15,8 +15,8 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     back = transmittances(wo.z);
     float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     float leaving = wo.z;
-    wi = refracted(wi);
-    wo = refracted(wo);
+    wi = refracted(wi, coat);
+    wo = refracted(wo, coat);
     sum = wi + wo;
     one_plus_dot = 0.5 * dot(sum, sum);
     ratio = one_plus_dot / sum.z;
@@ -25,14 +25,14 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
 #endif
     begin_pair(wi, wo, there, back);
 #ifdef SECOND_ORDER
-    begin_second_order();
+    begin_second_order(wi, wo);
 #endif
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
              * energy_scale(in_patch(wo, rotation), wo.z);
 #endif
 #ifdef VCAVITY
-    outside *= groove_shadow(wi.z, wo.z, one_plus_dot);
+    outside *= vcavity(wi.z, wo.z, one_plus_dot);
 #endif
 #ifdef COATED
     face_reflected = face / outside;

@@ -17,7 +17,7 @@ void main()
     begin_pair(wi, wo, vec2(1.0), vec2(1.0));
 #endif
 #ifdef SECOND_ORDER
-    begin_second_order();
+    begin_second_order(wi, wo);
 #endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);

@@ -33,10 +33,10 @@ vec4 on_pages(sampler2D pages, vec3 size, vec3 place)
 #endif
 }
 
-// Look up the coefficients of the pair that `begin_pair` has prepared.
-void begin_second_order()
+// Look up the coefficients of a pair of directions above the structure.
+void begin_second_order(vec3 wi, vec3 wo)
 {
-    vec3 cosines = vec3(pair_dot, pair_cosines.yx);
+    vec3 cosines = vec3(azimuth_cosine(wi, wo), wo.z, wi.z);
     vec3 angles = 1.0 - sign(cosines) * elevations(abs(cosines));  // angles over π/2
     vec3 place = angles * vec3(0.5, 1.0, 1.0) * (COEFFICIENT_NODES - 1.0);
     pair_coefficients = on_pages(second_coefficients, vec3(COEFFICIENT_NODES), place);
@@ -48,8 +48,8 @@ float second_order(vec2 uv, float r, float k, float z)
     vec3 place = k * vec3(uv, z) * ratio_steps + ratio_zero;
     place.xy = mix(place.xy, floor(place.xy + 0.5), ratio_orders);
     vec4 ratios = on_pages(slope_ratios, ratio_size, place);
-    vec4 c = pair_coefficients * gentle_share(OWN_INDEX, k, r, z) * (height_scale * height_scale / patch_area);
-    vec2 added = vec2(dot(c * vec4(1.0, -1.0, 1.0, -1.0), ratios), dot(c, ratios.yxwz));
-    added *= min(1.0, SECOND_ORDER_LIMIT * inversesqrt(max(dot(added, added), 1e-20)));
-    return dot(added, added) + 2.0 * added.x + 1.0;
+    float weight = small_slope_weight(k * z, height_statistic(k * r), normal_reflectance(OWN_INDEX));
+    vec4 c = pair_coefficients;
+    weight *= height_scale * height_scale / patch_area;
+    return 1.0 + added_power(c.x, c.y, c.z, c.w, ratios.x, ratios.y, ratios.z, ratios.w, weight);
 }

@@ -1,0 +1,85 @@
+"""Pairs of directions, materials and boundary models for tests of formulas in every language."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction.optics.arithmetic import of
+from mitsuba_diffraction.optics.blend import RoughnessTable
+from mitsuba_diffraction.optics.boundary import Geometry, Heights, Jones, Model, kirchhoff
+from mitsuba_diffraction.reference import boundary, coat
+from tests.support.directions import uniform_directions
+
+Array = NDArray[np.float64]
+
+#: Index of the coat over the medium above.
+COAT = 1.3
+#: Indices of materials over the medium above: real, of a metal, weakly absorbing.
+INDICES = {"dielectric": 1.5 + 0j, "metal": 0.65 + 5.6j, "absorbing": 1.2 + 0.3j}
+
+
+class Pairs(NamedTuple):
+    """Pairs (n, 3) of directions, κ in rad/µm and variance of the heights in µm² (n,)."""
+
+    wi: Array
+    wo: Array
+    kappa: Array
+    variance: Array
+
+
+def pairs(count: int) -> Pairs:
+    """Return random pairs; the first are the normal, mirrored, equal and opposite directions."""
+    rng = np.random.default_rng(8)
+    wi, wo = uniform_directions(count, rng, 0.02), uniform_directions(count, rng, 0.02)
+    wi[0], wo[1], wo[2], wo[3] = (0, 0, 1), (0, 0, 1), wi[2], wi[3] * [-1, -1, 1]
+    wi, wo = wi.astype(np.float32).astype(float), wo.astype(np.float32).astype(float)
+    kappa = 25.0 * rng.random(count)
+    return Pairs(wi, wo, kappa, 2e-3 * rng.random(count))
+
+
+def exact_power(given: Pairs, index: complex, *, coated: bool = False) -> Array:
+    """Return N' of small slope by `md.reference` in double precision, (n,)."""
+    wi, wo = given.wi, given.wo
+    n = COAT if coated else 1.0
+    inner = [coat.refracted(w, n) for w in (wi, wo)] if coated else [wi, wo]
+    relative = np.full(len(wi), index / n)
+    s = boundary.small_slope_weight(given.kappa, given.variance, relative)
+    jones = boundary.blended(*inner, relative, s)
+    if coated:
+        jones = coat.transmitted(jones, wi, wo, n, relative)
+    return boundary.unpolarised(jones) * (2.0 * inner[0][:, 2] * inner[1][:, 2]) ** 2
+
+
+def faded_jones(geometry: Geometry, index: Any, heights: Heights | None) -> Jones:
+    """Return Kirchhoff's matrix times exp(−κ²σ²/2), which depends on the heights."""
+    assert heights is not None
+    phase = heights.kappa * heights.kappa * heights.variance
+    kept = of(phase).exp(-0.5 * phase)
+    ss, sp, ps, pp = kirchhoff(geometry, index)
+    return ss * kept, sp * kept, ps * kept, pp * kept
+
+
+def halved(table: RoughnessTable) -> RoughnessTable:
+    """Return half the variance of a table."""
+    return RoughnessTable(table.first, 0.5 * table.nodes)
+
+
+FADED = Model("faded", faded_jones, halved)
+
+
+def exact_faded(given: Pairs, index: complex) -> Array:
+    """Return N' of `FADED` by `md.reference` in double precision, (n,)."""
+    jones = boundary.kirchhoff(given.wi, given.wo, np.full(len(given.wi), index))
+    power = boundary.unpolarised(jones) * (2.0 * given.wi[:, 2] * given.wo[:, 2]) ** 2
+    return power * np.exp(-(given.kappa**2) * given.variance)
+
+
+def check(found: Array, exact: Array, *, coated: bool = False) -> None:
+    """Compare in single precision: 1e-5 of the largest, and 1e-3 of each."""
+    # near Brewster's angle of a coat √(1 − T_p) has but half of the digits of T_p
+    largest = 3e-5 if coated else 1e-5
+    assert np.abs(found - exact).max() < largest * exact.max()
+    assert np.all(np.abs(found - exact) < 1e-3 * exact)
