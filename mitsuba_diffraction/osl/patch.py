@@ -62,13 +62,15 @@ class EnergyTexture(NamedTuple):
 
     Attributes
     ----------
-    pixels : (polar + 1, azimuthal + 1, 4) float32 on `FINE`, the first column repeated at the end;
-        channels are the scales of the two height scales `nodes`, and two of 0.
+    pixels : (wavelengths · (polar + 1), azimuthal + 1, 4) float32 on `FINE`, the first column
+        repeated at the end; channels are the scales of the height scales `nodes`, and two of 1.
     nodes : the surface's height scale, and the largest of its table.
+    wavelengths : (n,) nm, evenly in their logarithm.
     """
 
     pixels: NDArray[np.float32]
     nodes: tuple[float, float]
+    wavelengths: NDArray[np.float64]
 
     @property
     def constants(self) -> dict[str, float | int]:
@@ -79,18 +81,25 @@ class EnergyTexture(NamedTuple):
             "ENERGY_SHARE": SHARE,
             "ENERGY_HEIGHT": self.nodes[0],
             "ENERGY_MOST": self.nodes[1],
+            "ENERGY_PAGES": len(self.wavelengths),
+            "ENERGY_FIRST": float(np.log(self.wavelengths[0])),
+            "ENERGY_LAST": float(np.log(self.wavelengths[-1])),
         }
 
 
 def energy_texture(described: Surface) -> EnergyTexture | None:
     """Tabulate the scales of energy at two height scales; None where all are 1."""
     nodes = described.height_scale.number, float(described.patch.height_scale_max)
-    pages = [described.energy_scale(node) for node in nodes]
-    if all(page is None for page in pages):
+    tables = [described.energy_scale(node) for node in nodes]
+    if not (known := [table for table in tables if table is not None]):
         return None
-    values = [FINE.ones if page is None else page for page in pages]
-    scales = np.stack([np.pad(page, [(0, 0), (0, 1)], mode="wrap") for page in values], axis=-1)
-    return EnergyTexture(np.pad(scales, [(0, 0), (0, 0), (0, 2)]).astype(np.float32), nodes)
+    lam = known[0].wavelengths
+    values = np.ones((len(lam), FINE.polar + 1, FINE.azimuthal + 1, 4), np.float32)
+    for channel, table in enumerate(tables):
+        if table is not None:
+            pages = np.stack([table.page(float(wavelength)) for wavelength in lam])
+            values[..., channel] = np.pad(pages, [(0, 0), (0, 0), (0, 1)], mode="wrap")
+    return EnergyTexture(values.reshape(-1, *values.shape[2:]), nodes, lam)
 
 
 def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:

@@ -36,7 +36,7 @@ class Feature(Enum):
     MIRROR = "material", "material='none'"
     DIELECTRIC = "material", "a dielectric"
     RARER = "material", "a dielectric rarer than the medium above"
-    CONDUCTOR = "material", "a conductor"
+    CONDUCTOR = "material", "a conductor or a material with an index over wavelength"
     COAT = "", "a coat (coat_ior)"
     FILM = "", "a thin film (film_ior)"
     SMALL_SLOPE = "model", "model='small_slope'"
@@ -120,13 +120,13 @@ class Energy:
 
     Attributes
     ----------
-    scale : luminous mean e over wavelengths of the scale s, (polar + 1, azimuthal) on
-        `tables.directional.FINE`; None where all are 1. The BSDF is multiplied by s(ωi) s(ωo).
+    scale : s of wavelengths and directions on `tables.directional.FINE`; None where all are 1. The
+        BSDF is multiplied by s(ωi) s(ωo).
     reflected : albedo over the flat interface's reflectance, by which light goes on to a nested
         BSDF; None where the flat reflectance decides.
     """
 
-    scale: Callable[[float], NDArray[np.float32] | None]
+    scale: Callable[[float], DirectionalTable | None]
     reflected: Callable[[float], DirectionalTable | None]
 
 
@@ -237,7 +237,7 @@ class Surface:
         found = {feature for feature, has in present.items() if has}
         return found | {feature for feature in chosen if feature is not None}
 
-    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+    def energy_scale(self, height_scale: float) -> DirectionalTable | None:
         """See `Energy.scale`; None without scales of energy."""
         return None if self.energy is None else self.energy.scale(height_scale)
 

@@ -217,8 +217,6 @@ from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
-from numpy.typing import NDArray
 
 from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
@@ -289,23 +287,27 @@ class Diffraction(DiffractingSurface):
         # Eq. 1: (u, v, w) = ωi + ωo
         pair = self._pair(si, wo, active)
         # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
-        power = self.power.power(pair, self.scale_at(si, active), si)
+        scale = self.scale_at(si, active)
+        power = self.power.power(pair, scale, si)
         # Eq. 4 to 10: times N' of the material and the rest
-        return self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
+        return self.layering.diffraction_share * self.diffracted(
+            ctx, si, pair, power, scale, active
+        )
 
     def diffracted_density(self, si: Interaction, wo: Vector3f, active: Mask) -> Float:
         """See `Nesting.diffracted_density`."""
         pair = self._pair(si, wo, active).outer
-        return with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
+        scale = self._drawing_scale(self.scale_at(si, active))
+        return with_even_share(self.power.density(pair, scale, si))
 
     def diffracted_both(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
         """See `Nesting.diffracted_both`."""
         pair = self._pair(si, wo, active)
-        scales = self.scale_at(si, active), self._drawing_scale(si, active)
-        power, orders = self.power.both(pair, *scales, si)
-        value = self.diffracted(ctx, si, pair, power, active)
+        scale = self.scale_at(si, active)
+        power, orders = self.power.both(pair, scale, self._drawing_scale(scale), si)
+        value = self.diffracted(ctx, si, pair, power, scale, active)
         return self.layering.diffraction_share * value, with_even_share(orders)
 
     def normal_reflectance(self, si: Interaction, active: Mask) -> Spectrum:
@@ -328,13 +330,20 @@ class Diffraction(DiffractingSurface):
     # ------------------------------------------------------------------ the model
 
     def diffracted(
-        self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+        self,
+        ctx: Context,
+        si: Interaction,
+        pair: Pair,
+        power: Colour,
+        scale: Float,
+        active: Mask,
     ) -> Spectrum:
         """Return f cosθo of the structure, and of the coat's face where there is one.
 
         power : ⟨|P|²⟩ / (4π²σ⁴ λ²) of the pair in 1/µm², eq. 2 and 3, from the power model.
+        scale : `scale_at` the points.
         """
-        k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
+        k = self.power.wavenumbers(si)
         # Eq. 4 without power and N
         factor = self.geometry(pair)
         if self.vcavity:
@@ -349,7 +358,7 @@ class Diffraction(DiffractingSurface):
         if not mi.is_rgb:
             power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, si, pair, self.boundary, factor * power, active)
+        value = self.lobe(ctx, si, pair, self.boundary, factor * power, scale, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
         if self._energy is not None and self._energy.active_factors:
@@ -368,9 +377,8 @@ class Diffraction(DiffractingSurface):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def _drawing_scale(self, si: Interaction, active: Mask) -> Float:
+    def _drawing_scale(self, scale: Float) -> Float:
         """Height scale to draw directions for: under a coat κ is as if heights were larger."""
-        scale = self.scale_at(si, active)
         return scale if self.coat is None else scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
@@ -382,7 +390,7 @@ class Diffraction(DiffractingSurface):
         """See `Nesting.draw`."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self._drawing_scale(si, active)),
+            dr.detach(self._drawing_scale(self.scale_at(si, active))),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
@@ -462,11 +470,11 @@ class Diffraction(DiffractingSurface):
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
         return self._energy is not None and self._energy.conserving
 
-    def _energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+    def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.scale`."""
         if self._energy is None or not self._energy.conserving or self.coat is not None:
             return None
-        return self._energy.brightness(height_scale)
+        return self._energy.scale(height_scale)
 
     def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.reflected`."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import warn
 from ..optics import fresnel
-from ..optics.colour import RGB_WAVELENGTHS, response
+from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
 from ..tables.directional import FINE, LAST_ANGLE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
@@ -146,8 +146,8 @@ class EnergyModel:
                 "orders are least certain there"
             )
 
-    def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
+    def scale(self, height_scale: float) -> DirectionalTable | None:
+        """Energy scale s on `FINE`; None where all are 1."""
         height_scale /= self._scales.centre
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
@@ -155,9 +155,7 @@ class EnergyModel:
         if scales is None:
             return None
         scale = between([scale.on(FINE) for scale in scales], nodes, height_scale)
-        wavelengths = scale.wavelengths * self._scales.centre
-        weights = response(wavelengths)[:, 1] * wavelengths
-        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+        return DirectionalTable(scale.wavelengths * self._scales.centre, scale.values)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
         """Return the table that `reflected` looks up, for shaders."""

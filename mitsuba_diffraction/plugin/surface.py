@@ -102,14 +102,16 @@ class DiffractingSurface(mi.BSDF):
         pair: Pair,
         boundary: Boundary,
         power: Colour,
+        scale: Float,
         active: Mask,
     ) -> Spectrum:
         """Return f cosθo of a boundary.
 
         power : `geometry` times ⟨|P|²⟩ / (4π²σ⁴ λ²), per channel.
+        scale : `scale_at` the points.
         """
-        wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
-        factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        k = self.power.wavenumbers(si)
+        factor = boundary.factor(pair, scale, k, si, active, ctx.mode)
         return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
 
     def face(
@@ -117,7 +119,7 @@ class DiffractingSurface(mi.BSDF):
     ) -> Spectrum:
         """Return f cosθo of a flat face: the lobe of a flat patch."""
         power = self.geometry(pair) * self.power.flat(pair, si)
-        return self.lobe(ctx, si, pair, mirror, power, active)
+        return self.lobe(ctx, si, pair, mirror, power, mi.Float(0.0), active)
 
     def scale_at(self, si: Interaction, active: Mask) -> Float:
         """Return the factor on the heights at points of the surface."""

@@ -23,14 +23,16 @@ from mitsuba_diffraction.osl.patch import (
     powers_at,
 )
 from mitsuba_diffraction.plugin.description import Energy, Quantity, Surface
-from mitsuba_diffraction.tables.directional import FINE
+from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from tests.support.patches import DEEP, DEFAULTS, PATCH
 
 
 def scale_of(height_scale):
-    """A smooth scale of energy, lower for deeper heights."""
+    """A smooth scale of energy, lower for deeper heights and longer waves."""
     theta, phi = np.meshgrid(FINE.theta, FINE.phi, indexing="ij")
-    return (1 - 0.3 * height_scale * theta / 2 * (1 + 0.2 * np.cos(phi))).astype(np.float32)
+    page = 1 - 0.3 * height_scale * theta / 2 * (1 + 0.2 * np.cos(phi))
+    lam = np.geomspace(360.0, 830.0, 5)
+    return DirectionalTable(lam, (page ** (lam[:, None, None] / 500)).astype(np.float32))
 
 
 ENERGETIC = Surface(
@@ -66,7 +68,7 @@ def test_draws_have_the_probabilities_that_weigh_them():
     [
         {"coat_ior": 1.4}, {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
         {"shadowing": "vcavity"},
-        {"pigment": {"type": "diffuse"}},
+        {"beneath": {"type": "diffuse"}},
         {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
     ],
     ids=lambda value: next(iter(value)),
@@ -93,23 +95,27 @@ def test_boundary_models_that_the_shader_lacks_are_refused(some_variant):
 
 
 @settings(deadline=None, max_examples=50)
-@given(st.floats(0.0, 0.5 * np.pi), st.floats(-np.pi, np.pi), st.floats(0.0, 1.5))
-def test_scales_of_energy_are_those_of_the_description(theta, phi, height_scale):
+@given(
+    st.floats(0.0, 0.5 * np.pi), st.floats(-np.pi, np.pi), st.floats(0.0, 1.5),
+    st.floats(380.0, 780.0),
+)  # fmt: skip
+def test_scales_of_energy_are_those_of_the_description(theta, phi, height_scale, wavelength):
     """The look-up of shaders/patch.osl, at the nodes of its height scales and between them."""
-    pages = {0.0: FINE.ones, 1.0: scale_of(1.0), 1.5: scale_of(1.5)}
-    expected = [FINE.interpolation(theta, phi)(page) for page in pages.values()]
+    pages = [scale_of(scale).at(theta, phi, wavelength) for scale in (1.0, 1.5)]
     energy = energy_texture(ENERGETIC)
     constants = energy.constants
     row = (1 - np.sqrt(max(1 - 2 / np.pi * theta, 0))) / constants["ENERGY_SHARE"]
     row = min(row, 1.0) * constants["ENERGY_POLAR"]
     column = phi / (2 * np.pi) % 1.0 * constants["ENERGY_AZIMUTHAL"]
-    nodes = (
-        map_coordinates(energy.pixels[..., 0], [[row], [column]], order=1),
-        map_coordinates(energy.pixels[..., 1], [[row], [column]], order=1),
-    )
+    first, last = constants["ENERGY_FIRST"], constants["ENERGY_LAST"]
+    page = (np.log(wavelength) - first) / (last - first) * (constants["ENERGY_PAGES"] - 1)
+    pixels = energy.pixels.reshape(constants["ENERGY_PAGES"], -1, *energy.pixels.shape[1:])
+    place = [[page], [row], [column]]
+    nodes = [map_coordinates(pixels[..., n], place, order=1)[0] for n in (0, 1)]
     heights = [0.0, constants["ENERGY_HEIGHT"], constants["ENERGY_MOST"]]
-    read = np.interp(height_scale, heights, [1.0, nodes[0][0], nodes[1][0]])
-    assert read == pytest.approx(np.interp(height_scale, list(pages), expected), abs=1e-5)
+    read = np.interp(height_scale, heights, [1.0, *nodes])
+    # single precision of pages and places
+    assert read == pytest.approx(np.interp(height_scale, [0.0, 1.0, 1.5], [1.0, *pages]), abs=1e-5)
 
 
 def test_other_plugins_are_refused(tmp_path, some_variant):

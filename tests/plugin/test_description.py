@@ -36,7 +36,7 @@ from mitsuba_diffraction.realtime.glsl.materials import (
 )
 from mitsuba_diffraction.realtime.glsl.materials import Material as Drawn
 from mitsuba_diffraction.realtime.glsl.methods import CONSUMERS
-from mitsuba_diffraction.tables.directional import FINE
+from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH
 
@@ -45,8 +45,8 @@ TABLE = md.DiffractionTable.build(PATCH, **DEFAULTS, second_order=True)
 TEXTURE = object()  # stands for a texture of Mitsuba, which features do not read
 
 
-def half(height_scale: float) -> np.ndarray:
-    return np.full((FINE.polar + 1, FINE.azimuthal), 0.5, np.float32)
+def half(height_scale: float) -> DirectionalTable:
+    return DirectionalTable(np.array([400.0, 700.0]), np.stack([0.5 * FINE.ones] * 2))
 
 
 def base() -> Surface:
@@ -155,8 +155,8 @@ PARAMETERS = [
     ({"height_scale": 0.5}, Feature.HEIGHT_SCALE),
     ({"lateral_scale": 0.5}, Feature.LATERAL_SCALE),
     ({"orientation": 30.0}, Feature.ORIENTATION),
-    ({"pigment": {"type": "diffuse"}}, Feature.NESTED),
-    ({"pigment": {"type": "diffuse"}, "layering": "thesis"}, Feature.THESIS),
+    ({"beneath": {"type": "diffuse"}}, Feature.NESTED),
+    ({"beneath": {"type": "diffuse"}, "layering": "thesis"}, Feature.THESIS),
     ({"plugin": "diffraction_dielectric"}, Feature.TRANSMISSION),
 ]
 

@@ -38,6 +38,8 @@ for degrees in tilts:
         name = item["identifier"]
         socket = script.inputs.new(item["socket"], item["label"], identifier=name)
         value = values.get(name, item["default"])
+        if name in document["textures"]:
+            value = str(folder / document["textures"][name])
         if item["kind"] == "color":
             value = [*value, 1.0]
         if value is not None:

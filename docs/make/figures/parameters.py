@@ -24,7 +24,7 @@ from .pages import exit_code
 _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
 PLUGINS = {
-    "diffraction": _FOLDER / "bsdf.py",
+    "diffraction": _FOLDER / "diffraction.py",
     "diffraction_dielectric": _FOLDER / "transmission/diffraction_dielectric.py",
     "diffraction_orders": _FOLDER / "orders/diffraction_orders.py",
 }

@@ -159,22 +159,23 @@ class DiffractionDielectric(DiffractingSurface):
         frame = self.frame_at(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
+        scale = self.scale_at(si, active)
+        change, where = None, (self.power.wavenumbers(si), scale)
         if self._energy is not None and self._energy.scales_order_0:
             change = self._energy.order_0_scale((si.wi, wo), frame, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, si, wo, frame, lit, change)
+                side, orders = reflected(ctx, si, wo, frame, scale, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
-            passed = self._transmitted(ctx, si, crossing, change) * dr.abs(cos_o)
+            passed = self._transmitted(ctx, si, crossing, scale, change) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
-            orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
+            orders = self.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         if self._energy is not None and self._energy.attenuates:
             # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
@@ -242,13 +243,14 @@ class DiffractionDielectric(DiffractingSurface):
         si: Interaction,
         wo: Vector3f,
         frame: PatchFrame,
+        scale: Float,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        scale, pair = self.scale_at(si, lit), Pair(si, wo, frame, lit)
+        pair = Pair(si, wo, frame, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
-        value = self.lobe(ctx, si, pair, self.boundary, power, lit)
+        value = self.lobe(ctx, si, pair, self.boundary, power, scale, lit)
         if self.thin:
             value += self._returned(si, pair, scale, change)
         return value, self.power.density(pair, scale, si)
@@ -259,16 +261,17 @@ class DiffractionDielectric(DiffractingSurface):
         si: Interaction,
         wo: Vector3f,
         frame: PatchFrame,
+        scale: Float,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
-        n, scale = self.material.eta, self.scale_at(si, lit)
+        n = self.material.eta
         if self.thin:
             outer = Turned(si, wo, frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             power = self.geometry(pair) * self._power(si, pair, scale, change)
-            value = self.lobe(ctx, si, pair, self.inner_boundary, power, lit)
+            value = self.lobe(ctx, si, pair, self.inner_boundary, power, scale, lit)
             face = self.face(ctx, si, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             return value, self.power.density(outer, scale * n, si)
@@ -276,7 +279,7 @@ class DiffractionDielectric(DiffractingSurface):
         power = self.geometry(inner) * self._power(si, inner.place, scale, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
-        value = self.lobe(ctx, si, inner, self.inner_boundary, power, lit) * dr.square(n)
+        value = self.lobe(ctx, si, inner, self.inner_boundary, power, scale, lit) * dr.square(n)
         return value, self.power.density(inner, scale * n, si) * dr.square(n)
 
     def _returned(
@@ -313,18 +316,19 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         crossing: Crossing,
+        scale: Float,
         change: Colour | None,
     ) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        point, scale = crossing.place, self.scale_at(si, crossing.active)
+        point = crossing.place
         power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
         zeroth = dr.minimum(zeroth, power)  # speckle may be dark
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
-        others = self._factor(ctx, si, crossing, self._matrices(si, crossing, pair))
+        others = self._factor(ctx, si, crossing, self._matrices(si, crossing, scale, pair))
         flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
@@ -338,12 +342,12 @@ class DiffractionDielectric(DiffractingSurface):
             outside *= dr.select(down, *scales)
         return dr.select(crossing.active, value * outside, 0.0)
 
-    def _matrices(self, si: Interaction, crossing: Crossing, pair: Geometry) -> list[Jones]:
+    def _matrices(
+        self, si: Interaction, crossing: Crossing, scale: Float, pair: Geometry
+    ) -> list[Jones]:
         """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
         n, above, below = crossing.n, crossing.above, crossing.below
-        heights = self.boundary.heights(
-            crossing.place, self.scale_at(si, crossing.active), self.power.wavenumbers(si)
-        )
+        heights = self.boundary.heights(crossing.place, scale, self.power.wavenumbers(si))
         # Beyond the critical angle light decays outside; from outside none arrives there
         outside = outside_square(pair, n)
         outside = outside if self.thin else mi.Complex2f(outside, 0.0)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.boundary import MODELS
-from ...optics.colour import RGB_WAVELENGTHS
+from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Material, Surface
-from ...tables.directional import FINE
+from ...tables.directional import FINE, DirectionalTable
 from ...tables.store import cached_colours
 from .lobes import colour_power, pack_lobes
 from .maps import evaluated
@@ -79,8 +79,7 @@ class Modelled:
         pages = [energy.scale(scale) for scale in scales]
         if all(page is None for page in pages):
             return beneath
-        ones = FINE.ones
-        return beneath | pack_energy([ones if page is None else page for page in pages])
+        return beneath | pack_energy([FINE.ones if s is None else luminous_mean(s) for s in pages])
 
     def tables(self, method: str, *, floats: bool = False) -> Packed:
         """Pack the table for `fast` or `exact`.
@@ -96,6 +95,12 @@ class Modelled:
         colours = cached_colours(self.described.patch)
         factor = self.described.height_scale.number * self._coat
         return pack_lobes(lambda edges: colour_power(colours, edges, factor), colours.sigma)
+
+
+def luminous_mean(table: DirectionalTable) -> NDArray[np.float32]:
+    """Average a table over wavelengths as bright as they are, (polar + 1, azimuthal)."""
+    weights = response(table.wavelengths)[:, 1] * table.wavelengths
+    return np.average(table.values, axis=0, weights=weights).astype(np.float32)
 
 
 def _reflectance(material: Material | None) -> Packed:

@@ -161,11 +161,17 @@ def _kind(session: Session) -> type[BSDF]:
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
         def diffracted(
-            self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+            self,
+            ctx: Context,
+            si: Interaction,
+            pair: Pair,
+            power: Colour,
+            scale: Float,
+            active: Mask,
         ) -> Spectrum:
-            value = super().diffracted(ctx, si, pair, power, active)
+            value = super().diffracted(ctx, si, pair, power, scale, active)
             light = mi.unpolarized_spectrum(value)
-            session.record(self, si, pair.uv, pair.w * self.scale_at(si, active), light)
+            session.record(self, si, pair.uv, pair.w * scale, light)
             return value
 
     return RecordedDiffraction

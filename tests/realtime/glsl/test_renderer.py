@@ -20,7 +20,7 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     visibility,
     with_lights,
 )
-from mitsuba_diffraction.tables.directional import FINE
+from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
@@ -157,7 +157,9 @@ def test_another_height_scale_has_its_own_energy(
     monkeypatch.setattr(
         type(plate),
         "_energy_scale",
-        lambda self, scale: np.full(shape, scales[scale], np.float32),
+        lambda self, scale: DirectionalTable(
+            np.array([360.0, 830.0]), np.full((2, *shape), scales[scale], np.float32)
+        ),
     )
     scene = {
         "type": "scene",
