@@ -9,7 +9,7 @@ import mitsuba as mi
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.figures import diffraction_parameters as parameters
+from docs.make.figures import parameters
 from mitsuba_diffraction.errors import DiffractionError
 
 
