@@ -95,7 +95,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
         raise DiffractionError(f"solver {method!r} is unknown; choose one of {known}")
     if grating.films and method != "coupled":
         raise DiffractionError(
-            f"--solver {method} has no films on the profile; use --solver coupled, or leave the "
+            f"method {method} has no films on the profile; use method=coupled, or leave the "
             "layers out"
         )
     content = hashlib.sha256(
