@@ -220,9 +220,9 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     elif args.phi is not None or args.step is not None:
         args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
-    say(
-        f"tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} in "
-        "95 % of directions"
+    limits = (
+        f"; tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} "
+        "in 95 % of directions"
     )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
     with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
@@ -231,7 +231,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             say(
                 f"{estimate.stage}: {estimate.solutions} solutions at {estimate.stations} "
                 f"stations, about {_time(estimate.seconds / processes)}; results are kept in "
-                f"'{folder}'"
+                f"'{folder}'{limits}"
             )
 
         table = solve(
