@@ -285,6 +285,7 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
     """Return the answers where the mask is true; kernels skip a branch that no lane takes."""
     if not dr.is_jit_v(mi.Float):
         return ask(on) if on else otherwise
+
     def typed(answers: Sequence[Any]) -> tuple[Any, ...]:
         """Copy answers to the types that both branches must share."""
         return tuple(type(by)(answer) for by, answer in zip(otherwise, answers, strict=True))
