@@ -158,3 +158,31 @@ def test_squares_and_kinds() -> None:
 
     assert "return z.x * z.x + z.y * z.y;" in printed(of_kind, "complex")
     assert "return z;" in printed(of_kind, "float")
+
+
+def test_names_that_the_shader_declares_are_no_functions() -> None:
+    program = Program(GLSL, frozenset({"halved", "GAIN"}))
+    with pytest.raises(DiffractionError, match="already declares the name halved"):
+        program.add(halved, "float")
+
+    def of_gain(GAIN: Any) -> Any:
+        return halved(GAIN)
+
+    program.add(of_gain, "float")
+    assert "float halved_(float z)" in program.text
+    assert "float of_gain(float GAIN_)" in program.text
+    assert "return halved_(GAIN_);" in program.text
+
+
+def test_formulas_of_one_name_are_two_functions() -> None:
+    def outer(x: Any) -> Any:
+        return halved(x) + doubled(x)
+
+    def double(x: Any) -> Any:
+        return 2.0 * x
+
+    double.__name__ = "halved"
+    doubled = formula(double)
+    text = printed(outer, "float")
+    assert "return halved(x) + halved_(x);" in text
+    assert "return 2.0 * x;" in text

@@ -30,11 +30,11 @@ from ..glsl.materials import (
 )
 from ..glsl.methods import CONSUMERS
 from ..glsl.scene import RealtimeScene, Surface, load, read_scene
+from ..glsl.rewriting import shader_file
 from ..glsl.source import (
     display_definitions,
     fragment_parts,
     plain_source,
-    shader_file,
     vertex_source,
 )
 from ..glsl.texels import Packed
