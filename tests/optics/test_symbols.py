@@ -53,7 +53,7 @@ def test_functions_and_variables_keep_their_names() -> None:
     assert "More words" not in text
     assert "void both(vec3 wi, float low, float high, float index," in text
     assert "float length_ = sqrt(max(wi.x * wi.x + wi.z * wi.z, 1e-20));" in text
-    assert "bool steep = length_ > ends_low && wi.z < ends_high;" in text
+    assert "bool steep = length_ > low && wi.z < high;" in text
     # a formula is a function, before those that call it, once for all of its calls
     assert text.index("float halved(float z)") < text.index("void both(")
     assert text.count("float halved(") == 1

@@ -288,9 +288,7 @@ def test_what_shaders_do_not_know_is_refused(scene: Any) -> None:
     import mitsuba as mi
 
     filmed = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
-    with pytest.raises(
-        DiffractionError, match=r"thin film \(film_ior\), which an exported shader cannot show"
-    ):
+    with pytest.raises(DiffractionError, match="an exported shader cannot show"):
         make_shader(mi.load_dict(filmed))
 
 
