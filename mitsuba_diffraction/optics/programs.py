@@ -213,12 +213,11 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
         parameters.append(symbol)
         return symbol if argument != "vector" else components_of(scope, symbol)
     if isinstance(argument, tuple):
-        fields = getattr(argument, "_fields", None) or [f"{name}{n}" for n in range(len(argument))]
+        fields = getattr(argument, "_fields", range(len(argument)))
         parts = [
-            _parameter(scope, f"{name}_{field}" if hasattr(argument, "_fields") else field, part,
-                       parameters)
+            _parameter(scope, _word(name, argument, field), part, parameters)
             for field, part in zip(fields, argument, strict=True)
-        ]  # fmt: skip
+        ]
         return like(argument, parts)
     return argument
 
@@ -282,6 +281,13 @@ def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
     elif isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))
         for suffix, part in zip(fields, value, strict=True):
-            word = f"{name}_{suffix}" if isinstance(suffix, str) else f"{name}{suffix}"
+            word = _word(name, value, suffix)
             if not (isinstance(part, Symbol) and part.name):
                 _name(scope, word, part, own)
+
+
+def _word(name: str, record: tuple[Any, ...], field: str | int) -> str:
+    """Return the name of a tuple's part; `cos_i` of `geometry`, a record called after its class."""
+    if isinstance(field, int):
+        return f"{name}{field}"
+    return field if name == type(record).__name__.lower() else f"{name}_{field}"
