@@ -85,7 +85,9 @@ class Program:
         formula = getattr(formula, "__wrapped__", formula)
         key = (formula, name, all_parameters, *map(_key, arguments))
         if key not in self.functions:
-            scope = Scope(self, formula, name or self._free_name(formula, formula.__name__.lstrip("_")))
+            scope = Scope(
+                self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
+            )
             parameters, result = scope.run(arguments)
             printer = Printer(scope, all_parameters)
             self.functions[key] = printer.function(parameters, result, comment or _comment(formula))

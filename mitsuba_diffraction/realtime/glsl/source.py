@@ -37,6 +37,7 @@ _PREAMBLES = {
     ),
 }
 
+
 def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
     """Return the source of the vertex stage, which all methods share."""
     return _PREAMBLES[dialect] + shader_file(name)

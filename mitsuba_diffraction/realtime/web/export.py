@@ -29,8 +29,8 @@ from ..glsl.materials import (
     pack_surface,
 )
 from ..glsl.methods import CONSUMERS
-from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.rewriting import shader_file
+from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.source import (
     display_definitions,
     fragment_parts,
