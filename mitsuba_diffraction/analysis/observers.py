@@ -31,7 +31,7 @@ of CIE 2006 (170-1), for 2 degrees.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,7 +125,7 @@ def _human() -> Eye:
 
 
 #: Animals by name: λmax, relative numbers of receptors (1 if unknown), oil droplets, their λcut.
-EYES = {
+EYES: dict[str, Callable[[], Eye]] = {
     "avian_uv": lambda: _modelled(
         (371.0, 448.0, 502.0, 563.0), (1.0, 2.0, 2.0, 4.0), "TCYR", (300.0, 413.0, 507.0, 572.0),
         bird_media(),

@@ -79,16 +79,18 @@ def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:
     import colour
 
     light = colour.SDS_ILLUMINANTS[name]
-    return np.asarray(np.interp(wavelength, light.wavelengths, light.values))
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(np.interp(lam, light.wavelengths, light.values))
 
 
 def cone_fundamentals(wavelength: ArrayLike) -> NDArray[np.float64]:
     """Stockman and Sharpe's sensitivities of S, M and L to power, 2 degrees, (3, n) of λ (n,)."""
     import colour
 
+    lam = np.asarray(wavelength, np.float64)
     cones = colour.MSDS_CMFS["Stockman & Sharpe 2 Degree Cone Fundamentals"]
     return np.stack(
-        [np.interp(wavelength, cones.wavelengths, row, 0.0, 0.0) for row in cones.values.T[::-1]]
+        [np.interp(lam, cones.wavelengths, row, 0.0, 0.0) for row in cones.values.T[::-1]]
     )
 
 

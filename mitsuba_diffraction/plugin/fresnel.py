@@ -183,7 +183,7 @@ class Conductor:
         """
         nodes = TISSUES[above].nodes
         ratio = dispersion_of(above, nodes)
-        spectrum = {
+        spectrum: dict[str, Any] = {
             "type": "spectrum",
             "value": list(zip(nodes.tolist(), ratio.tolist(), strict=True)),
         }
