@@ -40,11 +40,11 @@ test: setup .venv/browser  ## run the quick tests, of every part: three minutes
 test-all: setup .venv/browser  ## run all tests: ten minutes
 	@$(PYTEST) -n 3
 
-# for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1 ROUNDS=20
+# for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1 ROUNDS=20; one kind: KIND=energy
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute
 	@mkdir -p out/fuzz
 	@MITSUBA_DIFFRACTION_CACHE=out/fuzz OPENBLAS_NUM_THREADS=1 $(PYTHON3) -W ignore -m tests.fuzz \
-	    --seconds $(or $(SECONDS),60) $(if $(ROUNDS),--rounds $(ROUNDS)) $(if $(SEED),--seed $(SEED))
+	    --seconds $(or $(SECONDS),60) $(if $(ROUNDS),--rounds $(ROUNDS)) $(if $(SEED),--seed $(SEED)) $(if $(KIND),--kind $(KIND))
 
 package: setup .venv/browser  ## test wheel and sdist in empty environments, with oldest and newest packages
 	@.ci/package

@@ -31,7 +31,7 @@ _NEEDS = {
     "imgui_bundle": _Need("view needs imgui-bundle", "view"),
     "moderngl": _Need("the shaders need moderngl", "gl"),
     "moderngl_window": _Need("view needs moderngl-window", "view"),
-    "pyoidn": _Need("--denoise needs pyoidn", "denoise"),
+    "pyoidn": _Need("denoising needs pyoidn", "denoise"),
 }
 
 

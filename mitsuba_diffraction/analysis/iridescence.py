@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, median
 
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
@@ -36,6 +36,9 @@ WINDOW = 10.0
 HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
 #: Saturation below which a colour counts as grey.
 GREY = 0.1
+
+#: Unordered surfaces of which `chance_iridescence` is the mean.
+CHANCES = 3
 
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
@@ -98,7 +101,24 @@ class DiffractedLight:
         return np.asarray(self.xyz[lit])
 
 
-def diffracted_light(table: DiffractionTable, light: Light) -> DiffractedLight:
+def chance_iridescence(table: DiffractionTable, light: Light) -> float:
+    """Return the index of an unordered surface of the same size and roughness, by chance alone.
+
+    The mean over `CHANCES` surfaces. Each order has the median power of all orders at its
+    frequency, times a random factor as of speckle, exponentially distributed.
+    """
+    last = table.grid.last
+    shape = (2 * last[1] + 1, 2 * last[0] + 1)
+    indices = []
+    for seed in range(CHANCES):
+        speckle = np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
+        indices.append(diffracted_light(table, light, speckle=speckle).iridescence())
+    return float(np.mean(indices))
+
+
+def diffracted_light(
+    table: DiffractionTable, light: Light, *, speckle: Reals | None = None
+) -> DiffractedLight:
     """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
@@ -107,6 +127,8 @@ def diffracted_light(table: DiffractionTable, light: Light) -> DiffractedLight:
     of Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
+    speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its
+        frequency, which replaces its own.
 
     Raises
     ------
@@ -127,6 +149,7 @@ def diffracted_light(table: DiffractionTable, light: Light) -> DiffractedLight:
     frequency = np.hypot(qx, qy[:, None])
     # 1e-6: rounding decides about orders of exactly that period otherwise
     mirror = frequency < (1.0 + 1e-6) * 2.0 * math.pi / width
+    rings = np.round(frequency / min(table.spacing)).astype(int)
     count = 2 * math.ceil(1.15 / _CELL)
     xyz = np.zeros((count, count, 3))
     central = np.zeros(3)
@@ -141,7 +164,12 @@ def diffracted_light(table: DiffractionTable, light: Light) -> DiffractedLight:
         factors = expansion.weights(k * w) / scale
         interval = expansion.interval(k * w)
         power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
-        power = np.maximum(power, 0.0) * _obliquity(sines, cosine, light)
+        power = np.maximum(power, 0.0)
+        if speckle is not None:
+            ring = rings[rows, columns]
+            medians = median(power, ring, np.arange(rings.max() + 1))
+            power = np.nan_to_num(medians)[ring] * speckle[rows, columns]
+        power *= _obliquity(sines, cosine, light)
         near = mirror[rows, columns]
         weights = response(wavelength) * STEP
         central += weights * power[near].sum()

@@ -41,6 +41,5 @@ def check_material(material: str | None, wavelengths: Reals, pigment: str | None
             value = material if name == "material" else pigment
             raise DiffractionError(
                 f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
-                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
-                "(--wavelength-range)"
+                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others"
             )

@@ -20,7 +20,7 @@ REPEATS = ("name", "folder")
 #: Columns of rows that are averaged over repeated scans.
 AVERAGED = (
     "range_um", "rms_height_um", "rms_slope", "period_1_um", "share_1", "diffracted",
-    "iridescence", *(f"share_{name}" for name in (*HUES, "grey")),
+    "iridescence", "iridescent_light", *(f"share_{name}" for name in (*HUES, "grey")),
 )  # fmt: skip
 
 # Files that lie beside scans and hold no heights.

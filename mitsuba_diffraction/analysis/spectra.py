@@ -203,8 +203,8 @@ def spectrum(
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
                 f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
-                "longer ones, or build a wider table with 'mitsuba-diffraction precompute "
-                "--wavelength-range'"
+                "longer ones, or build a wider table with "
+                "DiffractionTable.build"
             )
     signals = _signals(bsdf, sigma, geometry, lam, progress)
     if relative == "white":

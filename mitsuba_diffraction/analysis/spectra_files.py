@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import io
+import itertools
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ import numpy as np
 from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb, linear_srgb, response
+from .observers import Eye, contrasts, noises, quantum_catches
 from .spectra import Reals, Spectra
 from .spectral_variables import colours_of
 from .survey_files import write_table
@@ -80,6 +82,30 @@ def save_colours(groups: Groups, path: Any) -> None:
     ]
     columns = ("spectrum", "srgb", "hue", "chroma", "B1", "B2", "B3", "S8", "H1", "FWHM")
     write_table(path, columns, rows)
+
+
+def save_catches(
+    groups: Groups, eye: Eye, illuminant: Reals, catches_path: Any, contrasts_path: Any
+) -> None:
+    """Write an animal's quantum catches of each spectrum, and its contrasts of each pair in JND.
+
+    illuminant : quanta of the light, of `observers.illuminant_of`.
+    """
+    names = [name for group, each in groups.items() for name in each.names(group)]
+    catches = np.concatenate(
+        [quantum_catches(eye, each.wavelength, each.value, illuminant) for each in groups.values()]
+    )
+    rows = [
+        {"spectrum": name, **{r: f"{q:.6g}" for r, q in zip(eye.names, row, strict=True)}}
+        for name, row in zip(names, catches, strict=True)
+    ]
+    write_table(catches_path, ("spectrum", *eye.names), rows)
+    distances = contrasts(catches, noises(eye))
+    pairs = [
+        {"patch1": names[i], "patch2": names[j], "dS": f"{distances[i, j]:.6g}"}
+        for i, j in itertools.combinations(range(len(names)), 2)
+    ]
+    write_table(contrasts_path, ("patch1", "patch2", "dS"), pairs)
 
 
 def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:

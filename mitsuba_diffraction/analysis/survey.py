@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,8 @@ from ..progress import Progress, silent
 from ..tables.build.checks import warnings_of
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
-from .iridescence import WINDOW, diffracted_light
+from .crops import crops_of
+from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
 from .repeats import sample_of, scan_files, write_repeats
@@ -39,7 +41,7 @@ from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 5
+VERSION = 6
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -58,6 +60,8 @@ class Job:
     variant: str  # variant of Mitsuba
     threads: int  # threads of Dr.Jit
     surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF of the map; R = 1 without
+    # which crop of `iridescence.WINDOW` of how many; None for the whole scan
+    crop: tuple[int, int] | None = None
 
     @property
     def key(self) -> str:
@@ -65,7 +69,8 @@ class Job:
         treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
         variant = self.variant.partition("_")[2]
         parameters = (VERSION, self.theta, self.resolution, variant, *self.surface)
-        return key_of("survey", self.files.digest, treatment, *parameters)[:32]
+        crop = () if self.crop is None else ("crop", *self.crop)
+        return key_of("survey", self.files.digest, treatment, *parameters, *crop)[:32]
 
 
 @dataclass(frozen=True)
@@ -108,6 +113,11 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
     scan = read_scan(path, job.treatment.options, job.treatment.settings)
+    if job.crop is not None:
+        which, count = job.crop
+        crops = crops_of(path, job.treatment.options, count, WINDOW)
+        scan = scan._replace(patches=[crops[which]])
+        row["crop"] = which + 1
     patches = scan.patches
     for name in ("range", "rms_height", "rms_slope"):
         row[f"{name}_um" if name != "rms_slope" else name] = getattr(patches[0], name)
@@ -137,9 +147,14 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     diffracted = diffracted_light(table, Light(job.theta, phi))
     row["diffracted"] = diffracted.share
-    # a smaller scan has too few orders of its own: chance decides
+    index, floor = diffracted.iridescence(), chance_iridescence(table, Light(job.theta, phi))
+    row |= {"iridescence": index, "iridescence_by_chance": floor}
+    # colour beyond chance, weighed by how much of the light has it
+    row["iridescent_light"] = (
+        math.sqrt(index**2 - floor**2) * row["diffracted"] if (index > floor) else ""
+    )
     enough = widest_window(patches) >= 0.99 * WINDOW
-    row["iridescence"] = diffracted.iridescence() if enough else ""
+    row["ranked_among"] = f"scans {'from' if enough else 'below'} {WINDOW:g} µm"
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": _exr(table), ".png": _png(measured)}
 
@@ -174,14 +189,16 @@ def run_survey(
     threads: int = 0,
     surface: Mapping[str, Any] | None = None,
     repeats: str = "name",
+    crops: int | None = None,
     client: Any = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Measure every scan that the folder does not have yet, and write the results of all.
 
-    The folder holds `survey.csv`, a row for each scan; `samples.csv`, means and standard errors of
-    repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a map (.png) and a
-    row (.json) of each scan. They are named by the content of the scan and its treatment.
+    The folder holds `survey.csv`, a row for each scan, sorted by `ranked`; `samples.csv`, means and
+    standard errors of repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a
+    map (.png) and a row (.json) of each scan. They are named by the content of the scan and its
+    treatment.
 
     Parameters
     ----------
@@ -195,6 +212,8 @@ def run_survey(
     threads : threads of Dr.Jit in workers; 0 for one per core.
     surface : parameters of the map's BSDF, e.g. {"material": "keratin"}; R = 1 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
+    crops : measure so many crops of each scan, of `iridescence.WINDOW`, or as many as fit; scans
+        that are narrower, and recipes, are measured as a whole.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
 
@@ -212,22 +231,27 @@ def run_survey(
         raise DiffractionError("there is no scan to survey; name files")
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
-    named = [{"file": str(file), "sample": sample_of(file, repeats)} for file in files]
     shown = tuple((surface or {}).items())
     rows: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job] = {}
-    for n, file in enumerate(files):
+    named: list[dict[str, str]] = []
+    for file in files:
+        name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
             treatment = treatment_for(file, treatments).updated(common or Treatment())
             job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
+            parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
-            rows[n] = {"reason": str(error)}
+            rows[len(named)] = {"reason": str(error)}
+            named.append(name)
             continue
-        stored = _stored_row(scans, job)
-        if stored is None:
-            jobs[n] = job
-        else:
-            rows[n] = stored
+        for part in parts:
+            stored = _stored_row(scans, part)
+            if stored is None:
+                jobs[len(named)] = part
+            else:
+                rows[len(named)] = stored
+            named.append(name)
     todo = list(jobs)
     progress(0, len(todo), "scans")
     results = run_jobs(client, measure, [jobs[n] for n in todo])
@@ -236,13 +260,29 @@ def run_survey(
         if isinstance(result, Failed):
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
-            rows[n] = _store(scans, files[n], jobs[n], result)
+            rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
         write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
     result = write_rows(folder / TABLE, named, rows)
     write_repeats(folder / SAMPLES, result)
-    write_sheets(folder, result)
+    ranking = ranked(result)
+    write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
+    write_sheets(folder, ranking)
     return result
+
+
+def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Sort rows: wide scans before narrow ones, each by iridescent light; failed scans last.
+
+    The index of scans below `iridescence.WINDOW` has fewer orders in each direction, so that
+    chance has a larger part in it: they are ranked among themselves.
+    """
+
+    def place(row: Mapping[str, Any]) -> tuple[bool, bool, float]:
+        narrow = "below" in row.get("ranked_among", "")
+        return bool(row["reason"]), narrow, -(row.get("iridescent_light") or 0.0)
+
+    return sorted(rows, key=place)
 
 
 def _files_of(file: Path) -> SceneFiles:
@@ -251,6 +291,17 @@ def _files_of(file: Path) -> SceneFiles:
     if kind_of(file) is FileKind.RECIPE:
         Recipe.load(file)
     return files
+
+
+def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
+    """Return a job for each crop of a scan; the job itself for recipes and narrow scans."""
+    if kind_of(file) is FileKind.RECIPE:
+        return [job]
+    options = job.treatment.options
+    found = crops_of(file, options, count, WINDOW)
+    if min(found[0].extent) < 0.99 * WINDOW:
+        return [job]
+    return [replace(job, crop=(n, count)) for n in range(len(found))]
 
 
 def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:

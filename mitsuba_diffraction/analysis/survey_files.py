@@ -56,9 +56,11 @@ def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
             sheet.savefig(temporary, format="png")
 
 
-def _iridescence(index: float | str) -> str:
-    """Text of an index, or of none."""
-    return "too small for an index" if isinstance(index, str) else f"iridescence {index:.2g}"
+def _iridescence(row: Mapping[str, Any]) -> str:
+    """Text of an index, and what of it is chance."""
+    index, chance = row["iridescence"], row["iridescence_by_chance"]
+    beyond = "" if row["iridescent_light"] != "" else ": none"
+    return f"iridescence {index:.2g}, by chance {chance:.2g}{beyond}"
 
 
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
@@ -74,7 +76,7 @@ def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
         period = row.get("period_1_um")
         title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
         axes.set_title(
-            f"{Path(row['file']).name[:34]}\n{title}{_iridescence(row['iridescence'])}"
+            f"{Path(row['file']).name[:34]}\n{title}{_iridescence(row)}"
             + (f"\n{row['tiling']}" if row["tiling"] else ""),
             fontsize=6,
         )

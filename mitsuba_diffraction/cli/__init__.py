@@ -13,6 +13,7 @@ render                 a scene to a picture; `render --frames`: pictures of a sc
 tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 spectrum               reflectance spectra as a spectrometer measures them
+spectrometer           options of a spectrometer, and types of their values
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "thin", "wavelength_range", "tolerance", "solver",
-    "resolution", "polarised", "accept", "theta", "phi", "step", "jobs", "workers", "scheduler",
+    "depth", "duty", "direction", "material", "layers", "thin", "wavelength_range", "tolerance",
+    "solver", "resolution", "polarised", "accept", "theta", "phi", "step", "jobs", "workers",
+    "scheduler",
 )  # fmt: skip
 
 
@@ -64,6 +65,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--superstrate", metavar="N", type=number_between(1, 5),
         help="index of the clear medium above the grooves, e.g. 1.58 under polycarbonate; "
         "default: 1",
+    )  # fmt: skip
+    group.add_argument(
+        "--layer", metavar="M:T", type=_layer, action="append", dest="layers",
+        help="film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; once for "
+        "each, from the material upwards; solved by coupled waves",
     )  # fmt: skip
     group.add_argument(
         "--thin", action="store_true", default=None,
@@ -195,6 +201,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         thin=recipe.thin or bool(args.thin),
         settings=replace(recipe.settings, **changed),
         output=args.output or recipe.output,
+        layers=recipe.layers if args.layers is None else tuple(args.layers),
     )
 
 
@@ -213,9 +220,9 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     elif args.phi is not None or args.step is not None:
         args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
-    say(
-        f"tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} in "
-        "95 % of directions"
+    limits = (
+        f"; tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} "
+        "in 95 % of directions"
     )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
     with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
@@ -224,13 +231,14 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             say(
                 f"{estimate.stage}: {estimate.solutions} solutions at {estimate.stations} "
                 f"stations, about {_time(estimate.seconds / processes)}; results are kept in "
-                f"'{folder}'"
+                f"'{folder}'{limits}"
             )
 
         table = solve(
             recipe.profile,
             recipe.material,
             superstrate=recipe.superstrate,
+            layers=recipe.layers,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -303,6 +311,16 @@ def _pair(text: str) -> tuple[float, float]:
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"expected two numbers A,B, got '{text[:40]}'") from error
     return low, high
+
+
+def _layer(text: str) -> tuple[str, float]:
+    material, _, thickness = text.rpartition(":")
+    try:
+        return material, float(thickness)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, got '{text[:40]}'"
+        ) from error
 
 
 def _time(seconds: float) -> str:

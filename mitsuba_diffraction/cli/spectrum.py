@@ -18,8 +18,9 @@ from ..settings import TableSettings
 from . import options
 from .brdf_map import add_surface, surface_parameters
 from .console import Bar, mitsuba_warnings, say
-from .options import number_between, whole_number
+from .options import whole_number
 from .report import check_outputs, save_report
+from .spectrometer import add_spectrometer, group
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
@@ -29,38 +30,10 @@ if TYPE_CHECKING:
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
 _NOTHING = 1e-3
+# Files of an animal's catches and contrasts.
+_SEEN = ("catches", "contrasts")
 # Treatments of edges between which a band is drawn.
 _TREATMENTS = ("smooth", "taper", "none")
-
-
-def angles(text: str) -> list[float]:
-    """Parse a number, or FIRST:LAST:STEP, in degrees."""
-    try:
-        numbers = [float(part) for part in text.split(":")]
-    except ValueError:
-        numbers = []
-    if len(numbers) == 1:
-        return numbers
-    if len(numbers) == 3 and numbers[2] > 0.0 and 0.0 <= numbers[1] - numbers[0] <= 180.0:
-        count = int((numbers[1] - numbers[0]) / numbers[2] + 1e-9) + 1
-        if count <= 1000:
-            return [round(numbers[0] + n * numbers[2], 6) for n in range(count)]
-    raise argparse.ArgumentTypeError(
-        f"expected degrees, or FIRST:LAST:STEP such as 0:60:5, got {text!r}"
-    )
-
-
-def azimuth(text: str) -> float | str:
-    """Parse an angle, or auto."""
-    return text if text == "auto" else float(text)
-
-
-def group(text: str) -> tuple[str, str]:
-    """Parse NAME=PATTERN."""
-    name, equals, pattern = text.partition("=")
-    if not (equals and name and pattern):
-        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN, got {text!r}")
-    return name, pattern
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -82,54 +55,28 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--crops", metavar="N", type=whole_number(2),
         help="cut each scan into N parts, whose standard errors are the scan's repeatability",
     )  # fmt: skip
+    parser.add_argument(
+        "--observer", metavar="ANIMAL|CSV",
+        help="also quantum catches and contrasts (JND) of an eye: avian_uv, avian_v, lizard, "
+        "snake, dog, bee, human, or a file of wavelengths (nm) and a column of sensitivities for "
+        "each receptor",
+    )  # fmt: skip
+    parser.add_argument(
+        "--illuminant", metavar="LIGHT|CSV",
+        help="light of --observer: ideal, the same number of quanta at all wavelengths; d55, sun; "
+        "d65, sun and sky; d75, sky in open shade; or a file of wavelengths (nm) and photons, e.g. "
+        "measured under leaves; default: ideal",
+    )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
         "folder", ".csv",
     )  # fmt: skip
     # argparse takes -60:60:5 for an option otherwise
     parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
-    _add_spectrometer(parser.add_argument_group("the spectrometer"))
+    add_spectrometer(parser.add_argument_group("the spectrometer"))
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)
     options.add_json(parser, "the spectra")
-
-
-def _add_spectrometer(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        "--light", metavar="DEG", type=float, default=30.0,
-        help="angle of the lamp from the normal; default: 30",
-    )  # fmt: skip
-    group.add_argument(
-        "--light-azimuth", "--azimuth", metavar="DEG", type=azimuth, default=0.0,
-        help="azimuth of the lamp from the patch's x axis towards y, or auto: across the grooves "
-        "of each scan's strongest grating; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--detector", metavar="DEG", type=angles, nargs="+", default=None,
-        help="angles of the detectors from the normal, positive on the far side from the lamp, or "
-        "ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to",
-    )  # fmt: skip
-    group.add_argument(
-        "--acceptance", metavar="DEG", type=float, default=2.0,
-        help="full angle of the cone that a detector collects; default: 2",
-    )  # fmt: skip
-    group.add_argument(
-        "--relative", choices=("white", "mirror", "none"), default="white",
-        help="per cent of a white standard, of a perfect mirror, or of the incident light; "
-        "default: white",
-    )  # fmt: skip
-    group.add_argument(
-        "--polarisation", action="store_true",
-        help="also light polarised across (s) and in (p) the plane of incidence",
-    )  # fmt: skip
-    group.add_argument(
-        "--wavelength-range", metavar=("FIRST", "LAST"), nargs=2, type=number_between(100, 10000),
-        help="nm; default: 300 830, or from where a table begins",
-    )  # fmt: skip
-    group.add_argument(
-        "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
-        help="between wavelengths; default: 5",
-    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -142,19 +89,16 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or Path(f"{first or files[0].stem}-spectrum.csv")
     written = [output, output.with_suffix(".png"), output.with_name(f"{output.stem}-colours.csv")]
     errors = output.with_name(f"{output.stem}-errors.csv")
+    if args.observer is not None:
+        written += [output.with_name(f"{output.stem}-{name}.csv") for name in _SEEN]
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     check_outputs([*written, errors] if repeated else written, files, "spectrum")
     lam = _wavelengths(args)
+    eye, light = _eye(args, lam)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
+    from ..analysis import spectra_files as files_of_spectra
     from ..analysis.spectra import Geometry, mean_spectra
-    from ..analysis.spectra_files import (
-        on_common_wavelengths,
-        save_colours,
-        save_csv,
-        save_errors,
-        spectra_figure,
-    )  # fmt: skip
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
@@ -169,19 +113,21 @@ def run(args: argparse.Namespace) -> int:
             name: [s for file in members for s in _measured(args, file, geometry, lam, bar)]
             for name, members in groups.items()
         }
-    everything = on_common_wavelengths(measured)
+    everything = files_of_spectra.on_common_wavelengths(measured)
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} nm on, where every table begins")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
-    save_csv(spectra, output)
+    files_of_spectra.save_csv(spectra, output)
     if any(each.error is not None for each in spectra.values()):
         written.append(errors)
-        save_errors(spectra, errors)
-    save_colours(spectra, written[2])
+        files_of_spectra.save_errors(spectra, errors)
+    files_of_spectra.save_colours(spectra, written[2])
+    if eye is not None:
+        files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
     title = _title(groups, args)
     with atomic_path(written[1]) as temporary:
-        spectra_figure(spectra, title).savefig(temporary, format="png")
+        files_of_spectra.spectra_figure(spectra, title).savefig(temporary, format="png")
     shown = spectra[first]
     lam = shown.wavelength
     print(
@@ -206,6 +152,19 @@ def run(args: argparse.Namespace) -> int:
                        "acceptance": args.acceptance, "relative": args.relative,
                        "wavelengths": lam.tolist(), "spectra": columns})  # fmt: skip
     return 0
+
+
+def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
+    """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
+    if args.observer is None:
+        if args.illuminant is not None:
+            args.parser.error("argument --illuminant: is the light of --observer; name one")
+        return None, None
+    from ..analysis.observers import eye_of, illuminant_of, quantum_catches
+
+    eye = eye_of(args.observer)
+    quantum_catches(eye, lam, [[0.0]] * len(lam))
+    return eye, illuminant_of(args.illuminant or "ideal")
 
 
 def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:

@@ -50,7 +50,7 @@ def render(
     ----------
     scene : XML file.
     client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
-    parameters : of the scene, as -D sets them.
+    parameters : of the scene, by name.
     spp : samples per pixel; by default the scene's.
     seed : whole number from 0.
     variant : of Mitsuba; by default as `render` chooses it here.

@@ -61,8 +61,7 @@ def build_on_workers(
     """Build as `build`, and return the table with the map that knows its cost."""
     if settings.windows is None:
         raise DiffractionError(
-            "workers build tables of windows: set windows=auto (--windows auto), or do without "
-            "workers"
+            "workers build tables of windows: set windows=auto, or do without workers"
         )
     check_workers(client, None)
     run = OrderedMap(client)

@@ -76,8 +76,8 @@ def connect(
     address = scheduler or os.environ.get(VARIABLE)
     if not address:
         raise DiffractionError(
-            f"there is no cluster: say how many workers to start, or name a scheduler (--workers, "
-            f"--scheduler, or {VARIABLE})"
+            f"there is no cluster: say how many workers to start, or name a scheduler "
+            f"(or set {VARIABLE})"
         )
     named = {"scheduler_file" if address.endswith(".json") else "address": address}
     try:

@@ -65,14 +65,14 @@ class Recipe:
         DiffractionError
             If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
             contradicted by another, or names a generator that does not exist; if it is a recipe of
-            solved orders, which `mitsuba-diffraction solve` takes.
+            solved orders, which the room `solve` reads.
         """
         file = Path(path)
         shown = repr(str(file))
         content = _parse(file, shown)
         if content.get("method") == SOLVED:
             raise DiffractionError(
-                f"{shown} is a recipe of solved orders: run 'mitsuba-diffraction solve "
+                f"{shown} is a recipe of solved orders: run the command 'solve "
                 f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
             )
         for key in content:

@@ -37,7 +37,7 @@ def treatment_warning(path: Path, options: LoadOptions, field: HeightField) -> s
     return (
         f"{field.name}: making it periodic removed {removed:.3g} µm RMS and kept "
         f"{field.rms_height:.3g}: colours depend on the treatment; scan a larger area, or crop to "
-        "a part whose edges meet (--crop), and compare --periodic taper and --level lines"
+        "a part whose edges meet, and compare periodic=taper and level=lines"
     )
 
 
@@ -54,7 +54,7 @@ def jumping_lines(field: HeightField) -> str:
     if not (random and rows > JUMPS * max(columns, 1e-12)):
         return ""
     return (
-        f"{field.name}: use level=lines (--level lines): scan lines jump by {1e3 * steps[0]:.2g} "
+        f"{field.name}: use level=lines: scan lines jump by {1e3 * steps[0]:.2g} "
         f"nm RMS from row to row, {rows / max(columns, 1e-12):.2g} times as steeply as columns; "
         "that diffracts like a grating along y"
     )

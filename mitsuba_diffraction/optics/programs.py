@@ -15,23 +15,23 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from ..errors import DiffractionError
 from . import arithmetic
 from .dialects import Dialect
-from .printer import Function, Printer
+from .printer import Function, Printer, record_of
 from .symbols import (
+    OWN_FILES,
     Symbol,
+    argument_of,
     components_of,
     current,
     kind_of,
-    kinds_of,
-    leaves_of,
-    like,
     refuse,
     scopes,
-    structured,
 )
 
 
@@ -39,12 +39,15 @@ from .symbols import (
 class Program:
     """Functions in a dialect, those that a function calls before it.
 
+    declared : names that the rest of the shader declares: uniforms, functions, macros.
     complex_numbers : whether a function has complex numbers; their operations then come first.
     """
 
     dialect: Dialect
+    declared: frozenset[str] = frozenset()
     functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
     complex_numbers: bool = False
+    _owners: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
     def add(
         self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
@@ -63,8 +66,10 @@ class Program:
         Raises
         ------
         DiffractionError
-            If the formula cannot be written, with its line.
+            If the formula cannot be written, with its line, or if the shader declares the name.
         """
+        name = name or formula.__name__.lstrip("_")
+        self._check_name(formula, name)
         return self._add(formula, arguments, name, comment)
 
     def _add(
@@ -73,17 +78,30 @@ class Program:
         arguments: tuple[Any, ...],
         name: str = "",
         comment: str = "",
-        *,
-        all_parameters: bool = True,
     ) -> Function:
         formula = getattr(formula, "__wrapped__", formula)
-        key = (formula, name, all_parameters, *map(_key, arguments))
+        key = (formula, name, *map(_key, arguments))
         if key not in self.functions:
-            scope = Scope(self, formula, name or formula.__name__.lstrip("_"))
+            scope = Scope(
+                self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
+            )
             parameters, result = scope.run(arguments)
-            printer = Printer(scope, all_parameters)
-            self.functions[key] = printer.function(parameters, result, comment or _comment(formula))
+            words = comment or _comment(formula)
+            self.functions[key] = Printer(scope).function(parameters, result, words)
         return self.functions[key]
+
+    def _check_name(self, formula: Callable[..., Any], name: str) -> None:
+        """Refuse a name that is not this formula's alone."""
+        if self._free_name(formula, name) != name:
+            raise DiffractionError(f"the shader already declares the name {name}; choose another")
+
+    def _free_name(self, formula: Callable[..., Any], name: str) -> str:
+        """Return a name that neither the rest of the shader nor another formula has."""
+        formula = getattr(formula, "__wrapped__", formula)
+        taken = self.declared | self.dialect.reserved
+        while name in taken or self._owners.setdefault(name, formula) is not formula:
+            name += "_"
+        return name
 
     def add_staged(
         self,
@@ -102,6 +120,8 @@ class Program:
         late : parameters of the second function; the others are those of the first.
         names : of both functions.
         """
+        for name in names:
+            self._check_name(formula, name)
         scope = Scope(self, formula, names[1])
         parameters, result = scope.run(arguments)
         first, second = Printer(scope).staged(parameters, result, late, names, _comment(formula))
@@ -144,11 +164,9 @@ class Scope:
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Write a call of another formula, and the formula itself if it is new."""
-        function = self.program._add(formula, tuple(map(kind_of, values)), all_parameters=False)
-        leaves = [leaf for value in values for leaf in leaves_of(value)]
-        leaves = [leaf for leaf, used in zip(leaves, function.used, strict=True) if used]
-        results = self.call(function.name, leaves, list(kinds_of(function.result)))
-        return structured(function.result, iter(results))
+        function = self.program._add(formula, tuple(map(kind_of, values)))
+        results = self.call(function.name, [argument_of(v) for v in values], function.kinds)
+        return results[0] if function.record is None else function.record(results)
 
     def call(self, name: str, arguments: Sequence[Any], kinds: Sequence[str]) -> list[Any]:
         """Return the results of a function; a vector as its components."""
@@ -173,7 +191,8 @@ class Scope:
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.dialect.reserved or name in {self.name, *self.callees}:
+        macro = name.isupper() and name in self.program.declared
+        if macro or name in self.dialect.reserved or name in {self.name, *self.callees}:
             name += "_"
         numbered, n = name, 1
         while numbered in self.taken:
@@ -187,16 +206,16 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
     """Return a formula's argument, and add its leaves to the function's parameters."""
     if isinstance(argument, str):
         symbol = Symbol(argument, "name", (scope.take(name),), scope)
+        scope.program.complex_numbers |= argument == "complex"
         parameters.append(symbol)
         return symbol if argument != "vector" else components_of(scope, symbol)
     if isinstance(argument, tuple):
-        fields = getattr(argument, "_fields", None) or [f"{name}{n}" for n in range(len(argument))]
+        fields = getattr(argument, "_fields", range(len(argument)))
         parts = [
-            _parameter(scope, f"{name}_{field}" if hasattr(argument, "_fields") else field, part,
-                       parameters)
+            _parameter(scope, _word(name, argument, field), part, parameters)
             for field, part in zip(fields, argument, strict=True)
-        ]  # fmt: skip
-        return like(argument, parts)
+        ]
+        return record_of(argument)(parts)
     return argument
 
 
@@ -226,7 +245,8 @@ def _active(scope: Scope) -> Iterator[None]:
 
 def _emitted(formula: Callable[..., Any], values: tuple[Any, ...]) -> Any:
     """Call a formula from within another: write a call if a symbol is among its arguments."""
-    if not any(isinstance(leaf, Symbol) for value in values for leaf in leaves_of(value)):
+    parts = [part for value in values for part in (value if isinstance(value, tuple) else [value])]
+    if not any(isinstance(part, Symbol) for part in parts):
         return formula(*values)
     return current().called(formula, values)
 
@@ -238,11 +258,13 @@ def _local_names(scope: Scope) -> Iterator[None]:
     def on_return(frame: FrameType, event: str, _: Any) -> None:
         if event != "return" or scopes[-1:] != [scope]:
             return
-        own = frame.f_code is scope.formula.__code__
-        if own or frame.f_code.co_filename == scope.formula.__code__.co_filename:
+        own, file = frame.f_code is scope.formula.__code__, frame.f_code.co_filename
+        if own or file == scope.formula.__code__.co_filename or file in formula_files:
             for name, value in frame.f_locals.items():
                 _name(scope, name, value, own)
 
+    folder = Path(__file__).parent
+    formula_files = {str(file) for file in folder.glob("*.py")} - {__file__, *OWN_FILES}
     before = sys.getprofile()
     sys.setprofile(on_return)
     try:
@@ -254,11 +276,20 @@ def _local_names(scope: Scope) -> Iterator[None]:
 def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
     """Name a symbol, or the parts of a tuple; own : a variable of the formula itself."""
     if isinstance(value, Symbol):
-        if value.scope is scope and (own or value.name is None):
+        if value.scope is scope and own:
             value.name = name
+        elif value.scope is scope and value.hint is None:
+            value.hint = name
     elif isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))
         for suffix, part in zip(fields, value, strict=True):
-            word = f"{name}_{suffix}" if isinstance(suffix, str) else f"{name}{suffix}"
+            word = _word(name, value, suffix)
             if not (isinstance(part, Symbol) and part.name):
                 _name(scope, word, part, own)
+
+
+def _word(name: str, record: tuple[Any, ...], field: str | int) -> str:
+    """Return the name of a tuple's part; `cos_i` of `geometry`, a record called after its class."""
+    if isinstance(field, int):
+        return f"{name}{field}"
+    return field if name == type(record).__name__.lower() else f"{name}_{field}"

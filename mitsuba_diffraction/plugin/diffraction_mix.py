@@ -253,10 +253,12 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
     """Return the answers where the mask is true; kernels skip a branch that no lane takes."""
     if not dr.is_jit_v(mi.Float):
         return ask(on) if on else otherwise
-    # copies: Dr.Jit makes what comes out of both branches of what the one returned
-    return dr.if_stmt(
-        (), on, lambda: tuple(ask(on)), lambda: tuple(type(value)(value) for value in otherwise)
-    )
+
+    def typed(answers: Sequence[Any]) -> tuple[Any, ...]:
+        """Copy answers to the types that both branches must share."""
+        return tuple(type(by)(answer) for by, answer in zip(otherwise, answers, strict=True))
+
+    return dr.if_stmt((), on, lambda: typed(ask(on)), lambda: typed(otherwise))
 
 
 def _weights(

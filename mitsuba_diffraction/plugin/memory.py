@@ -64,7 +64,9 @@ def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True)
 
 def zero_packets(floats: int) -> list[Packet]:
     """Return the packets of `read_packets` with zeros in them."""
-    size = packet_size(floats) if dr.is_jit_v(mi.Float) else floats
+    if not dr.is_jit_v(mi.Float):
+        return [mi.ArrayXf([0.0] * floats)]
+    size = packet_size(floats)
     return [dr.zeros(mi.ArrayXf, (size, 1)) for _ in range(floats // size)]
 
 

@@ -52,7 +52,7 @@ def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeR
         if asked is True:
             raise DiffractionError(
                 "second_order=true needs a table of coherence='ensemble' with slope ratios; build "
-                "it with 'mitsuba-diffraction precompute' and '--second-order auto' or 'true'"
+                "it with DiffractionTable.build(second_order=auto)"
             )
         return None
     return ratios if applies(asked, ratios) else None

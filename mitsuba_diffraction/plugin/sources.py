@@ -113,8 +113,8 @@ def table_of_file(
             raise DiffractionError(
                 f"height_scale={height_scale:g} is beyond the table's "
                 f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
-                "the height field instead of the table, or build it with '--height-scale-max "
-                f"{height_scale:.4g}' or more"
+                "the height field instead of the table, or build it with "
+                f"DiffractionTable.build(height_scale_max={height_scale:.4g}) or more"
             )
     elif kind is FileKind.RECIPE:
         recipe = Recipe.load(path)
@@ -251,7 +251,7 @@ def _sha256(path: Path) -> str:
 
 def _remedy(name: str) -> str:
     if name == "coherence_width":  # which scenes have as a parameter of their own
-        return "leave it out, or say 'auto' (to a scene: -D coherence_width=auto)"
+        return "leave it out, or say coherence_width=auto"
     return "leave it out"
 
 
@@ -271,14 +271,14 @@ def _check_agreement(
     if asked.pop("second_order", None) is True and table.slope_ratios is None:
         raise DiffractionError(
             f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
-            "it out, or build the table with '--second-order true', for coherence='ensemble'"
+            "it out, or build the table with second_order=true, for coherence='ensemble'"
         )
     for name, value in asked.items():
         if value != tabulated[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has "
                 f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
-                f"'mitsuba-diffraction precompute --{name.replace('_', '-')} {value}'"
+                f"DiffractionTable.build({name}={value})"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
@@ -288,5 +288,6 @@ def _check_agreement(
     if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
-            f"from {SHORTEST_WAVELENGTH:g} nm on; build it with '--wavelength-range 360 830'"
+            f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
+            "DiffractionTable.build(wavelength_range=(360, 830))"
         )

@@ -165,7 +165,7 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
         if name not in (*NAMES[plugin], *nested, "id"):
             raise DiffractionError(_unknown(name, plugin))
     bsdf = next(iter(nested.values()), None)
-    if "pigment" in props:
+    if "pigment" in props and "pigment" not in nested:
         if bsdf is not None:
             raise DiffractionError(
                 f"pigment and the nested BSDF {kind_of(bsdf)} both lie beneath; give one of them"

@@ -29,7 +29,7 @@ PLACED = "coherence = surface"
 #: Points a side of the unit square of UV coordinates at which procedural textures are checked.
 _POINTS = 32
 
-_MADE = "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
+_MADE = "make it with the command 'tangents MESH -o FIELD.ply', and use that file"
 _READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
 _STRETCHES = re.compile(r'lateral_scale = MeshAttribute\[\s*name = "([^"]+)"')
 

@@ -3,7 +3,7 @@
 Contents
 --------
 load         variants set and scenes loaded; Mitsuba's errors in one line
-parameters   names that -D may set, and values that change from frame to frame
+parameters   names that may be set, and values that change from frame to frame
 passes       rendering in passes of samples
 pictures     EXR and PNG of pictures
 denoise      pictures without noise, by Open Image Denoise

@@ -70,7 +70,7 @@ def fit_meshes(state: Any, folder: Path) -> None:
 
 
 def _boolean(props: Any, name: str) -> bool:
-    """Read a parameter that -D may set: true or false, as text."""
+    """Read a parameter of a scene: true or false, as text."""
     text = str(props.get(name, "true")).lower()
     if text not in ("true", "false"):
         raise DiffractionError(f"{name}={text!r} must be true or false")
@@ -120,7 +120,7 @@ def _node_of(state: Any, name: str) -> int:
     if name not in known:
         listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
         raise DiffractionError(
-            f"--material {name}: no BSDF or shape of the scene has this id; there are "
+            f"{MATERIAL}{name}: no BSDF or shape of the scene has this id; there are "
             f"{listed or 'none: add id attributes to the scene'}"
         )
     return int(known[name])

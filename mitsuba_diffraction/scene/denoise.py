@@ -34,7 +34,7 @@ def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
     denoiser = optional("pyoidn")
     colours = colours_of(picture)
     if colours is None:
-        raise DiffractionError("--denoise: the film holds no colours; give it the format rgb")
+        raise DiffractionError("the film to be denoised holds no colours; give it the format rgb")
     rgb, single = mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32
     noisy = np.nan_to_num(np.array(colours.convert(rgb, single, False)), nan=0.0)
     kinds = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})

@@ -65,12 +65,12 @@ def set_variant(name: str | None) -> str:
         name += "_ad_spectral"
     if name not in mi.variants():
         raise DiffractionError(
-            f"--mode: there is no variant {name!r}; there are {', '.join(mi.variants())}"
+            f"there is no variant {name!r}; there are {', '.join(mi.variants())}"
         )
     backend = name.partition("_")[0]
     if backend in _GPUS and not dr.has_backend(getattr(dr.JitBackend, _GPUS[backend])):
         raise DiffractionError(
-            f"--mode {name}: no {_GPUS[backend]} device answers; use "
+            f"variant {name}: no {_GPUS[backend]} device answers; use "
             f"{name.replace(backend, 'llvm', 1)}, or install the driver of the GPU"
         )
     if backend == "llvm":
@@ -98,7 +98,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     check_parameters(file, parameters)
     for name in _TAKEN:
         if name in parameters:
-            raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
+            raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         scene = _instantiated(file, parameters, materials, box_filter)
     except (RuntimeError, UnicodeDecodeError) as error:
@@ -136,6 +136,7 @@ def _instantiated(
     try:
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **parameters)
+            _check_films(state)
             fit_meshes(state, Path(folder))
             put_materials(state, materials)
             mi.parser.transform_all(config, state)
@@ -157,7 +158,7 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
         warn(
             f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "
             "there and turns from triangle to triangle; give the mesh directions with "
-            "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+            "the command 'tangents', or unwrap it so that u runs the way the patch's x "
             "axis shall"
         )
 
@@ -189,21 +190,34 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError("the scene has no sensor; add a <sensor>")
     if not 0 <= index < len(sensors):
         raise DiffractionError(
-            f"--sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
+            f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
-    _check_film(sensors[index])
     return sensors[index]
 
 
-def _check_film(sensor: Any) -> None:
-    """Refuse a film whose pictures would exceed the memory of this machine."""
-    width, height = (int(length) for length in sensor.film().crop_size())
-    needed = width * height * _BYTES_PER_PIXEL
-    if needed > memory():
-        raise DiffractionError(
-            f"a picture of {width} x {height} pixels needs some {needed / 1e9:.3g} GB, and this "
-            f"machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most scenes)"
+def _check_films(state: Any) -> None:
+    """Refuse films whose pictures would exceed the memory of this machine.
+
+    state : `mi.parser.ParserState`; nothing is loaded yet, since that may take minutes.
+    """
+    import mitsuba as mi
+
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        width, height = (
+            node.props.get(f"crop_{name}", node.props.get(name, default))
+            for name, default in (("width", 768), ("height", 576))  # Mitsuba's
         )
+        if not isinstance(width, int) or not isinstance(height, int):
+            continue  # Mitsuba names the type that it expects
+        needed = width * height * _BYTES_PER_PIXEL
+        if needed > memory():
+            raise DiffractionError(
+                f"a picture of {width} x {height} pixels needs some {needed / 1e9:.3g} GB, and "
+                f"this machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most "
+                "scenes)"
+            )
 
 
 def plain_text(error: BaseException) -> str:
@@ -257,7 +271,7 @@ def _words(error: BaseException) -> str:
 def _no_ply(match: re.Match[str]) -> str:
     """Say what to do about a mesh of another format where a PLY is expected."""
     file = PurePath(match["file"])
-    todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
+    todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
     if not match["why"].startswith("invalid PLY"):
         return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
@@ -275,5 +289,5 @@ def _unused(match: re.Match[str]) -> str:
     return (
         f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
         f"declares it: write ${names[0]} where its value is to go, or leave "
-        f"{', '.join(names)} out of -D, --animate and --turn"
+        f"{', '.join(names)} out"
     )

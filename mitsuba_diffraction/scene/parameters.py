@@ -1,4 +1,4 @@
-"""Parameters of an XML scene, so that a misspelt -D is answered with the names there are."""
+"""Parameters of an XML scene, so that a misspelt one is answered with the names there are."""
 
 from __future__ import annotations
 
@@ -39,20 +39,19 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
         if name in known:
             continue
         if not known:
-            raise DiffractionError(f"-D {name}: '{scene}' has no parameters; leave it out")
+            raise DiffractionError(f"'{scene}' has no parameters; leave {name} out")
         listed = ", ".join(
             name if default is None else f"{name}={default}" for name, default in known.items()
         )
         close = difflib.get_close_matches(name, known, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
         if name in (*LOAD_KEYS, *RECIPE_SETTINGS) and "patch" in known:
-            option = f"--{name.replace('_', '-')} {values[name]}"
-            hint = f"; or run 'mitsuba-diffraction precompute FILE {option} -o TABLE.exr' first, "
-            hint += "and give -D patch=TABLE.exr"
+            hint = f"; or build a table with DiffractionTable.build({name}={values[name]}) first, "
+            hint += "and give patch=TABLE.exr"
         elif name == "patch":
-            hint = "; put heights on the id of a BSDF or shape: --material ID=FILE,material=Al"
+            hint = "; put heights on the id of a BSDF or shape: material:ID=FILE,material=Al"
         raise DiffractionError(
-            f"-D {name}: '{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
+            f"'{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
         )
 
 
@@ -208,8 +207,8 @@ def values_of_frames(
         begin = numbers_in(start or "")
         if begin is None or len(begin) != 1:
             raise DiffractionError(
-                f"--turn {name}: it begins at {start!r}, which is no angle in degrees; give a "
-                f"number: -D {name}=0"
+                f"the turn of {name} begins at {start!r}, which is no angle in degrees; give a "
+                f"number: {name}=0"
             )
         around.append(Change(name, begin, (begin[0] + 360.0,)))
     frames = []

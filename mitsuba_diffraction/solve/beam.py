@@ -19,6 +19,7 @@ from ..tables.orders.lookup import turned_axes
 from ..tables.orders.polarised import mueller_of
 from ..tables.orders.table import check_outline
 from .efficiencies import Efficiencies, check_light
+from .films import Layers, films_of, material_text
 from .jobs import Jobs, problem_of, solver_of
 from .materials import Material, material_of
 from .measured import table_of
@@ -40,6 +41,7 @@ def solve_beam(
     phi: ArrayLike = 0.0,
     step: float = 5.0,
     superstrate: float = 1.0,
+    layers: Layers = (),
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] = silent,
@@ -51,8 +53,8 @@ def solve_beam(
     theta, phi : directions to the light, degrees, within the superstrate: from the normal, and from
         x towards y; a grid of both.
     step : between wavelengths, nm; the ends of the settings' wavelengths are solved exactly.
-    profile, material, superstrate, settings, jobs, announce : as for `solve_orders`; the tolerance
-        is that of the solver.
+    profile, material, superstrate, layers, settings, jobs, announce : as for `solve_orders`; the
+        tolerance is that of the solver.
 
     Raises
     ------
@@ -77,7 +79,9 @@ def solve_beam(
             f"{lam.size} wavelengths x {polar.size} theta x {azimuth.size} phi are over {_MOST} "
             "solutions; choose fewer directions, or a larger step"
         )
-    grating = Grating(profile, material_of(material, how.wavelengths), superstrate, how.wavelengths)
+    substance = material_of(material, how.wavelengths)
+    films = films_of(layers, substance, False, how.wavelengths)
+    grating = Grating(profile, substance, superstrate, how.wavelengths, films=films)
     light = _Lights(grating, lam, polar, azimuth)
     problem = problem_of(grating, how.method, how.resolution or 0)
     middle = light.places[:: max(len(light.places) // _COMPARED, 1)]
@@ -90,7 +94,7 @@ def solve_beam(
     values, orders = light.efficiencies(solved)
     header: dict[str, Any] = {
         "solver": solver_of(chosen.problem).name,
-        "material": grating.material.name,
+        "material": material_text(grating),
         "profile": profile.name,
         "solver_error": chosen.error,
         "tolerance": how.tolerance,
@@ -140,8 +144,8 @@ class _Lights:
             total = float(row[:, 0].sum())
             if total > MOST_EXCESS:
                 raise DiffractionError(
-                    f"efficiencies of a solution sum to {total:.4g}; use a higher --resolution, or "
-                    "another --solver"
+                    f"efficiencies of a solution sum to {total:.4g}; use a higher resolution, or "
+                    "another method"
                 )
             both /= np.maximum(both.sum(axis=0), 1.0)
             values[n, j - np.arange(len(row)) - orders[0]] = np.maximum(both, 0.0)

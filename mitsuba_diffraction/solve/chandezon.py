@@ -56,8 +56,8 @@ class Chandezon:
         self.period, self.harmonics = profile.period, harmonics
         if reason := refused(profile):
             raise DiffractionError(
-                f"{profile.name} {reason}, which Chandezon's method cannot solve; use --solver "
-                "integral"
+                f"{profile.name} {reason}, which Chandezon's method cannot solve; use "
+                "method=integral"
             )
         x, z = profile.closed
         angles = np.arctan2(np.diff(z), np.diff(x))
@@ -82,8 +82,8 @@ class Chandezon:
         """
         if station.indices is None or station.thin:
             raise DiffractionError(
-                "Chandezon's method solves reflection by a material with an index; use --solver "
-                "integral for perfect conductors and thin sheets"
+                "Chandezon's method solves reflection by a material with an index; use "
+                "method=integral for perfect conductors and thin sheets"
             )
         k = np.pi * station.extent / self.period
         first = station.channels // 2 - self.harmonics

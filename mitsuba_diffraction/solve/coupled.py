@@ -3,11 +3,14 @@
 The profile is cut into layers with vertical walls, in each of which the field is a sum of modes,
 from the Fourier coefficients of ε (Moharam, Grann, Pommet and Gaylord 1995, JOSA A 12, 1068), with
 Li's rules for products of discontinuous functions (Li 1996, JOSA A 13, 1870). One reflection matrix
-serves all channels. Slopes of metal converge slowly in TM: use the integral method for them.
+serves all channels. Films on the profile, as thick along z everywhere, are further media of layers:
+walls have none, as if they had been evaporated from above. Slopes of metal converge
+slowly in TM: use the integral method for them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -22,6 +25,9 @@ from .stations import LEAST_NORMAL, Real, Station
 
 Complex = NDArray[Any]
 
+# Decimals of µm that tell edges of layers apart
+_DIGITS = 9
+
 
 class CoupledWaves:
     """Coupled waves for one profile.
@@ -31,6 +37,7 @@ class CoupledWaves:
     profile : one period of the grooves; no undercut.
     harmonics : spatial frequencies on either side of the middle one. Slopes are cut into as many
         layers.
+    films : thicknesses of films on the profile, from the material upwards, along z, µm.
 
     Raises
     ------
@@ -38,20 +45,26 @@ class CoupledWaves:
         If the profile is undercut.
     """
 
-    def __init__(self, profile: Profile, harmonics: int) -> None:
+    def __init__(self, profile: Profile, harmonics: int, films: Sequence[float] = ()) -> None:
         if (np.diff(profile.x) < 0).any():
             raise DiffractionError(
                 f"{profile.name} is undercut, which coupled waves in layers cannot solve; use "
-                "--solver integral"
+                "method=integral"
             )
         self.period, self.harmonics = profile.period, harmonics
         levels = np.unique(profile.z)
-        edges = levels if _has_walls(profile) else np.linspace(levels[0], levels[-1], harmonics + 1)
-        edges = edges[::-1]
+        if not _has_walls(profile):
+            levels = np.linspace(levels[0], levels[-1], harmonics + 1)
+        # surfaces of the material and of each film
+        offsets = np.append(0.0, np.cumsum(films))
+        edges = np.unique(np.round(np.add.outer(offsets, levels), _DIGITS))[::-1]
         self._top, self._bottom = float(edges[0]), float(edges[-1])
-        #: Layers from the top: thickness in µm, and ends (n, 2) of the intervals of material.
+        #: Layers from the top: thickness in µm, and intervals (n, 2) below each surface.
         self.layers = [
-            (float(above - below), _intervals(profile, float(0.5 * (above + below))))
+            (
+                float(above - below),
+                [_intervals(profile, float(0.5 * (above + below) - up)) for up in offsets],
+            )
             for above, below in pairwise(edges)
         ]
 
@@ -64,14 +77,15 @@ class CoupledWaves:
         """Return the amplitudes between all channels; see `stations.Solver`."""
         if station.indices is None:
             raise DiffractionError(
-                "coupled waves need a material with an index; use --solver integral for a perfect "
+                "coupled waves need a material with an index; use method=integral for a perfect "
                 "conductor"
             )
-        pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
+        indices = np.stack([station.indices, *station.films], axis=-1)
+        pairs = zip(station.wavelengths, indices, station.along, strict=True)
         return np.stack([self._solve(station, *pair) for pair in pairs])
 
-    def _solve(self, station: Station, wavelength: float, index: complex, y: float) -> Complex:
-        """Return the amplitudes at one wavelength.
+    def _solve(self, station: Station, wavelength: float, indices: Complex, y: float) -> Complex:
+        """Return the amplitudes at one wavelength; indices of the material, and of films.
 
         The scattering matrix of tangential E is carried up from the material (`_across`); through a
         layer of thickness h, R becomes X R X, U becomes X U, and D becomes D X, with X = exp(iqh).
@@ -79,11 +93,11 @@ class CoupledWaves:
         first = station.channels // 2 - self.harmonics
         numbers = np.arange(first, first + 2 * self.harmonics + 1)
         x = np.sqrt(1.0 - y**2) * station.sines_of(numbers)
-        epsilon = index**2
-        below = _uniform(x, y, epsilon)
+        media = np.append(indices**2, 1.0)
+        below = _uniform(x, y, media[0])
         total = _material(len(x), station.inside - first)
         for thickness, filled in reversed(self.layers):
-            above = _layer(x, y, epsilon, filled / self.period)
+            above = _layer(x, y, media, [ends / self.period for ends in filled])
             total = _across(above, below, total)
             through = np.exp(2j * np.pi * thickness / wavelength * above.q)[:, None]
             total = _Scattering(
@@ -95,7 +109,7 @@ class CoupledWaves:
         sides = (
             _Side(x[np.arange(station.channels) - first], y, 1.0, -self._top / wavelength),
             # a metal, whose index is complex, has no channels
-            _Side(x[station.inside - first], y, abs(index), self._bottom / wavelength),
+            _Side(x[station.inside - first], y, abs(indices[0]), self._bottom / wavelength),
         )
         rows = np.arange(station.channels) - first
         return _amplitudes(total, np.concatenate([rows, len(x) + rows]), sides)
@@ -134,10 +148,17 @@ def _uniform(x: Real, y: float, epsilon: complex) -> _Modes:
     return _Modes(q, np.eye(len(q)), right / q)
 
 
-def _layer(x: Real, y: float, epsilon: complex, filled: Real) -> _Modes:
-    """Return the modes of a layer; `filled` (n, 2) intervals of the material, over the period."""
-    direct = _toeplitz(len(x), 1.0, epsilon, filled)
-    inverse = _toeplitz(len(x), 1.0, 1.0 / epsilon, filled)
+def _layer(x: Real, y: float, media: Complex, filled: Sequence[Real]) -> _Modes:
+    """Return the modes of a layer.
+
+    media : ε of the material, of films upwards, and of the medium above all of them.
+    filled : intervals (n, 2) below the surface of each but the last, over the period.
+    """
+    whole = [float(np.sum(ends[:, 1] - ends[:, 0])) for ends in filled]
+    if all(share in (0.0, 1.0) for share in whole):
+        return _uniform(x, y, complex(media[int(sum(share == 0.0 for share in whole))]))
+    direct = _toeplitz(len(x), media, filled)
+    inverse = _toeplitz(len(x), 1.0 / media, filled)
     left, right = _products(x, y, direct, np.linalg.inv(inverse))
     square, electric = np.linalg.eig(left @ right)
     q = np.sqrt(square)
@@ -256,18 +277,19 @@ class _Side:
         return np.asarray(self._square > (LEAST_NORMAL * self.index) ** 2)
 
 
-def _toeplitz(n: int, outside: complex, inside: complex, filled: Real) -> Complex:
-    """Return the Toeplitz matrix of the Fourier coefficients of a layer's ε.
+def _toeplitz(n: int, media: Complex, filled: Sequence[Real]) -> Complex:
+    """Return the Toeplitz matrix of the Fourier coefficients of values of `media`, see `_layer`.
 
     Harmonic m has the factor exp(−2πi m x): the numbers of channels rise towards −x.
     """
     m = np.arange(-(n - 1), n)
-    start, end = filled[:, 0, None], filled[:, 1, None]
-    # ∫ exp(2πi m x) dx over the intervals
-    middle, width = 0.5 * (start + end), end - start
-    terms = (width * np.sinc(m * width) * np.exp(2j * np.pi * m * middle)).sum(axis=0)
-    coefficients = (inside - outside) * terms
-    coefficients[n - 1] += outside
+    coefficients = np.zeros(len(m), complex)
+    coefficients[n - 1] = media[-1]
+    for step, ends in zip(media[:-1] - media[1:], filled, strict=True):
+        # ∫ exp(2πi m x) dx over the intervals
+        middle, width = ends.mean(axis=1)[:, None], (ends[:, 1] - ends[:, 0])[:, None]
+        terms = width * np.sinc(m * width) * np.exp(2j * np.pi * m * middle)
+        coefficients += step * terms.sum(axis=0)
     return np.asarray(toeplitz(coefficients[n - 1 :], coefficients[n - 1 :: -1]))
 
 
@@ -280,6 +302,8 @@ def _has_walls(profile: Profile) -> bool:
 def _intervals(profile: Profile, height: float) -> Real:
     """Return the ends (n, 2) of the intervals of one period in which the profile is higher."""
     x, z = profile.closed
+    if height < z.min():
+        return np.array([[0.0, profile.period]])
     rises = np.flatnonzero((z[:-1] < height) & (z[1:] >= height))
     falls = np.flatnonzero((z[:-1] >= height) & (z[1:] < height))
 

@@ -63,14 +63,19 @@ class Problem:
         if self.resolution > MOST_RESOLUTION[self.method]:
             raise DiffractionError(
                 f"{self.grating.profile.name} would be solved at resolution {self.resolution}, and "
-                f"--solver {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
+                f"method {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
                 "its lengths are in µm; it may be too deep, or too rough, for the shortest "
-                "wavelength; slopes may be solved by --solver chandezon"
+                "wavelength; slopes may be solved by method=chandezon"
             )
 
 
 def method_for(grating: Grating) -> str:
-    """Return the solver for a grating: Chandezon's method for slopes, else the integral method."""
+    """Return the solver for a grating.
+
+    Coupled waves for films, Chandezon's method for slopes, else the integral method.
+    """
+    if grating.films:
+        return "coupled"
     sloped = not (grating.is_perfect or grating.thin or refused(grating.profile))
     return "chandezon" if sloped else "integral"
 
@@ -88,6 +93,11 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     if method not in METHODS:
         known = ", ".join((AUTO, *METHODS))
         raise DiffractionError(f"solver {method!r} is unknown; choose one of {known}")
+    if grating.films and method != "coupled":
+        raise DiffractionError(
+            f"method {method} has no films on the profile; use method=coupled, or leave the "
+            "layers out"
+        )
     content = hashlib.sha256(
         repr(
             ("amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin)
@@ -97,13 +107,21 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     content.update(repr(profile.period).encode())
     for array in (profile.x, profile.z, material.wavelengths, material.values):
         content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
+    for film in grating.films:
+        content.update(repr(film.thickness).encode())
+        for array in (film.material.wavelengths, film.material.values):
+            content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
     return Problem(grating, method, resolution, content.hexdigest())
 
 
 @lru_cache(maxsize=2)
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
-    return METHODS[problem.method](problem.grating.profile, problem.resolution)
+    grating = problem.grating
+    if grating.films:  # which coupled waves alone have
+        thicknesses = [film.thickness for film in grating.films]
+        return CoupledWaves(grating.profile, problem.resolution, thicknesses)
+    return METHODS[problem.method](grating.profile, problem.resolution)
 
 
 class Solved(NamedTuple):
@@ -138,7 +156,7 @@ def solve_place(problem: Problem, place: Place) -> Solved:
         raise
     except (ValueError, np.linalg.LinAlgError) as error:  # numbers that are not finite
         raise DiffractionError(
-            f"--solver {problem.method} cannot solve {grating.profile.name} "
+            f"method {problem.method} cannot solve {grating.profile.name} "
             f"({one_line(str(error))}); check that its line neither touches nor nearly touches "
             "itself"
         ) from error

@@ -16,6 +16,7 @@ from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import MOST_NODES, Counts, check_outline
 from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
+from .films import Layers, films_of, material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import FEWEST, MOST, Line, Place, count_for, lines
@@ -89,6 +90,7 @@ def solve_orders(
     *,
     superstrate: float = 1.0,
     thin: bool = False,
+    layers: Layers = (),
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] | None = None,
@@ -102,6 +104,8 @@ def solve_orders(
     superstrate : index of the clear medium above.
     thin : whether the material is a thin sheet, whose lower side is flat: the table then has the
         light on both sides (`sheet`). Otherwise it has the reflected orders.
+    layers : films on the profile, from the material upwards, such as [("1.46", 0.1)]: material and
+        thickness along z, µm. They interfere; walls have none.
     settings : wavelengths, tolerance, method.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
@@ -115,7 +119,7 @@ def solve_orders(
     if not isinstance(profile, Profile):
         raise DiffractionError(
             f"solve_orders: expected a profile, as of md.profiles.lamellar, got {quoted(profile)}; "
-            "a recipe is solved by 'mitsuba-diffraction solve'"
+            "a recipe is solved by the command 'solve'"
         )
     how, work = settings or Settings(), jobs or Jobs()
     tell = announce or silent
@@ -127,7 +131,14 @@ def solve_orders(
         raise DiffractionError(
             "polarised: tables of thin sheets have efficiencies alone; leave out polarised, or thin"
         )
-    grating = Grating(profile, substance, superstrate, how.wavelengths, thin)
+    grating = Grating(
+        profile,
+        substance,
+        superstrate,
+        how.wavelengths,
+        thin,
+        films_of(layers, substance, thin, how.wavelengths),
+    )
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
     if how.resolution is None:
@@ -140,7 +151,7 @@ def solve_orders(
         coarse = replace(problem, resolution=coarsest(problem))
     counts = _counts(coarse, work, bands, how, tell)
     header: dict[str, Any] = {
-        "material": grating.material.name,
+        "material": material_text(grating),
         "profile": profile.name,
         "solver_error": chosen.error,
         "tolerance": how.tolerance,
@@ -178,7 +189,7 @@ def _refuse_or_warn(error: Measured, how: Settings) -> None:
     )
     if not how.accept:
         raise DiffractionError(
-            f"{text}; --accept writes it as it is, without solving again; or use a larger "
+            f"{text}; accept=True writes it as it is, without solving again; or use a larger "
             "tolerance, or fewer wavelengths"
         )
     warn(text)
@@ -201,7 +212,7 @@ def _solved_at_nodes(
         problem = finer_problem(problem)
     raise DiffractionError(
         f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
-        "use another --solver, a higher --resolution, or a smoother profile"
+        "use another method, a higher resolution, or a smoother profile"
     )
 
 

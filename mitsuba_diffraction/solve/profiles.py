@@ -73,7 +73,7 @@ class Profile:
         if x.min() < -slack or x.max() > self.period + slack:
             raise DiffractionError(
                 f"{self.name}: x runs from {x.min():g} to {x.max():g} µm, but one period is 0 to "
-                f"{self.period:g} µm; give one period, in µm, or the right one with --period"
+                f"{self.period:g} µm; give one period, in µm, or the right length of the period"
             )
         if (np.abs(self._turns()) > _FOLDED).any():
             raise DiffractionError(
@@ -192,7 +192,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
                 continue  # names of the columns
             raise DiffractionError(
                 f"'{path}', line {number}: expected two numbers x, z in µm, got {text[:60]!r} "
-                "(solve reads efficiencies with --import)"
+                "(read_orders reads efficiencies)"
             ) from error
         rows.append([x, z])
     if not rows:
@@ -202,7 +202,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     if len(x) > 2 and x.max() < 0.5 * period:
         raise DiffractionError(
             f"'{path}': x covers {x.max():g} µm of a period of {period:g} µm; give one whole "
-            "period, in µm, or the right one with --period"
+            "period, in µm, or the right length of the period"
         )
     # the end of a period is the beginning of the next
     if len(x) > 2 and abs(x[-1] - period) < 1e-6 * period and abs(z[-1] - z[0]) < 1e-6 * period:

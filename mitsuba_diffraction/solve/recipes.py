@@ -4,6 +4,7 @@
     profile = "lamellar"            # blazed, sinusoidal; or the path of a line, CSV of x, z in µm
     material = "Al"                 # a name, an index such as "1.5" or "0.65+5.6i", or "none"
     superstrate = 1.58              # index of the clear medium above; default 1
+    layers = [["1.46", 0.1]]        # films on it, from the material upwards, µm; default none
     thin = true                     # light goes through: a sheet of a clear material; default false
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
@@ -33,12 +34,13 @@ from ..files import path_within, read_text
 from ..heights.lengths import number_between
 from ..heights.recipes import SOLVED
 from ..tables.orders.table import WAVELENGTHS
+from .films import Layers
 from .orders import Settings
 from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
-    "method", "profile", "material", "superstrate", "thin", "wavelengths", "tolerance", "solver",
-    "resolution", "polarised", "output", "arguments",
+    "method", "profile", "material", "superstrate", "layers", "thin", "wavelengths", "tolerance",
+    "solver", "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -48,7 +50,7 @@ class SolvedRecipe:
 
     Attributes
     ----------
-    profile, material, superstrate, thin, settings : arguments of `solve_orders`.
+    profile, material, superstrate, thin, settings, layers : arguments of `solve_orders`.
     output : path of the table.
     """
 
@@ -58,6 +60,7 @@ class SolvedRecipe:
     thin: bool
     settings: Settings
     output: Path
+    layers: Layers = ()
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
@@ -78,7 +81,7 @@ class SolvedRecipe:
         if content.get("method") != SOLVED:
             raise DiffractionError(
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
-                "mitsuba-diffraction precompute"
+                "DiffractionTable.build"
             )
         for key in content:
             if key not in _KEYS:
@@ -133,6 +136,15 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     if "depth" not in arguments:
         raise DiffractionError(f"profile {name!r} needs its depth in µm")
     return make(**arguments)
+
+
+def _layers(value: Any) -> Layers:
+    """Return pairs of a material and a thickness."""
+    if not (isinstance(value, list) and all(isinstance(p, list) and len(p) == 2 for p in value)):
+        raise DiffractionError(
+            f'layers: expected pairs such as [["1.46", 0.1]], material and µm, got {quoted(value)}'
+        )
+    return tuple((str(name), thickness) for name, thickness in value)
 
 
 def _flag(content: Mapping[str, Any], name: str) -> bool:

@@ -59,10 +59,10 @@ def chosen_resolution(
             return Chosen(coarse, error)
         coarse, values = fine, finer
     raise DiffractionError(
-        f"--solver {problem.method} does not converge on {problem.grating.profile.name}: at "
+        f"method {problem.method} does not converge on {problem.grating.profile.name}: at "
         f"resolution {coarse.resolution} the last step changed {error:.2%} of the light, sums over "
         f"orders are above 1 by {max(excess, 0.0):.2%}, and reversed light differs by "
-        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another --solver, or set "
+        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another method, or set "
         "the resolution"
     )
 

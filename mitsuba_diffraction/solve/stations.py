@@ -7,7 +7,7 @@ share what is expensive in a solver. A station has several wavelengths w at the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,13 @@ LEAST_COSINE = 0.03
 LEAST_NORMAL = 5e-4
 
 
+class Film(NamedTuple):
+    """Film on a profile, as thick along z everywhere; thickness in µm."""
+
+    material: Material
+    thickness: float
+
+
 @dataclass(frozen=True, eq=False)
 class Grating:
     """Periodic surface for which a table is solved.
@@ -40,6 +47,7 @@ class Grating:
     superstrate : real index of the clear medium above.
     wavelengths : shortest and longest of the table, in vacuum, nm.
     thin : whether the material is a sheet with a flat lower side (`sheet`).
+    films : on the profile, from the material upwards.
     """
 
     profile: Profile
@@ -47,6 +55,7 @@ class Grating:
     superstrate: float
     wavelengths: tuple[float, float]
     thin: bool = False
+    films: tuple[Film, ...] = ()
 
     @property
     def optical_period(self) -> float:
@@ -86,7 +95,14 @@ class Grating:
             None if index is None else index / self.superstrate,
             np.sqrt(1.0 - cosine**2),
             self.thin,
+            tuple(self._relative(film.material, lam) for film in self.films),
         )
+
+    def _relative(self, material: Material, wavelength: Real) -> Complex:
+        """Return the index of a film, over that of the medium above; wavelength : in vacuum, nm."""
+        index = material.index(wavelength)
+        assert index is not None  # `orders.films_of` refuses perfect conductors
+        return np.asarray(index / self.superstrate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +119,7 @@ class Station:
         conductor, of which only the first wavelength is solved.
     along : (n,) direction cosine y along the grooves.
     thin : whether light comes from within the material as well.
+    films : indices (n,) of each film, over that of the medium above.
     """
 
     extent: float
@@ -112,6 +129,7 @@ class Station:
     indices: NDArray[np.complex128] | None
     along: Real
     thin: bool = False
+    films: tuple[Complex, ...] = ()
 
     @property
     def sines(self) -> Real:

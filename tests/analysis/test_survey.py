@@ -15,13 +15,15 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
+from mitsuba_diffraction.analysis.iridescence import chance_iridescence, diffracted_light
+from mitsuba_diffraction.analysis.maps.result import Light
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
-from mitsuba_diffraction.analysis.survey import (
-    run_survey,
-)
+from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.tables.store import VARIABLE
+from mitsuba_diffraction.tables.table import DiffractionTable
+from tests.support.directions import rough_patch
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
@@ -82,8 +84,10 @@ def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_p
             assert picture.size == (32, 32)
     with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
-    assert [Path(row["file"]).stem for row in table] == ["straight", "broken", "turned"]
-    assert float(table[2]["period_1_um"]) == turned["period_1_um"]
+    names = [Path(row["file"]).stem for row in table]
+    assert (set(names[:2]), names[2]) == ({"straight", "turned"}, "broken")
+    periods = {float(row["period_1_um"]) for row in table[:2]}
+    assert periods == {straight["period_1_um"], turned["period_1_um"]}
     assert (tmp_path / "out" / "sheet.png").is_file()
 
 
@@ -252,3 +256,42 @@ def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, cap
     assert time.perf_counter() - start < 30  # far from the minute that the scan would take
     (line,) = capfd.readouterr().err.splitlines()
     assert "run the command again to go on" in line
+
+
+def test_rows_are_ranked_by_light_beyond_chance_and_failed_ones_last():
+    rows = [
+        {"file": "failed", "reason": "no heights"},
+        {"file": "narrow", "reason": "", "iridescent_light": 0.9, "ranked_among": "scans below 10"},
+        {"file": "chance", "reason": "", "iridescent_light": "", "ranked_among": "scans from 10"},
+        {"file": "faint", "reason": "", "iridescent_light": 1e-4, "ranked_among": "scans from 10"},
+        {"file": "bright", "reason": "", "iridescent_light": 0.1, "ranked_among": "scans from 10"},
+    ]
+    assert [r["file"] for r in ranked(rows)] == ["bright", "faint", "chance", "narrow", "failed"]
+
+
+def test_chance_explains_an_unordered_surface_and_not_a_grating():
+    n = 128
+    rough = rough_patch((n, n), (0.08, 0.08), 0.01)
+    x = 0.08 * np.arange(n)
+    grating = HeightField(0.3 * rough.heights + 0.03 * np.sin(2 * np.pi * x / 1.28), 0.08)
+    light = Light(30.0, 0.0)
+    for field, above in ((rough, 1.25), (grating, 1.3)):
+        table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
+        index = diffracted_light(table, light).iridescence()
+        chance = chance_iridescence(table, light)
+        # chance differs by some 10 % from patch to patch
+        assert (index > above * chance) == (field is grating), (index, chance)
+
+
+def test_scans_of_different_sizes_are_measured_on_crops_of_one(survey, tmp_path):
+    field = gratings.elaphe_like(25.0, 250)
+    for name, pixels in (("wide", 250), ("narrow", 80)):
+        np.save(tmp_path / f"{name}.npy", field.heights[:pixels, :pixels])
+    rows = survey([tmp_path / "wide.npy", tmp_path / "narrow.npy"], crops=3)
+    assert [row.get("crop", "") for row in rows] == [1, 2, 3, ""]
+    assert [row["width_um"] for row in rows] == pytest.approx([10.0, 10.0, 10.0, 8.0])
+    assert len({row["range_um"] for row in rows[:3]}) == 3
+    with (tmp_path / "out" / "samples.csv").open(encoding="utf-8") as file:
+        wide, narrow = csv.DictReader(file)
+    assert float(wide["range_um_se"]) > 0.0
+    assert narrow["range_um_se"] == ""

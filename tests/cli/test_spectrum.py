@@ -140,3 +140,20 @@ def test_samples_that_are_averaged_are_said(run, scans, here):
     assert ran.code == 0, ran.err
     assert "2 names" in ran.err
     assert "--group" in ran.err
+
+
+def test_an_observer_has_catches_of_each_column_and_contrasts_of_each_pair(run, scans, here):
+    span = ["--coherence-width", "6", "--wavelength-range", "300", "700", "--step", "50"]
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *span, "--observer", "avian_uv",
+              "--detector", "20", "30", "40", "-o", "o.csv")  # fmt: skip
+    assert ran.code == 0, ran.err
+    catches = (here / "o-catches.csv").read_text("utf-8").splitlines()
+    assert catches[0] == "spectrum,u,s,m,l"
+    assert len(catches) == 4
+    pairs = (here / "o-contrasts.csv").read_text("utf-8").splitlines()
+    assert pairs[0] == "patch1,patch2,dS"
+    assert [line.split(",")[1][-2:] for line in pairs[1:]] == ["30", "40", "40"]
+    for arguments, named in ((("dragon", *span), "dragon"), (("avian_uv", *QUICK), "300")):
+        ran = run("spectrum", scans / "scan0.npy", *PIXEL, "--observer", *arguments)
+        assert ran.code == 1
+        assert named in ran.err

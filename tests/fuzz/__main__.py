@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from mitsuba_diffraction.streams import own_program
-from tests.fuzz import cached, command_lines, damage, light, orders, surfaces, updates
+from tests.fuzz import cached, command_lines, damage, energy, light, orders, surfaces, updates
 
 KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "tables": damage.check_table,
@@ -32,20 +32,21 @@ KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "light": light.check,
     "updates": updates.check,
     "orders": orders.check,
+    "energy": energy.check,
 }
 #: A kind's place decides its random numbers: new ones go to the end.
 _STREAMS = (
     "commands", "heights", "surfaces", "tables", "texts", "documents", "cache", "scenes", "light",
-    "updates", "orders",
+    "updates", "orders", "energy",
 )  # fmt: skip
 #: Share of the time that each kind gets.
 _SHARES = {
     "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.05, "cache": 0.05, "scenes": 0.05,
-    "commands": 0.1, "surfaces": 0.15, "light": 0.15, "updates": 0.05, "orders": 0.1,
+    "commands": 0.1, "surfaces": 0.1, "light": 0.1, "updates": 0.05, "orders": 0.1, "energy": 0.1,
 }  # fmt: skip
 #: Cases of each kind that take about a second together.
 ROUND = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
-ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1, "orders": 30}
+ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine.
 _BUSY, _HANG = 40, 300

@@ -38,7 +38,7 @@ def test_lines_that_jump_are_suggested_to_be_levelled(tmp_path):
     rng = np.random.default_rng(1)
     path = tmp_path / "lines.npy"
     _, field = loaded(rough + 0.02 * rng.normal(size=(128, 1)), path)
-    assert "--level lines" in jumping_lines(field)
+    assert "level=lines" in jumping_lines(field)
     for still in (loaded(rough, path)[1], loaded(rough.T, path)[1]):
         assert jumping_lines(still) == ""
     _, level = loaded(rough + 0.02 * rng.normal(size=(128, 1)), path, level="lines")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
@@ -14,7 +13,6 @@ from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.osl.export import OSL
 from mitsuba_diffraction.osl.patch import (
     DRAWS_WIDTH,
     energy_texture,
@@ -86,12 +84,6 @@ def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=True))
     with pytest.warns(md.DiffractionWarning, match="second_order"):
         md.osl.export(bsdf, tmp_path)
-
-
-def test_boundary_models_that_the_shader_lacks_are_refused(some_variant):
-    described = replace(mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS)).describe(), model="level")
-    with pytest.raises(DiffractionError, match=r"model='level'.*OSL.*kirchhoff"):
-        OSL.check(described)
 
 
 @settings(deadline=None, max_examples=50)

@@ -112,7 +112,7 @@ def test_consumer_shows_a_feature_or_refuses_it_in_one_line(chosen, consumer):
 def of_osl(described: Surface) -> object:
     shader = shader_of(described)
     arrays = {name: pixels.tobytes() for name, pixels in shader.textures.items()}
-    return shader.constants, list(shader.arrays), shader.sockets, arrays
+    return shader.formulas, shader.constants, list(shader.arrays), shader.sockets, arrays
 
 
 def of_shaders(described: Surface) -> object:
@@ -123,11 +123,11 @@ def of_shaders(described: Surface) -> object:
     return packed.uniforms, packed.definitions, textures, scale, axis
 
 
-#: Features that tables, mixes and textures of Mitsuba have: tests of scenes and tables show them.
+#: Features of tables, mixes, textures and users' models: tests of these show them.
 ELSEWHERE = {
     Feature.HEIGHTS, Feature.ORDERS, Feature.MIX, Feature.LIMITED, Feature.PATCH,
     Feature.VARYING_WEIGHTS, Feature.VARYING_LENGTH, Feature.VARYING_ORIENTATION,
-    Feature.DIELECTRIC, Feature.SMALL_SLOPE,
+    Feature.DIELECTRIC, Feature.SMALL_SLOPE, Feature.OWN_MODEL,
 }  # fmt: skip
 
 

@@ -317,9 +317,10 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
     (name,) = parameters
     if name in SCENE_SETTINGS:
         assert "; leave it out, or " in text
-        option = f"--{name.replace('_', '-')} {parameters[name]}"
-        assert text.endswith(f"build another table with 'mitsuba-diffraction precompute {option}'")
-        assert ("-D coherence_width=auto" in text) == (name == "coherence_width")
+        assert text.endswith(
+            f"build another table with DiffractionTable.build({name}={parameters[name]})"
+        )
+        assert ("say coherence_width=auto" in text) == (name == "coherence_width")
 
 
 @pytest.mark.parametrize("width", [2.4, "2.4", "auto"])

@@ -31,7 +31,7 @@ def plate(name: str):
 
 @pytest.mark.parametrize(
     ("name", "remedy"),
-    [("vertex_orientation", "mitsuba-diffraction tangents"), ("face_color", "add it to the mesh")],
+    [("vertex_orientation", "the command 'tangents"), ("face_color", "add it to the mesh")],
 )
 def test_an_attribute_that_is_missing_is_named_with_what_to_do(name, remedy):
     with pytest.raises(DiffractionError, match=f"no attribute {name}.*{remedy}"):

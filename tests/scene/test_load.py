@@ -52,20 +52,20 @@ CASES = {
     '[ply.cpp:136] Error while loading PLY file "/m/ball.obj": "/m/ball.obj": invalid PLY header: '
     'unknown token "#"!': (
         "'a.xml', line 2: shape 'ply': '/m/ball.obj' is no PLY mesh, which the scene expects: run "
-        "'mitsuba-diffraction tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
+        "the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
     ),
     # quads, in binary and as text
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
     '[PLYMesh] Error while loading PLY file "q.ply": incompatible contents -- is this a triangle '
     "mesh?!": (
         "'a.xml', line 2: shape 'ply': 'q.ply' has polygons, of which Mitsuba reads only "
-        "triangles: run 'mitsuba-diffraction tangents q.ply -o mesh.ply' first, and use mesh.ply"
+        "triangles: run the command 'tangents q.ply -o mesh.ply' first, and use mesh.ply"
     ),
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
     '[PLYMesh] Error while loading PLY file "t.ply": [ply.h:268] "t.ply": trailing tokens after '
     "end of PLY file!": (
         "'a.xml', line 2: shape 'ply': 't.ply' has polygons, of which Mitsuba reads only "
-        "triangles: run 'mitsuba-diffraction tangents t.ply -o mesh.ply' first, and use mesh.ply"
+        "triangles: run the command 'tangents t.ply -o mesh.ply' first, and use mesh.ply"
     ),
 }  # fmt: skip
 
@@ -131,7 +131,7 @@ def test_no_other_mesh_is(scene_of, mesh, bsdf):
 @pytest.mark.parametrize("bsdf", [FOLLOWING, f'<bsdf type="twosided">{FOLLOWING}</bsdf>'])
 def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(scene_of, bsdf):
     """Kernels would go on with zeros, and not turn it."""
-    with pytest.raises(DiffractionError, match=r"hide has no attribute vertex_.* tangents MESH"):
+    with pytest.raises(DiffractionError, match=r"hide has no attribute vertex_.*'tangents MESH"):
         load_scene(scene_of(TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", bsdf), {})
 
 

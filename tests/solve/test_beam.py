@@ -7,7 +7,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.fresnel import amplitudes as fresnel
+from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.beam import solve_beam
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings

@@ -48,7 +48,7 @@ def test_s_and_p_need_matrices_but_in_planes_of_symmetry():
     table = thin_grating(0.8, counts=(2, 2, 1), wavelengths=(500.0, 640.0))
     for phi in (0.0, 90.0):
         assert len(list_orders(table, 550.0, 30.0, phi, polarised=True).rows)
-    with pytest.raises(DiffractionError, match="--polarised"):
+    with pytest.raises(DiffractionError, match="polarised=True"):
         list_orders(table, 550.0, 30.0, 45.0, polarised=True)
 
 

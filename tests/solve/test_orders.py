@@ -106,7 +106,7 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
 def test_a_table_that_misses_its_tolerance_is_refined_or_accepted(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
     monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
-    with pytest.raises(DiffractionError, match=r"5 % of directions .tolerance 0.40%.*--accept"):
+    with pytest.raises(DiffractionError, match=r"5 % of directions .tolerance 0.40%.*accept=True"):
         solve_orders(PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3))
     with pytest.warns(md.DiffractionWarning, match="on average"):
         coarse = solve_orders(
@@ -136,7 +136,7 @@ def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_the_integral_metho
         ("0,1,2\n", "line 1"),
         ("0,nan\n1,0\n", "finite"),
         ("# nothing\n", "no points"),
-        ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "--import"),
+        ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "read_orders"),
     ],
 )
 def test_lines_that_are_no_period_are_refused(points, message, tmp_path):

@@ -94,7 +94,7 @@ def test_the_command_says_what_it_will_do_writes_the_table_and_clears_up(tmp_pat
         (["sinusoidal", "--period", "1", "--depth", "0.1", "--duty", "0.5"], "duty"),
         (["missing.csv", "--period", "1"], "missing.csv"),
         (["heap", "--period", "1"], "expected one of"),
-        (["sinusoidal", "--period", "1", "--depth", "0.1", "--material", "Unob"], "conductor"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "--material", "Unob"], "Unob"),
         (["sinusoidal", "--period", "1", "--depth", "0.1", "-o", "none/x.nc"], "folder"),
     ],
 )

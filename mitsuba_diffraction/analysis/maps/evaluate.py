@@ -88,7 +88,7 @@ def brdf_map(
     if surface is not None and bands.low < (shortest := surface.shortest_wavelength):
         raise DiffractionError(
             f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a wider table "
-            "with 'mitsuba-diffraction precompute --wavelength-range'"
+            "with DiffractionTable.build"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
     sigma = None if surface is None else surface.sigma

@@ -206,7 +206,7 @@ def _warn_of_wavelengths(table: OrderTable) -> None:
         low, high = table.wavelengths
         warn(
             f"this table of orders is of {low:g} to {high:g} nm: it reflects no light below "
-            f"{least:.0f} and above {most:.0f} nm; solve it with a wider --wavelength-range"
+            f"{least:.0f} and above {most:.0f} nm; solve it with a wider range of wavelengths"
         )
 
 
@@ -216,5 +216,5 @@ def _warn_of_polarisation() -> None:
         _warned.append(True)
         warn(
             "a table of diffraction_orders has no Mueller matrices: in this polarised variant it "
-            "depolarises light; solve gratings with --polarised (thin sheets have none)"
+            "depolarises light; solve gratings with polarised=True (thin sheets have none)"
         )

@@ -70,7 +70,7 @@ def read_parameters(props: Properties) -> Parameters:
 def _table(props: Properties) -> OrderTable:
     if ("table" in props) == ("data" in props):
         raise DiffractionError(
-            f"{ORDERS} takes one of table, a file of 'mitsuba-diffraction solve', and data, an "
+            f"{ORDERS} takes one of table, a file of orders, and data, an "
             "OrderTable of md.bsdf_dict"
         )
     if "data" in props:

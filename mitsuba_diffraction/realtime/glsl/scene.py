@@ -242,7 +242,7 @@ def check_variant(variant: str) -> None:
     if kind == "scalar" or "mono" in colours:
         raise DiffractionError(
             f"variant {variant} does not support the shaders, which need colours and arrays of "
-            "values: set llvm_ad_rgb or llvm_ad_spectral (--mode)"
+            "values: set llvm_ad_rgb or llvm_ad_spectral"
         )
 
 

@@ -150,7 +150,7 @@ class TangentReport:
         if not self.has_uv:
             return [
                 "no texture coordinates, so the patch has no direction: give the mesh one with "
-                "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+                "the command 'tangents', or unwrap it so that u runs the way the patch's x "
                 "axis shall"
             ]
         lines = []
@@ -165,7 +165,7 @@ class TangentReport:
             lines.append(
                 f"the patch's direction {self.breaking()}: colours will show seams; "
                 + (
-                    "make it with 'mitsuba-diffraction tangents' and another --along"
+                    "make it with the command 'tangents' along another guide"
                     if self.has_orientation
                     else "unwrap along the body in one piece"
                 )
@@ -175,7 +175,7 @@ class TangentReport:
                 f"the patch's direction turns by over {TURN:g} degrees between neighbours, or "
                 f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: "
                 + (
-                    "use a finer mesh, or another --along of 'mitsuba-diffraction tangents'"
+                    "use a finer mesh, or the command 'tangents' along another guide"
                     if self.has_orientation
                     else "colours will show seams; unwrap along the body in one piece"
                 )

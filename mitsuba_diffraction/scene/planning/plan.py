@@ -85,7 +85,7 @@ def record(
             raise DiffractionError(
                 f"none of {paths} paths carries light of a surface that diffracts "
                 f"({_names(session)}): the camera does not see it lit; check camera and lights, or "
-                "raise --paths"
+                "raise paths"
             )
         return traced, [_recorded(key, session, traced) for key in session.tables]
     finally:

@@ -69,17 +69,19 @@ class Gain:
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 
-    def order_0(self, cos_i: Real, cos_o: Real, power: Real, cos_turn: Real) -> Real:
+    def order_0(self, cos_i: Real, cos_o: Real, power: Real, turn: Real) -> Real:
         """Return the share of order 0 that goes to directions across its lobe.
 
-        power : of order 0 at these directions; cos_turn : of the azimuth between them.
+        power : of order 0 at these directions; turn : azimuths between them, (..., n), rad.
         """
         if self.path.let_through:
             return self.path.flat_transmittance(cos_i, cos_o) * power
-        share = self.exact(cos_i, cos_o, cos_turn) * power
+        wide = turn.shape[-1] > 1
+        share = self(cos_i, cos_o, turn) if wide else self.exact(cos_i, cos_o, -1.0)
+        share = share * power
         if not self.path.thin:
             return share
-        return share + self.path.face_reflectance(cos_i, cos_o, cos_turn)
+        return share + self.path.face_reflectance(cos_i, cos_o, np.cos(turn))
 
     @cached_property
     def _table(self) -> Real:

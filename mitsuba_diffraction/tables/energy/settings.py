@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 22
+VERSION = 24
 
 
 @dataclass(frozen=True)

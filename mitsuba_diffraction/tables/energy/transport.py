@@ -167,9 +167,9 @@ class Transport:
         # azimuths across the lobe, at which G of a wide one differs towards the horizon
         across, weights = _ACROSS if width > _WIDE else (np.zeros(1), np.ones(1))
         turn = across * width / np.sqrt(np.maximum(sin_o * sine, 1e-9))[..., None]
-        cos_turn = -np.cos(np.minimum(turn, np.pi))
+        turn = np.pi - np.minimum(turn, np.pi)
         cos_in, cos_out, share = (x[..., None] + 0.0 * turn for x in (cos_i, cos_o, power))
-        gain = self._gain.order_0(cos_in, cos_out, share, cos_turn)
+        gain = self._gain.order_0(cos_in, cos_out, share, turn)
         parts *= gain @ (weights / weights.sum())
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()

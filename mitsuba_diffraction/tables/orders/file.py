@@ -36,7 +36,7 @@ SUFFIX = ".nc"
 _STEP = 1.0 / 30_000.0
 #: Mark of Mueller matrices among packed arrays.
 _MUELLER = " mueller"
-_AGAIN = "solve it again with 'mitsuba-diffraction solve'"
+_AGAIN = "solve it again with solve_orders"
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -124,14 +124,13 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
 def _advice(path: Path) -> str:
     """Return what to do with a file that is no table of orders."""
     if kind_of(path) is FileKind.RECIPE:
-        command = f"mitsuba-diffraction solve {shlex.quote(str(path))}"
-        return f"run '{command}', and give the table (.nc) that it writes"
+        return (
+            f"run the command 'solve {shlex.quote(str(path))}', and give the table (.nc) that it "
+            "writes"
+        )
     if kind_of(path) is FileKind.TABLE:
         return "tables of heights (EXR) belong to the BSDF 'diffraction'"
-    return (
-        "make one with 'mitsuba-diffraction solve', which also reads efficiencies of other "
-        "programs (--import)"
-    )
+    return "make one with solve_orders, or with read_orders from efficiencies of other programs"
 
 
 def _table(file: Any) -> OrderTable:

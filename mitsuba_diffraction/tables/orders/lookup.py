@@ -87,7 +87,8 @@ def polarised_efficiency(
         if not table.polarised:
             raise DiffractionError(
                 "s and p of light off the plane across the grooves need Mueller matrices; solve "
-                "the profile with --polarised, or take groove_efficiency: E or B along the grooves"
+                "the profile with polarised=True, or take groove_efficiency: E or B along the "
+                "grooves"
             )
         difference = difference + turned.sine * mueller(table, x, y, wavelength, order)[..., 0, 2]
     difference = np.clip(difference, -mean, mean)
@@ -179,7 +180,7 @@ def mueller(
     """
     if not table.polarised:
         raise DiffractionError(
-            "this table has efficiencies alone; solve the profile with --polarised for Mueller "
+            "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
     light = (table, x, y, wavelength, order)
@@ -241,7 +242,7 @@ def _lit(table: OrderTable, wavelength: Array) -> NDArray[np.bool_]:
         warn(
             f"light of {wavelength[~lit][0]:g} nm meets a table of orders of {low:g} to {high:g} "
             f"nm, which has none below {least:.0f} and above {most:.0f} nm; solve it with a wider "
-            "--wavelength-range"
+            "range of wavelengths"
         )
     return np.asarray(lit)
 

@@ -226,7 +226,7 @@ def test_unusable_options_are_usage_errors(render, options, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--turn", "text"], "--turn text: it begins at 'word', which is no angle"),
+        (["--turn", "text"], "the turn of text begins at 'word', which is no angle"),
         (["--animate", "lihgt=0:1"], "did you mean light?"),
         (["--turn", "light", "-o", "no/where"], None),
     ],

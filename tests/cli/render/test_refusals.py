@@ -119,13 +119,15 @@ def test_definitions_may_hold_equal_signs():
     assert args.parameters == [("a", "b=c"), ("d", "")]
 
 
-def test_a_picture_beyond_the_memory_is_refused_before_it_is_rendered(run, scene):
-    size = '<integer name="width" value="99999999"/><integer name="height" value="9999"/>'
-    scene.write_text(
-        re.sub(r'<integer name="(width|height)" value="[^"]*"/>', "", SCENE).replace(
-            '<film type="hdrfilm">', f'<film type="hdrfilm">{size}'
-        )
-    )
-    line = run("render", scene, *QUICK).failed_in_one_line()
-    assert "99999999 x 9999 pixels" in line
+@pytest.mark.parametrize("names", [("width", "height"), ("crop_width", "crop_height")])
+def test_a_picture_beyond_the_memory_is_refused_before_anything_is_loaded(run, scene, names):
+    """Among the scene's objects is one that cannot be loaded; the film is refused first."""
+    size = "".join(f'<integer name="{name}" value="$resx"/>' for name in names)
+    text = re.sub(r'<integer name="(width|height)" value="[^"]*"/>', "", SCENE)
+    text = text.replace('<film type="hdrfilm">', f'<film type="hdrfilm">{size}')
+    text = re.sub("(<scene [^>]*>)", r'\1<default name="resx" value="9"/>', text)
+    scene.write_text(text.replace("</scene>", '<shape type="no"/></scene>'))
+    line = run("render", scene, *QUICK, "-D", "resx=99999999").failed_in_one_line()
+    assert "99999999 x 99999999 pixels" in line
     assert "use fewer pixels" in line
+    assert "there is no shape plugin 'no'" in run("render", scene, *QUICK).failed_in_one_line()

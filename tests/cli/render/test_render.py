@@ -130,7 +130,7 @@ def test_a_sensor_is_chosen_by_its_number(run, scene):
     scene.write_text(SCENE.replace("  <emitter", second + "  <emitter"))
     assert "8 x 16" in run("render", scene, *QUICK, "--sensor", "1", "-o", "a.png").out
     line = run("render", scene, *QUICK, "--sensor", "2").failed_in_one_line()
-    assert "--sensor 2: the scene has 2" in line
+    assert "sensor 2: the scene has 2" in line
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ def test_every_parameter_is_described_once(some_variant):
 
 
 def test_the_defaults_are_those_of_the_code(some_variant, patch):
-    from mitsuba_diffraction.plugin import parameters as code
+    from mitsuba_diffraction.plugin import diffraction_parameters as code
     from mitsuba_diffraction.plugin.sources import from_cache
     from mitsuba_diffraction.tables.table import DiffractionTable
 
@@ -72,7 +72,7 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
 def test_the_choices_are_those_of_the_code(some_variant):
     from mitsuba_diffraction.heights import preprocess
     from mitsuba_diffraction.heights import read as options
-    from mitsuba_diffraction.plugin import parameters as code
+    from mitsuba_diffraction.plugin import diffraction_parameters as code
     from mitsuba_diffraction.tables.expansion import BASES
 
     choices = {

@@ -74,7 +74,7 @@ def test_files_keep_the_matrices(tmp_path):
 
 
 def test_tables_without_matrices_and_matrices_of_other_efficiencies_are_refused():
-    with pytest.raises(DiffractionError, match="--polarised"):
+    with pytest.raises(DiffractionError, match="polarised=True"):
         OrderTable.mirror(0.6).mueller(0.0, 0.0, 550.0, 0)
     band = GRATING.bands[0]
     for wrong in (tuple(0.9 * m for m in band.mueller), (band.mueller[0][..., :3],)):

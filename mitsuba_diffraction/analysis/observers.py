@@ -1,0 +1,268 @@
+"""Eyes of animals: spectral sensitivities, quantum catches and contrasts.
+
+A receptor's sensitivity is that of its pigment's template, times the transmittance of its oil
+droplet, normalised to an area of 1, times that of the ocular media, as pavo's `sensmodel` has it.
+
+References
+----------
+V. I. Govardovskii, N. Fyhrquist, T. Reuter, D. G. Kuzmin and K. Donner, In search of the visual
+pigment template, Visual Neuroscience 17, 509-528 (2000): A1 pigments, α and β bands.
+N. S. Hart and M. Vorobyev, Modelling oil droplet absorption spectra and spectral sensitivities of
+bird cone photoreceptors, J. Comp. Physiol. A 191, 381-392 (2005).
+M. Vorobyev and D. Osorio, Receptor noise as a determinant of colour thresholds, Proc. R. Soc. B
+265, 351-358 (1998).
+N. S. Hart, J. C. Partridge, I. C. Cuthill and A. T. D. Bennett, Visual pigments, oil droplets,
+ocular media and cone photoreceptor distribution in two species of passerine bird, J. Comp. Physiol.
+A 186, 375-387 (2000): blue tit, `avian_uv`.
+A. J. Sillman, V. I. Govardovskii, P. Röhlich, J. A. Southard and E. R. Loew, The photoreceptors and
+visual pigments of the garter snake, J. Comp. Physiol. A 181, 89-101 (1997): `snake`.
+N. S. Hart, Vision in the peafowl (Aves: Pavo cristatus), J. Exp. Biol. 205, 3925-3935 (2002):
+`avian_v`; pigments, numbers of cones, and the peaks that media and droplets give them, 432, 477,
+537 and 605 nm. The cut-offs here are those that give these peaks; the first has the media in it.
+E. R. Loew, L. J. Fleishman, R. G. Foster and I. Provencio, Visual pigments and oil droplets in
+diurnal lizards, J. Exp. Biol. 205, 927-938 (2002): `lizard`, anoles; pigments without droplets.
+J. Neitz, T. Geist and G. H. Jacobs, Color vision in the dog, Visual Neuroscience 3, 119-125 (1989):
+`dog`.
+R. Menzel, in Photoreceptor Optics (Springer 1975), 372-387: `bee`, the honeybee.
+A. Stockman and L. T. Sharpe, Vision Research 40, 1711-1737 (2000): `human`, the cone fundamentals
+of CIE 2006 (170-1), for 2 degrees.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError, quoted
+from ..files import read_text
+from ..optics.colour import cone_fundamentals, illuminant_power
+
+Reals = NDArray[np.float64]
+
+#: Wavelengths of sensitivities, nm: the range in which animals see.
+GRID = np.arange(300.0, 701.0)
+#: Lights of catches: as many quanta everywhere; CIE's daylight of direct sun, of sun and sky, and
+#: of the northern sky, in open shade (G. Wyszecki and W. S. Stiles, Color Science, Wiley 1982).
+ILLUMINANTS = ("ideal", "d55", "d65", "d75")
+#: Weber fraction of the most frequent receptor, of birds' long-wave cones.
+WEBER = 0.1
+
+# Of oil droplets, the wavelength of half transmittance from that of the cut: slope, intercept (nm).
+_DROPLETS = {"C": (0.99, 24.38), "Y": (0.9, 70.03), "R": (0.99, 28.65), "P": (0.96, 33.57)}
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Receptors of an animal, shortest wavelength first.
+
+    Attributes
+    ----------
+    names : of the receptors.
+    sensitivity : (receptors, GRID), each of area 1 before the ocular media.
+    density : relative numbers of receptors, by which noise is shared.
+    """
+
+    names: tuple[str, ...]
+    sensitivity: Reals
+    density: tuple[float, ...]
+
+
+def pigment_template(peak: float, wavelengths: ArrayLike = GRID, beta: bool = True) -> Reals:
+    """Return the absorbance (n,) of an A1 pigment with this λmax in nm, its maximum 1."""
+    lam = np.asarray(wavelengths, np.float64)
+    x = peak / lam
+    a = 0.8795 + 0.0459 * np.exp(-((peak - 300.0) ** 2) / 11940.0)
+    alpha = 1.0 / (
+        np.exp(69.7 * (a - x)) + np.exp(28.0 * (0.922 - x)) + np.exp(-14.9 * (1.104 - x)) + 0.674
+    )
+    if beta:
+        place, width = 189.0 + 0.315 * peak, -40.5 + 0.195 * peak
+        alpha += 0.26 * np.exp(-(((lam - place) / width) ** 2))
+    return np.asarray(alpha / alpha.max())
+
+
+def droplet_transmittance(kind: str, cut: float, wavelengths: ArrayLike = GRID) -> Reals:
+    """Return the transmittance (n,) of an oil droplet: C, Y, R, P by λcut in nm; T, clear."""
+    lam = np.asarray(wavelengths, np.float64)
+    if kind == "T":
+        return np.ones_like(lam)
+    slope, intercept = _DROPLETS[kind]
+    gradient = 0.5 / (slope * cut + intercept - cut)
+    return np.asarray(np.exp(-np.exp(-2.89 * gradient * (lam - cut) + 1.08)))
+
+
+def bird_media(wavelengths: ArrayLike = GRID) -> Reals:
+    """Return the transmittance (n,) of a blue tit's ocular media, the polynomial of pavo."""
+    lam = np.asarray(wavelengths, np.float64)
+    terms = (8.928e-13, -2.595e-9, 3.006e-6, -0.001736, 0.5013, -55.56)
+    return np.asarray(np.maximum(np.log(np.maximum(np.polyval(terms, lam), 1e-300)), 0.0))
+
+
+def _modelled(
+    peaks: Sequence[float], density: Sequence[float], droplets: str = "",
+    cuts: Sequence[float] = (), media: Reals | None = None, names: str = "usml",
+) -> Eye:  # fmt: skip
+    """Model an eye from its pigments."""
+    # the droplets of birds hide the β band, which pavo leaves out of their eyes
+    curves = np.stack([pigment_template(peak, beta=not droplets) for peak in peaks])
+    if droplets:
+        curves *= [droplet_transmittance(k, c) for k, c in zip(droplets, cuts, strict=True)]
+    curves /= curves.sum(axis=1, keepdims=True)
+    if media is not None:
+        curves = curves * media
+    return Eye(tuple(names[-len(peaks) :]), curves, tuple(density))
+
+
+def _human() -> Eye:
+    """Model the human eye: cone fundamentals per quantum."""
+    curves = cone_fundamentals(GRID) / GRID
+    return Eye(("s", "m", "l"), curves / curves.sum(axis=1, keepdims=True), (1.0, 1.0, 1.0))
+
+
+#: Animals by name: λmax, relative numbers of receptors (1 if unknown), oil droplets, their λcut.
+EYES: dict[str, Callable[[], Eye]] = {
+    "avian_uv": lambda: _modelled(
+        (371.0, 448.0, 502.0, 563.0), (1.0, 2.0, 2.0, 4.0), "TCYR", (300.0, 413.0, 507.0, 572.0),
+        bird_media(),
+    ),
+    "avian_v": lambda: _modelled(
+        (424.0, 458.0, 505.0, 567.0), (1.0, 1.9, 2.2, 2.1), "CCYR", (383.5, 440.0, 505.5, 569.5),
+        names="vsml",
+    ),
+    "lizard": lambda: _modelled((365.0, 455.0, 495.0, 564.0), (1.0, 1.0, 1.0, 1.0)),
+    "dog": lambda: _modelled((429.0, 555.0), (1.0, 1.0), names="sl"),
+    "bee": lambda: _modelled((350.0, 440.0, 540.0), (1.0, 1.0, 1.0), names="usm"),
+    "human": _human,
+    "snake": lambda: _modelled((360.0, 482.0, 554.0), (1.0, 1.0, 12.0), names="uml"),
+}  # fmt: skip
+
+
+def eye_of(name: str) -> Eye:
+    """Return an eye by name, or from a CSV: wavelengths in nm and a column for each receptor.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such animal, or the file has no sensitivities from 400 to 700 nm.
+    """
+    if name in EYES:
+        return EYES[name]()
+    if Path(name).suffix.lower() != ".csv":
+        raise DiffractionError(
+            f"observer={quoted(name)} is unknown; choose one of {', '.join(EYES)}, or a CSV of "
+            "wavelengths (nm) and a column for each receptor"
+        )
+    names, table = _columns(name)
+    if len(names) < 2:
+        raise DiffractionError(
+            f"'{name}' is no eye: give a header, wl and a name for each receptor, and rows of "
+            "wavelengths in nm, increasing, and sensitivities"
+        )
+    if table[0, 0] > 400.0 or table[-1, 0] < 700.0 or table[:, 1:].min() < 0.0:
+        raise DiffractionError(
+            f"'{name}': sensitivities must be 0 or more, from 400 to 700 nm at least"
+        )
+    curves = np.stack([np.interp(GRID, table[:, 0], c, 0.0, 0.0) for c in table[:, 1:].T])
+    return Eye(names, curves / curves.sum(axis=1, keepdims=True), (1.0,) * len(names))
+
+
+def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
+    """Return the names of a CSV's columns behind wavelengths, and its numbers; none if wrong."""
+    header, *lines = read_text(name).splitlines() or [""]
+    names = tuple(word.strip() for word in header.split(",")[1:])
+    try:
+        table = np.array([[float(x) for x in line.split(",")] for line in lines if line.strip()])
+    except ValueError:
+        return (), np.empty((0, 0))
+    right = table.ndim == 2 and len(table) > 1 and table.shape[1] == 1 + len(names)
+    if not (right and (np.diff(table[:, 0]) > 0.0).all()):
+        return (), np.empty((0, 0))
+    return names, table
+
+
+def illuminant_of(name: str) -> Reals:
+    """Return the quanta of a light at `GRID`, of mean 1: by name, or from a CSV of photons.
+
+    name : one of `ILLUMINANTS`, or a CSV of wavelengths in nm and relative photons.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such light, or the file does not cover 300 to 700 nm.
+    """
+    if name in ILLUMINANTS:
+        quanta = (
+            np.ones_like(GRID) if name == "ideal" else illuminant_power(name.upper(), GRID) * GRID
+        )
+        return np.asarray(quanta / quanta.mean())
+    if Path(name).suffix.lower() != ".csv":
+        raise DiffractionError(
+            f"illuminant={quoted(name)} is unknown; choose one of {', '.join(ILLUMINANTS)}, or a "
+            "CSV of wavelengths (nm) and photons"
+        )
+    names, table = _columns(name)
+    covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
+    if not (covers and table[:, 1].min() >= 0.0 < table[:, 1].max()):
+        raise DiffractionError(
+            f"'{name}' is no light: give a header, wl and a name, and rows of wavelengths from 300 "
+            "to 700 nm, increasing, and photons"
+        )
+    quanta = np.interp(GRID, table[:, 0], table[:, 1])
+    return np.asarray(quanta / quanta.mean())
+
+
+def quantum_catches(
+    eye: Eye, wavelengths: ArrayLike, value: ArrayLike, illuminant: ArrayLike = 1.0
+) -> Reals:
+    """Return the catches Q = ∫ R S I dλ (spectra, receptors), over nanometres; pavo's `Qi`.
+
+    Parameters
+    ----------
+    wavelengths : (n,), nm, which cover 300 to 700.
+    value : (n, spectra), reflectance, 1 is white.
+    illuminant : of `GRID`, quanta; 1 without.
+
+    Raises
+    ------
+    DiffractionError
+        If the wavelengths do not cover the eye's range.
+    """
+    lam, spectra = np.asarray(wavelengths, np.float64), np.asarray(value, np.float64)
+    seen = GRID[eye.sensitivity.max(axis=0) > 1e-3 * eye.sensitivity.max()]
+    if lam[0] > seen[0] or lam[-1] < seen[-1]:
+        raise DiffractionError(
+            f"the spectra are from {lam[0]:g} to {lam[-1]:g} nm, and this eye sees from "
+            f"{seen[0]:g} to {seen[-1]:g} nm; give wavelength_range=(300, 700)"
+        )
+    fine = np.stack([np.interp(GRID, lam, curve) for curve in spectra.T])
+    return np.asarray(fine * illuminant @ eye.sensitivity.T)
+
+
+def noises(eye: Eye, weber: float = WEBER) -> Reals:
+    """Return the noise e of each receptor's channel: `weber` that of the most frequent one."""
+    density = np.array(eye.density)
+    return np.asarray(weber * np.sqrt(density.max() / density))
+
+
+def contrasts(catches: ArrayLike, noise: ArrayLike) -> Reals:
+    """Return chromatic distances ΔS (spectra, spectra) in just noticeable differences.
+
+    Vorobyev and Osorio's eq. 3 to 5 for any number of receptors, with log catches: differences Δf
+    without their mean, weighted by 1/e², over the noise of the channels. Spectra without light in
+    one receptor have no contrast, nan.
+    """
+    q, e = np.asarray(catches, np.float64), np.asarray(noise, np.float64)
+    with np.errstate(divide="ignore"):
+        f = np.where(q > 0.0, np.log(np.maximum(q, 1e-300)), np.nan)
+    weights = e**-2 / np.sum(e**-2)
+    result = np.zeros((len(q), len(q)))
+    for i, j in itertools.combinations(range(len(q)), 2):
+        step = f[i] - f[j]
+        distance = np.sqrt(np.sum(((step - weights @ step) / e) ** 2))
+        result[i, j] = result[j, i] = distance
+    return result

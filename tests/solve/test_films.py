@@ -1,0 +1,93 @@
+"""Films on profiles, beside transfer matrices and themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.films import films_of
+from mitsuba_diffraction.solve.jobs import problem_of
+from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.profiles import blazed, lamellar
+from mitsuba_diffraction.solve.stations import Grating, reversed_light
+
+RANGE = (500.0, 600.0)
+#: Protected aluminium with a high and a low index; µm.
+LAYERS = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
+SUPERSTRATE = 1.2
+
+
+def grating(profile, layers=LAYERS, material="Al"):
+    substance = material_of(material, RANGE)
+    films = films_of(layers, substance, False, RANGE)
+    return Grating(profile, substance, SUPERSTRATE, RANGE, films=films)
+
+
+def solved(surface, station, harmonics):
+    return CoupledWaves(
+        surface.profile, harmonics, [film.thickness for film in surface.films]
+    ).amplitudes(station)
+
+
+def test_flat_stacks_reflect_as_transfer_matrices_say():
+    tmm = pytest.importorskip("tmm")
+    surface = grating(lamellar(0.5, 0.0))
+    station = surface.station(1, 0, 0.35, 0.5, [0.2, 0.9])
+    amplitudes = solved(surface, station, 3)
+    for n, lam in enumerate(station.wavelengths * SUPERSTRATE * 1e3):
+        y, c = station.along[n], np.sqrt(1 - station.along[n] ** 2)
+        indices = [
+            SUPERSTRATE, *(f.material.index(lam)[()] for f in reversed(surface.films)),
+            surface.material.index(lam)[()],
+        ]  # fmt: skip
+        depths = [np.inf, *(1e3 * f.thickness for f in reversed(surface.films)), np.inf]
+        for channel, sine in enumerate(station.sines):
+            theta = np.arcsin(np.hypot(c * sine, y))
+            powers = [tmm.coh_tmm(name, indices, depths, theta, lam)["R"] for name in "sp"]
+            row = (np.abs(amplitudes[n, channel, :, channel]) ** 2).sum()
+            # rounding; both polarisations together, since axes along the grooves are not s and p
+            assert row == pytest.approx(sum(powers), abs=1e-9)
+
+
+def test_a_film_of_the_material_is_a_higher_profile():
+    """And one of the medium above is none."""
+    profile = lamellar(0.5, 0.1)
+    bare, same = grating(profile, []), grating(profile, [("Al", 0.07)])
+    station = bare.station(1, 0, 0.35, 0.5, [0.2])
+    coated = replace(station, films=same.station(1, 0, 0.35, 0.5, [0.2]).films)
+    difference = np.abs(solved(bare, station, 12)) - np.abs(solved(same, coated, 12))
+    assert np.abs(difference).max() < 1e-9
+    air = grating(profile, [(str(SUPERSTRATE), 0.07)])
+    aired = replace(station, films=air.station(1, 0, 0.35, 0.5, [0.2]).films)
+    difference = solved(bare, station, 12) - solved(air, aired, 12)
+    assert np.abs(difference).max() < 1e-9
+
+
+@pytest.mark.parametrize("profile", [lamellar(0.5, 0.1), blazed(0.5, 0.1)], ids=("walls", "slope"))
+def test_light_under_films_is_reciprocal(profile):
+    surface = grating(profile)
+    there, back = (surface.station(1, 0, tau, 0.5, [0.5]) for tau in (0.3, 0.7))
+    amplitudes = solved(surface, there, 20)
+    difference = amplitudes - reversed_light(solved(surface, back, 20))
+    # harmonics are cut at other frequencies: 0.05 with 8 of them on slopes, 0.0035 with 30
+    assert np.abs(difference).max() < 0.02
+    assert (np.abs(amplitudes) ** 2).sum(axis=(3, 4)).max() < 1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: grating(lamellar(0.5, 0.1), [("1.46", 0.0)]), "layer 1: thickness"),
+        (lambda: grating(lamellar(0.5, 0.1), [("1.4", 0.1), ("Unobtainium", 1)]), "is unknown"),
+        (lambda: grating(lamellar(0.5, 0.1), [("none", 0.1)]), "layer 1: a perfect conductor"),
+        (lambda: grating(lamellar(0.5, 0.1), LAYERS, "none"), "not on thin sheets or perfect"),
+        (lambda: problem_of(grating(blazed(0.5, 0.1)), "chandezon", 20), "method=coupled"),
+    ],
+)
+def test_films_that_cannot_be_solved_are_refused(make, message):
+    with pytest.raises(DiffractionError, match=message):
+        make()
