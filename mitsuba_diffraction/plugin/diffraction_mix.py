@@ -34,8 +34,8 @@ import numpy as np
 
 from ..errors import DiffractionError
 from .description import Mix
-from .memory import index_between
 from .lifecycle import ALL_COMPONENTS, PluginBSDF, ask
+from .memory import index_between
 from .parameter_changes import Bounded, Changing, ObjectValues
 from .textures import is_attribute, range_of, require_raw, uv_square
 from .types import (

@@ -15,7 +15,7 @@ from .memory import index_between
 from .parameter_changes import Bounded, Changeable, ObjectValues
 from .properties import number
 from .textures import is_bitmap, range_of, require_raw
-from .types import Callback, Float, Interaction, Mask, Properties, Texture
+from .types import Float, Interaction, Mask, Properties, Texture
 
 #: Flatter would be lost in single precision.
 LEAST_SCALE = 1e-30

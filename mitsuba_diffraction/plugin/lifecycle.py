@@ -75,7 +75,7 @@ class PluginBSDF(mi.BSDF):
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """Return f |cosθo| per wavelength, as the context's mode of transport has it."""
-        return self.answers(ctx, si, wo, active, "v")[0]
+        return mi.Spectrum(self.answers(ctx, si, wo, active, "v")[0])
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Return the density of `sample` per solid angle."""
@@ -86,7 +86,7 @@ class PluginBSDF(mi.BSDF):
     ) -> tuple[Spectrum, Float]:
         """Return `eval` and `pdf` at once."""
         value, density = self.answers(ctx, si, wo, active, "vd")
-        return value, density
+        return mi.Spectrum(value), density
 
     # ------------------------------------------------------------------ changes of parameters
 

@@ -148,7 +148,8 @@ class NestingBSDF(PluginBSDF):
         if diffracts:
             drawn = self.draw(site, sample1, sample2)
             result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
-        value, pdf = self.evaluated(ctx, site, result.wo, active & ~delta, "vd")
+        smooth = dr.select(delta, False, active)
+        value, pdf = self.evaluated(ctx, site, result.wo, smooth, "vd")
         value = value / dr.select(pdf > 0.0, pdf, 1.0)
         if nested is not None:
             beneath = mi.Spectrum(self.beneath(site, result.wo, delta))

@@ -181,7 +181,7 @@ class DiffractionDielectric(DiffractingSurface):
         active = mi.Mask(active) & (cos_i != 0.0)
         site = self.site_at(si, active)
         share = self._staying_share(cos_i, _asked(ctx))
-        reflected = sample1 < share
+        reflected, passed = sample1 < share, sample1 >= share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
@@ -192,7 +192,7 @@ class DiffractionDielectric(DiffractingSurface):
         cosine = dr.abs(cos_i)
         drawn = self.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
-            dr.detach(site.scale * dr.select(reflected & ~down, n, 1.0)),
+            dr.detach(site.scale * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
@@ -207,7 +207,7 @@ class DiffractionDielectric(DiffractingSurface):
         value, density = self.evaluated(ctx, site, wo, active, "vd")
         active &= density > 0.0
         eta = dr.select(reflected, 1.0, out / sides.into)
-        result = sample_of(wo, dr.select(active, density, 0.0), ~reflected, eta)
+        result = sample_of(wo, dr.select(active, density, 0.0), passed, eta)
         return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
 
     # ------------------------------------------------------------------ reflection
