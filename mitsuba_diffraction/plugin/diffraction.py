@@ -285,7 +285,7 @@ class Diffraction(DiffractingSurface):
         else:
             power, density = self.power.both(pair, site.scale, drawing, site.si)
         # Eq. 4 to 10: times N' of the material and the rest
-        value = self._light(ctx, site, pair, power, active)
+        value = self.light(ctx, site, pair, power, active)
         return self.layering.diffraction_share * value, with_even_share(density)
 
     def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
@@ -299,7 +299,7 @@ class Diffraction(DiffractingSurface):
         """See `NestingBSDF.reflected_share`."""
         return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
 
-    def _light(self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask) -> Spectrum:
+    def light(self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask) -> Spectrum:
         """Return f cosθo of the structure, and of the coat's face where there is one.
 
         power : ⟨|P|²⟩ / (4π²σ⁴ λ²) of the pair in 1/µm², eq. 2 and 3, from the power model.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -73,7 +72,7 @@ class Site:
     si: Interaction
     frame: PatchFrame
     scale: Float = 1.0
-    wavenumbers: Sequence[Float] = ()
+    wavenumbers: list[Float] = ()
 
 
 class Pair:

@@ -15,8 +15,8 @@ from . import arithmetic
 
 # Base classes first
 _MODULES = (
-    "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric", "orders.diffraction_orders",
-    "orders.orders_sheet", "diffraction_mix",
+    "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric",
+    "orders.diffraction_orders", "orders.orders_sheet", "diffraction_mix",
 )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.description import Surface, describe
-from ...plugin.directions import Pair
+from ...plugin.directions import Pair, Site
 from ...plugin.properties import own_id
 from ...plugin.sources import TableRequest
 from ...plugin.types import (
@@ -160,18 +160,12 @@ def _kind(session: Session) -> type[BSDF]:
     class RecordedDiffraction(Diffraction):
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
-        def diffracted(
-            self,
-            ctx: Context,
-            si: Interaction,
-            pair: Pair,
-            power: Colour,
-            scale: Float,
-            active: Mask,
+        def light(
+            self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask
         ) -> Spectrum:
-            value = super().diffracted(ctx, si, pair, power, scale, active)
+            value = super().light(ctx, site, pair, power, active)
             light = mi.unpolarized_spectrum(value)
-            session.record(self, si, pair.uv, pair.w * scale, light)
+            session.record(self, site.si, pair.uv, pair.w * site.scale, light)
             return value
 
     return RecordedDiffraction
