@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import drjit as dr
@@ -72,7 +72,7 @@ class Site:
     si: Interaction
     frame: PatchFrame
     scale: Float = 1.0
-    wavenumbers: list[Float] = ()
+    wavenumbers: list[Float] = field(default_factory=list)
 
 
 class Pair:
