@@ -97,14 +97,14 @@ class Surface:
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings, grid = self._settings, self._grid
-        albedo = None if self._both_sides else self._albedo(wavelength_range)
-        if albedo is not None and self._conserves(albedo):
+        albedo, largest = None, math.inf
+        if not self._both_sides:
+            albedo, largest = self._albedo(wavelength_range)
+        if largest <= self._limit:
             return Conservation(albedo)
-        count = settings.side_wavelengths
-        if isinstance(self.material, Reflector):
-            fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
-            count = max(settings.wavelengths, min(fringes, settings.fringes))
-        nodes = spread(wavelength_range, count)
+        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+        nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
         solved = parallel(lambda light: self._solved(light()), lights)
         c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
@@ -165,21 +165,18 @@ class Surface:
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
 
-    def _conserves(self, albedo: DirectionalTable) -> bool:
-        """Whether a reflector gains no light, up to the horizon."""
-        if albedo.values.max() > self._limit:
-            return False
-        lights = self._lights(albedo.wavelengths, GRAZING, albedo.grid.phi)
-        largest = max(light().sent(self._ones, self._ones).max() for light in lights)
-        return bool(largest <= self._limit)
+    def _albedo(self, wavelength_range: tuple[float, float]) -> tuple[DirectionalTable, float]:
+        """Return the albedo of a reflector as it is, and its largest value up to the horizon.
 
-    def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
-        """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
+        It has fewer directions and wavelengths than its scale.
+        """
         coarse = self._grid.half
         wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
-        lights = self._lights(wavelengths, coarse.theta, coarse.phi)
-        albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
-        return DirectionalTable(wavelengths, np.stack(albedos))
+        theta = np.concatenate([coarse.theta, GRAZING])
+        lights = self._lights(wavelengths, theta, coarse.phi)
+        albedos = np.stack(parallel(lambda light: light().sent(self._ones, self._ones)[0], lights))
+        table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
+        return table, float(albedos.max())
 
     def _solved(self, light: ScatteredLight) -> tuple[Array, Array]:
         """Find c and s at the grid's directions."""
@@ -226,9 +223,10 @@ class Surface:
         return c, s
 
 
-def spread(wavelength_range: tuple[float, float], count: int) -> Real:
-    """Wavelengths (nm) evenly in their logarithm, or the only one."""
+def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) -> Real:
+    """Wavelengths (nm) evenly in their logarithm, `count` in an octave or more, or the only one."""
     low, high = wavelength_range
+    count = max(math.ceil(count * min(math.log2(high / low), 1.0)), least)
     return np.geomspace(low, high, count if high > low else 1)
 
 

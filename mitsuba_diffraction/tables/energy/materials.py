@@ -100,6 +100,10 @@ class Dielectric:
             paths.insert(0, Returned(None, model, sheet=n))
         return [paths] * len(wavelengths)
 
+    def phase(self, wavelength_range: tuple[float, float]) -> float:
+        """Return 0: no film is on the interface."""
+        return 0.0
+
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this dielectric from another material."""
         return [self.index, self.model, self.thin]
