@@ -49,7 +49,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         "model": str(rng.choice(["small_slope", "kirchhoff"])),
         "wavelength": float(rng.uniform(400.0, 700.0)),
     }
-    if rng.random() < 0.5:
+    if rng.random() < 0.3:
         chosen["lateral_scale"] = log_uniform(rng, 0.2, 2.0)
     if rng.random() < 0.3:
         chosen["coherence"] = "patch"
