@@ -35,6 +35,9 @@ from .symbols import (
 )
 
 
+OWN_FILES.add(__file__)
+
+
 @dataclass
 class Program:
     """Functions in a dialect, those that a function calls before it.
@@ -264,7 +267,7 @@ def _local_names(scope: Scope) -> Iterator[None]:
                 _name(scope, name, value, own)
 
     folder = Path(__file__).parent
-    formula_files = {str(file) for file in folder.glob("*.py")} - {__file__, *OWN_FILES}
+    formula_files = {str(file) for file in folder.glob("*.py")} - OWN_FILES
     before = sys.getprofile()
     sys.setprofile(on_return)
     try:
