@@ -34,7 +34,6 @@ from .symbols import (
     scopes,
 )
 
-
 OWN_FILES.add(__file__)
 
 
