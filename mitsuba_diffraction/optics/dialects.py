@@ -58,7 +58,7 @@ vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
             "filter common partition noise texture entry discard switch case default sizeof "
             "cast namespace using this union enum typedef template packed goto inline "
             "volatile public static extern external interface long short double unsigned "
-            "superp plus times inverse_of elevations turn_of"
+            "superp plus times inverse_of"
         ).split()
     ),
 )  # fmt: skip

@@ -91,7 +91,10 @@ class Printer:
             first._count(symbol)
         first._body(ready, [name for _, name in stored])
         early = [p for p in parameters if id(p) not in kept]
-        values = "".join(f"{self._dialect.types[kind]} {name};\n" for kind, name in stored)
+        by_kind: dict[str, list[str]] = {}
+        for kind, name in stored:
+            by_kind.setdefault(self._dialect.types[kind], []).append(name)
+        values = "".join(f"{kind} {', '.join(words)};\n" for kind, words in by_kind.items())
         text = first._written(names[0], "void", early, [], f"Prepare `{names[1]}`.")
         second = Printer(self._scope)
         second._variables = {id(s): name for s, (_, name) in zip(ready, stored, strict=True)}

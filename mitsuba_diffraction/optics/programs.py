@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from types import FrameType
 from typing import Any
 
+from ..errors import DiffractionError
 from . import arithmetic
 from .dialects import Dialect
 from .printer import Function, Printer
@@ -39,12 +40,15 @@ from .symbols import (
 class Program:
     """Functions in a dialect, those that a function calls before it.
 
+    declared : names that the rest of the shader declares: uniforms, functions, macros.
     complex_numbers : whether a function has complex numbers; their operations then come first.
     """
 
     dialect: Dialect
+    declared: frozenset[str] = frozenset()
     functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
     complex_numbers: bool = False
+    _owners: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
     def add(
         self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
@@ -63,8 +67,10 @@ class Program:
         Raises
         ------
         DiffractionError
-            If the formula cannot be written, with its line.
+            If the formula cannot be written, with its line, or if the shader declares the name.
         """
+        name = name or formula.__name__.lstrip("_")
+        self._check_name(formula, name)
         return self._add(formula, arguments, name, comment)
 
     def _add(
@@ -79,11 +85,26 @@ class Program:
         formula = getattr(formula, "__wrapped__", formula)
         key = (formula, name, all_parameters, *map(_key, arguments))
         if key not in self.functions:
-            scope = Scope(self, formula, name or formula.__name__.lstrip("_"))
+            scope = Scope(
+                self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
+            )
             parameters, result = scope.run(arguments)
             printer = Printer(scope, all_parameters)
             self.functions[key] = printer.function(parameters, result, comment or _comment(formula))
         return self.functions[key]
+
+    def _check_name(self, formula: Callable[..., Any], name: str) -> None:
+        """Refuse a name that is not this formula's alone."""
+        if self._free_name(formula, name) != name:
+            raise DiffractionError(f"the shader already declares the name {name}; choose another")
+
+    def _free_name(self, formula: Callable[..., Any], name: str) -> str:
+        """Return a name that neither the rest of the shader nor another formula has."""
+        formula = getattr(formula, "__wrapped__", formula)
+        taken = self.declared | self.dialect.reserved
+        while name in taken or self._owners.setdefault(name, formula) is not formula:
+            name += "_"
+        return name
 
     def add_staged(
         self,
@@ -102,6 +123,8 @@ class Program:
         late : parameters of the second function; the others are those of the first.
         names : of both functions.
         """
+        for name in names:
+            self._check_name(formula, name)
         scope = Scope(self, formula, names[1])
         parameters, result = scope.run(arguments)
         first, second = Printer(scope).staged(parameters, result, late, names, _comment(formula))
@@ -173,7 +196,8 @@ class Scope:
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.dialect.reserved or name in {self.name, *self.callees}:
+        macro = name.isupper() and name in self.program.declared
+        if macro or name in self.dialect.reserved or name in {self.name, *self.callees}:
             name += "_"
         numbered, n = name, 1
         while numbered in self.taken:
@@ -191,12 +215,11 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
         parameters.append(symbol)
         return symbol if argument != "vector" else components_of(scope, symbol)
     if isinstance(argument, tuple):
-        fields = getattr(argument, "_fields", None) or [f"{name}{n}" for n in range(len(argument))]
+        fields = getattr(argument, "_fields", range(len(argument)))
         parts = [
-            _parameter(scope, f"{name}_{field}" if hasattr(argument, "_fields") else field, part,
-                       parameters)
+            _parameter(scope, _word(name, argument, field), part, parameters)
             for field, part in zip(fields, argument, strict=True)
-        ]  # fmt: skip
+        ]
         return like(argument, parts)
     return argument
 
@@ -260,6 +283,13 @@ def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
     elif isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))
         for suffix, part in zip(fields, value, strict=True):
-            word = f"{name}_{suffix}" if isinstance(suffix, str) else f"{name}{suffix}"
+            word = _word(name, value, suffix)
             if not (isinstance(part, Symbol) and part.name):
                 _name(scope, word, part, own)
+
+
+def _word(name: str, record: tuple[Any, ...], field: str | int) -> str:
+    """Return the name of a tuple's part; `cos_i` of `geometry`, a record called after its class."""
+    if isinstance(field, int):
+        return f"{name}{field}"
+    return field if name == type(record).__name__.lower() else f"{name}_{field}"

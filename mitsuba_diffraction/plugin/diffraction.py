@@ -116,7 +116,8 @@ film_ior : float or string [none]
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
     above it. The index over that of the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
-    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01.
+    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01,
+    or 0.001 of thick films. Derivatives with respect to the film include it.
 film_thickness : float ∂ [none]
     Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
     coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.
@@ -146,7 +147,7 @@ energy_conserving : boolean [true]
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
     first time and is cached. It is interpolated over height_scale: an optimisation waits when it
     enters a new interval. For its derivative, enable that of height_scale before
-    parameters.update().
+    parameters.update(). Derivatives with respect to indices and films hold it constant.
 shadowing : string [none]
     `vcavity`: shadowing of long V-shaped grooves (Torrance and Sparrow 1967); `none`.
 

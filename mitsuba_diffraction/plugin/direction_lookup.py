@@ -34,22 +34,31 @@ class DirectionLookup:
         self._pages = self._polar = self._azimuthal = 1
 
     def update(
-        self, tables: list[DirectionalTable] | None, nodes: list[float], scales: ScaleRange
+        self,
+        tables: list[DirectionalTable] | None,
+        nodes: list[float],
+        scales: ScaleRange,
+        slopes: Sequence[tuple[Float, list[DirectionalTable]]] = (),
     ) -> None:
-        """Take the tables at evenly spaced height scales, or none."""
+        """Take the tables at evenly spaced height scales, or none.
+
+        slopes : differentiable numbers, and derivatives of the tables with respect to them.
+        """
         self.present = tables is not None
         if tables is None:
             return
         height_scale, varies = scales.height_scale, scales.varies
-        maps = np.stack([_cells(table, scales.centre) for table in tables])
+        maps = _maps(tables, scales.centre)
+        rates = [(number, _maps(rate, scales.centre)) for number, rate in slopes]
         self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
             share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-            self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
+            here = [(x, rate[0] * (1 - share) + rate[1] * share) for x, rate in rates]
+            self._values = _attached(maps[0] * (1 - share) + maps[1] * share, here)
         # Where there is but one node nothing varies with the height scale
-        self._nodes = upload(mi.Float, maps) if varies or width > 0.0 else None
+        self._nodes = _attached(maps, rates) if varies or width > 0.0 else None
         wavelengths = tables[0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
@@ -138,6 +147,20 @@ def between(
     width = nodes[1] - nodes[0]
     share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
+
+
+def _attached(values: Array, slopes: Sequence[tuple[Float, Array]]) -> Buffer:
+    """Upload values that have these derivatives with respect to differentiable numbers."""
+    buffer = upload(mi.Float, values)
+    for number, rate in slopes:
+        buffer += (number - dr.detach(number)) * upload(mi.Float, rate)
+    dr.eval(buffer)
+    return buffer
+
+
+def _maps(tables: list[DirectionalTable], stretch: float) -> Array:
+    """Cells of tables, see `_cells`."""
+    return np.stack([_cells(table, stretch) for table in tables])
 
 
 def _cells(table: DirectionalTable, stretch: float) -> Array:

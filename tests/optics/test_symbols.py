@@ -51,9 +51,9 @@ def test_functions_and_variables_keep_their_names() -> None:
     text = printed(both, "vector", Ends("float", "float"), "float")
     assert "// Return a real and a complex number, eq. 1.\n" in text
     assert "More words" not in text
-    assert "void both(vec3 wi, float ends_low, float ends_high, float index," in text
+    assert "void both(vec3 wi, float low, float high, float index," in text
     assert "float length_ = sqrt(max(wi.x * wi.x + wi.z * wi.z, 1e-20));" in text
-    assert "bool steep = length_ > ends_low && wi.z < ends_high;" in text
+    assert "bool steep = length_ > low && wi.z < high;" in text
     # a formula is a function, before those that call it, once for all of its calls
     assert text.index("float halved(float z)") < text.index("void both(")
     assert text.count("float halved(") == 1
@@ -65,7 +65,7 @@ def test_complex_and_real_formulas_are_two_functions_of_one_name() -> None:
     assert "vec2 halved(vec2 z)" in text
     osl = printed(both, "vector", Ends("float", "float"), "complex", dialect=OSL)
     assert "md_number halved(md_number z)" in osl
-    assert "int steep = length_ > ends_low && wi[2] < ends_high;" in osl
+    assert "int steep = length_ > low && wi[2] < high;" in osl
 
 
 def test_an_expression_is_computed_once() -> None:
@@ -158,3 +158,31 @@ def test_squares_and_kinds() -> None:
 
     assert "return z.x * z.x + z.y * z.y;" in printed(of_kind, "complex")
     assert "return z;" in printed(of_kind, "float")
+
+
+def test_names_that_the_shader_declares_are_no_functions() -> None:
+    program = Program(GLSL, frozenset({"halved", "GAIN"}))
+    with pytest.raises(DiffractionError, match="already declares the name halved"):
+        program.add(halved, "float")
+
+    def of_gain(GAIN: Any) -> Any:
+        return halved(GAIN)
+
+    program.add(of_gain, "float")
+    assert "float halved_(float z)" in program.text
+    assert "float of_gain(float GAIN_)" in program.text
+    assert "return halved_(GAIN_);" in program.text
+
+
+def test_formulas_of_one_name_are_two_functions() -> None:
+    def outer(x: Any) -> Any:
+        return halved(x) + doubled(x)
+
+    def double(x: Any) -> Any:
+        return 2.0 * x
+
+    double.__name__ = "halved"
+    doubled = formula(double)
+    text = printed(outer, "float")
+    assert "return halved(x) + halved_(x);" in text
+    assert "return 2.0 * x;" in text

@@ -82,7 +82,7 @@ def test_pictures_agree_with_mitsuba(tmp_path, grating):
     for name, shape, light, source, inputs, beneath in (
         ("disc", "disk", "lamp", grating, {"Rotation (°)": -90.0}, {}),
         ("grating", "rectangle", "sky", grating, {}, {}),
-        ("scale", "sphere", "sky", scale, {"Pigment": [0.1, 0.05, 0.02]}, {"nested": pigment}),
+        ("skin", "sphere", "sky", scale, {"Pigment": [0.1, 0.05, 0.02]}, {"nested": pigment}),
     ):
         bsdf = exported(source, tmp_path / name, name)
         tangent = "radial-z" if shape == "disk" else "uv"

@@ -97,6 +97,8 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     """Return what makes a command small."""
     if "--import" in rest or (command == "export-shader" and rest[0].endswith(".nc")):
         return []  # as small as its file
+    if any(word.startswith("--theta") for word in rest) and command == "solve":
+        return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
     # a sheet has a material that light goes through
     return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
@@ -130,6 +132,7 @@ def small_tree(folder: Path) -> Path:
         shutil.copy(folder / "scan.spm", folder / name)
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
+    (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
         for program in blocks("docs/orders.md", "python"):

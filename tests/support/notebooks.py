@@ -95,7 +95,7 @@ SMALLER = {
     },
     "solved_orders": {
         "spp=256": "spp=8",
-        "wavelengths=(480.0, 640.0), tolerance=0.02": "wavelengths=(560.0, 640.0), tolerance=0.2",
+        "tolerance=0.02": "tolerance=0.2",
     },
     "speed_and_accuracy": {
         "pixels=240": "pixels=128",

@@ -20,7 +20,8 @@ packing        tables as textures
 texels         textures, uniforms and definitions that a shader reads; packing of numbers
 methods        tables and programs of each method, also of the thesis' methods
 formulas       formulas of optics that a shader calls, as functions in GLSL
-source         text of the shaders; removal of unused code, and prefixed names
+source         text of the shaders, by method and surface
+rewriting      files of shaders; removal of unused code, and prefixed names, for other programs
 context        OpenGL without a window: programs, textures, framebuffers
 timing         time per fragment
 viewer         a window on a scene with a panel (extra `view`)

@@ -21,7 +21,8 @@ from .maps import Map
 from .materials import GLSL, Diffracting, Material, pack_conservation, pack_surface, packed_by
 from .methods import CONSUMERS
 from .packing import pack_responses
-from .source import global_names, method_files, part, pruned, renamed, resolved, shader_file
+from .rewriting import global_names, pruned, renamed, resolved, shader_file
+from .source import method_files, part
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that can be exported, and the names of their functions.

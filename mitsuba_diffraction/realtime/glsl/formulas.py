@@ -32,6 +32,7 @@ from ...optics.orders import (
 )
 from ...optics.programs import Program
 from ...optics.second_order import added_power
+from .rewriting import declared_names
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
@@ -59,7 +60,7 @@ def formulas(definitions: Mapping[str, str]) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
-    program = Program(GLSL)
+    program = Program(GLSL, declared_names())
     program.add(encoded_colour, "vector")
     if "DISPLAYED" in names:
         shown = shown_colour if "NATURAL" in names else encoded_colour

@@ -101,7 +101,7 @@ def pack_method(method: Method) -> Packed:
     steps = np.diff(method.wavelengths)
     return Packed(
         textures=(
-            listed("amplitudes", as_half(texels(series))),
+            listed("series_amplitudes", as_half(texels(series))),
             listed("amplitude_zero", texels(zero)),
         ),
         uniforms={

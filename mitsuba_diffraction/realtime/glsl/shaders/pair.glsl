@@ -11,8 +11,8 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     float outside = area * ratio * ratio / wi.z;
     vec2 there = vec2(1.0), back = vec2(1.0);
 #ifdef COATED
-    there = transmittances(wi.z);
-    back = transmittances(wo.z);
+    there = face_transmittances(wi.z);
+    back = face_transmittances(wo.z);
     float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     float leaving = wo.z;
     wi = refracted(wi, coat);

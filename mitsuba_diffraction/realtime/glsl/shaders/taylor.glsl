@@ -3,7 +3,7 @@
 
 #define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
 
-uniform sampler2D amplitudes;       // TEXELS texels per bin: real and imaginary part of two terms
+uniform sampler2D series_amplitudes; // TEXELS texels per bin: real and imaginary part of two terms
 uniform sampler2D amplitude_zero;   // series of order 0, minus 1
 uniform sampler2D responses;        // linear sRGB / 2π over k, one row per light
 uniform ivec2 last_order;
@@ -85,7 +85,7 @@ float window_power(vec2 uv, float z, float wavelength)
         float across = kernel(place.y - float(first.y + j), exponents.y);
         for (int i = 0; i < TAPS_X; ++i) {
             int texel = ((corner.y + j) * size.x + corner.x + i) * TEXELS;
-            vec2 value = series(amplitudes, texel, weights) * inverse_scale;
+            vec2 value = series(series_amplitudes, texel, weights) * inverse_scale;
             float share = across * kernel(place.x - float(first.x + i), exponents.x);
             amplitude += share * value;
             power += share * dot(value, value);
