@@ -162,7 +162,7 @@ class TableSettings:
     """
 
     coherence_width: str | float = _setting(
-        "auto", _width, "µm over which the light is coherent, 4σ of its amplitude window; auto is 65",
+        "auto", _width, "µm over which the light is coherent, 4σ of its window; auto is 65",
         f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
         metavar="auto|W", type=str,
     )  # fmt: skip

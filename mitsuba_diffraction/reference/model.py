@@ -18,14 +18,14 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
 
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
-over positions of the window (Stam 1999, eq. 7–12). Order 0, the mirror, is known from any patch: it
-has the light's own window σ₀ ≥ σ, where a scan is too small for other orders of that width. K is Kirchhoff's tangent plane: Fresnel's r_s,
-r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
-d. Rows and columns of J are s and p, outgoing and incoming. B is first-order small slope (Rice
-1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend on directions and
-index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and across q_j, slopes
-filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays (n,) as in `Light`.
-coat.py, film.py and transmission.py wrap this.
+over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
+window has the light's σ₀; a small scan limits σ of other orders alone. K is Kirchhoff's tangent
+plane: Fresnel's r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|,
+p = d×s of light along d. Rows and columns of J are s and p, outgoing and incoming. B is first-order
+small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
+on directions and index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and
+across q_j, slopes filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays
+(n,) as in `Light`. coat.py, film.py and transmission.py wrap this.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ from hypothesis import given
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.coherence import (
-    USUAL_WIDTH,
     repeats,
     resolved,
     resolved_width,
@@ -17,7 +16,7 @@ from mitsuba_diffraction.heights.coherence import (
     window_warning,
 )
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.settings import USUAL_WIDTH, TableSettings
 
 SIDES = st.integers(2, 40)
 PIXELS = st.floats(0.01, 20.0)
