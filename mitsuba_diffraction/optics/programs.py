@@ -15,24 +15,23 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from ..errors import DiffractionError
 from . import arithmetic
 from .dialects import Dialect
-from .printer import Function, Printer
+from .printer import Function, Printer, record_of
 from .symbols import (
+    OWN_FILES,
     Symbol,
+    argument_of,
     components_of,
     current,
     kind_of,
-    kinds_of,
-    leaves_of,
-    like,
     refuse,
     scopes,
-    structured,
 )
 
 
@@ -79,18 +78,16 @@ class Program:
         arguments: tuple[Any, ...],
         name: str = "",
         comment: str = "",
-        *,
-        all_parameters: bool = True,
     ) -> Function:
         formula = getattr(formula, "__wrapped__", formula)
-        key = (formula, name, all_parameters, *map(_key, arguments))
+        key = (formula, name, *map(_key, arguments))
         if key not in self.functions:
             scope = Scope(
                 self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
             )
             parameters, result = scope.run(arguments)
-            printer = Printer(scope, all_parameters)
-            self.functions[key] = printer.function(parameters, result, comment or _comment(formula))
+            words = comment or _comment(formula)
+            self.functions[key] = Printer(scope).function(parameters, result, words)
         return self.functions[key]
 
     def _check_name(self, formula: Callable[..., Any], name: str) -> None:
@@ -167,11 +164,9 @@ class Scope:
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Write a call of another formula, and the formula itself if it is new."""
-        function = self.program._add(formula, tuple(map(kind_of, values)), all_parameters=False)
-        leaves = [leaf for value in values for leaf in leaves_of(value)]
-        leaves = [leaf for leaf, used in zip(leaves, function.used, strict=True) if used]
-        results = self.call(function.name, leaves, list(kinds_of(function.result)))
-        return structured(function.result, iter(results))
+        function = self.program._add(formula, tuple(map(kind_of, values)))
+        results = self.call(function.name, [argument_of(v) for v in values], function.kinds)
+        return results[0] if function.record is None else function.record(results)
 
     def call(self, name: str, arguments: Sequence[Any], kinds: Sequence[str]) -> list[Any]:
         """Return the results of a function; a vector as its components."""
@@ -220,7 +215,7 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
             _parameter(scope, _word(name, argument, field), part, parameters)
             for field, part in zip(fields, argument, strict=True)
         ]
-        return like(argument, parts)
+        return record_of(argument)(parts)
     return argument
 
 
@@ -250,7 +245,8 @@ def _active(scope: Scope) -> Iterator[None]:
 
 def _emitted(formula: Callable[..., Any], values: tuple[Any, ...]) -> Any:
     """Call a formula from within another: write a call if a symbol is among its arguments."""
-    if not any(isinstance(leaf, Symbol) for value in values for leaf in leaves_of(value)):
+    parts = [part for value in values for part in (value if isinstance(value, tuple) else [value])]
+    if not any(isinstance(part, Symbol) for part in parts):
         return formula(*values)
     return current().called(formula, values)
 
@@ -262,11 +258,13 @@ def _local_names(scope: Scope) -> Iterator[None]:
     def on_return(frame: FrameType, event: str, _: Any) -> None:
         if event != "return" or scopes[-1:] != [scope]:
             return
-        own = frame.f_code is scope.formula.__code__
-        if own or frame.f_code.co_filename == scope.formula.__code__.co_filename:
+        own, file = frame.f_code is scope.formula.__code__, frame.f_code.co_filename
+        if own or file == scope.formula.__code__.co_filename or file in formula_files:
             for name, value in frame.f_locals.items():
                 _name(scope, name, value, own)
 
+    folder = Path(__file__).parent
+    formula_files = {str(file) for file in folder.glob("*.py")} - {__file__, *OWN_FILES}
     before = sys.getprofile()
     sys.setprofile(on_return)
     try:
@@ -278,8 +276,10 @@ def _local_names(scope: Scope) -> Iterator[None]:
 def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
     """Name a symbol, or the parts of a tuple; own : a variable of the formula itself."""
     if isinstance(value, Symbol):
-        if value.scope is scope and (own or value.name is None):
+        if value.scope is scope and own:
             value.name = name
+        elif value.scope is scope and value.hint is None:
+            value.hint = name
     elif isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))
         for suffix, part in zip(fields, value, strict=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import linecache
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeAlias
@@ -43,17 +43,19 @@ class Symbol:
     ----------
     kind : one of `KINDS`.
     operation, parts : operator or function, and its operands; "name" and its text for a variable.
-    name : of the variable that holds the value in the formula.
+    name, hint : of the variable that holds the value in the formula, and in a function that the
+        formula runs.
     scope : function that the expression belongs to, None where it is known everywhere.
     """
 
-    __slots__ = ("kind", "name", "operation", "parts", "scope")
+    __slots__ = ("hint", "kind", "name", "operation", "parts", "scope")
 
     def __init__(
         self, kind: str, operation: str, parts: tuple[Any, ...], scope: Scope | None = None
     ) -> None:
         self.kind, self.operation, self.parts, self.scope = kind, operation, parts, scope
         self.name: str | None = None
+        self.hint: str | None = None
 
     def __add__(self, other: Any) -> Any:
         return self if _is(other, 0.0) else _node("+", self, other)
@@ -298,14 +300,7 @@ def components_of(scope: Scope, vector: Symbol) -> tuple[Any, ...]:
     return tuple(scope.expression("float", axis, (vector,)) for axis in "xyz")
 
 
-def like(structure: tuple[Any, ...], parts: Iterable[Any]) -> Any:
-    """Return parts in a tuple of a structure's type."""
-    if hasattr(structure, "_make"):
-        return structure._make(parts)
-    return tuple(parts)
-
-
-def _vector(value: Any) -> bool:
+def is_vector(value: Any) -> bool:
     """Whether a value is three real numbers that are a direction or a colour."""
     return (
         type(value) is tuple and len(value) == 3
@@ -314,22 +309,18 @@ def _vector(value: Any) -> bool:
     )  # fmt: skip
 
 
-def kind_of(value: Any) -> Any:
-    """Return the kind of a value as `Program.add` takes it."""
+def kind_of(value: Any) -> str:
+    """Return the kind of an argument or a result of a function."""
     if isinstance(value, Symbol):
         return value.kind
-    if isinstance(value, int | float):
-        return "float"
-    if _vector(value):
-        return "vector"
-    if isinstance(value, tuple):
-        return like(value, map(kind_of, value))
-    return value
+    if not (isinstance(value, int | float) or is_vector(value)):
+        refuse(f"{value!r} is no number")
+    return "vector" if isinstance(value, tuple) else "float"
 
 
 def argument_of(value: Any, scope: Scope | None = None) -> Any:
     """Return three components as a vector, and other numbers as they are."""
-    if not _vector(value):
+    if not is_vector(value):
         return value
     scope = scope or current()
     first = value[0]
@@ -338,26 +329,3 @@ def argument_of(value: Any, scope: Scope | None = None) -> Any:
         if all(v is c for v, c in zip(value, components_of(scope, vector), strict=True)):
             return vector
     return scope.expression("vector", "vector", value)
-
-
-def leaves_of(value: Any, scope: Scope | None = None) -> Iterator[Any]:
-    """Return the numbers and vectors of a value that are arguments of a function, or results."""
-    if isinstance(value, Symbol | int | float) or _vector(value):
-        yield argument_of(value, scope)
-    elif isinstance(value, tuple):
-        for part in value:
-            yield from leaves_of(part, scope)
-
-
-def kinds_of(structure: Any) -> Iterator[str]:
-    if isinstance(structure, str):
-        yield structure
-    else:
-        for part in structure:
-            yield from kinds_of(part)
-
-
-def structured(structure: Any, values: Iterator[Any]) -> Any:
-    if isinstance(structure, str):
-        return next(values)
-    return like(structure, [structured(part, values) for part in structure])

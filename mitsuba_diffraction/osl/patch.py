@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from ..optics.boundary import Model
-from ..optics.coat import pair_power
-from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
-from ..optics.programs import Program
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
 from ..tables.powers import order_0_power
@@ -201,28 +197,6 @@ def patch_constants(
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
     }
-
-
-def patch_formulas(model: Model | None) -> str:
-    """Return the functions of `optics` that `shaders/patch.osl` calls.
-
-    model : of the boundary; None of a perfect reflector.
-
-    Raises a DiffractionError if the model's formula cannot be written in OSL.
-    """
-    program = Program(OSL)
-    jones = None if model is None else model.jones
-    program.add(
-        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
-    )
-    flat = reflectance if model is not None else _everything
-    program.add(flat, "float", "complex", name="flat_reflectance")
-    return program.text
-
-
-def _everything(cosine: Any, index: Any) -> float:
-    """Return the reflectance of a perfect reflector."""
-    return 1.0
 
 
 def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
