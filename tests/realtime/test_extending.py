@@ -21,6 +21,8 @@ from tests.support.languages import emitted, shaded
 from tests.support.pages import blocks
 from tests.support.variants import obstacle
 
+pytestmark = pytest.mark.thorough  # a browser, Blender, and a table
+
 PAIRS = pairs(64**2)
 SOURCE = blocks("docs/extending.md", "python")[0]
 
@@ -70,7 +72,6 @@ def test_osl(model: Model, tmp_path: Path) -> None:
         check(found, exact(model, index))
 
 
-@pytest.mark.thorough
 def test_page(tab: Any, model: Model, tmp_path: Path) -> None:
     import mitsuba as mi
 
