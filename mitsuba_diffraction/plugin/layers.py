@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ..optics.arithmetic import is_complex
-from ..optics.coat import refracted
+from ..optics.coat import coated_reflectance, cosine_within, refracted
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.fresnel import Filmed, reflectance
 from ..optics.geometry import wavenumber
@@ -60,14 +60,10 @@ class UnderCoat:
         self.changeable = (*material.changeable, *coat.changeable)
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """1 − T T / (1 − R R) of coat and material, for the cosine of the angle outside."""
-        n = self.coat.eta
-        inside = dr.sqrt(dr.maximum(dr.fma(cos_theta, cos_theta, n * n - 1.0), 1e-12)) / n
+        """Reflectance of coat and material together, for the cosine of the angle outside."""
         face = self.coat.reflectance(cos_theta, si, active)
-        beneath = self.material.reflectance(inside, si, active)
-        through = (1.0 - face) * (1.0 - beneath)
-        # Mirrors that reflect everything let nothing through
-        return 1.0 - through * dr.rcp(dr.maximum(1.0 - face * beneath, 1e-6))
+        inside = cosine_within(cos_theta, self.coat.eta)
+        return coated_reflectance(face, self.material.reflectance(inside, si, active))
 
     def traverse(self, callback: Callback) -> None:
         """Expose the material's index, and the coat's over that of the medium above it."""

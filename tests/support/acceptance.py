@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.materials import TISSUES
+from mitsuba_diffraction.optics.materials import SODIUM, TISSUES
 from tests.support.directions import Array, rough_patch
 
 ANGLES, LIGHT, AZIMUTH, ACCEPTANCE = (0.0, 35.0), 20.0, 30.0, 5.0
@@ -19,6 +19,7 @@ def _parts(name, lam):
     return {"eta": float(index.real), "k": float(index.imag)}
 
 
+WET = _parts("water", SODIUM)["eta"]
 #: Parameters of a BSDF by name, and those of the reference at a wavelength in nm.
 MATERIALS = {
     "dielectric": ({"int_ior": 1.5}, lambda lam: {"eta": 1.5}),
@@ -26,7 +27,11 @@ MATERIALS = {
     "melanin": ({"material": "melanin"}, lambda lam: _parts("melanin", lam)),
     "wet keratin": (
         {"material": "keratin", "coat_ior": "water"},
-        lambda lam: {**_parts("keratin", lam), "coat": _parts("water", lam)["eta"]},
+        # light's path in the coat has water's index at sodium's line, the contrast that at lam
+        lambda lam: {
+            "eta": _parts("keratin", lam)["eta"] * WET / _parts("water", lam)["eta"],
+            "coat": WET,
+        },
     ),
 }
 
