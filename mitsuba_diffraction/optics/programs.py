@@ -34,6 +34,8 @@ from .symbols import (
     scopes,
 )
 
+OWN_FILES.add(__file__)
+
 
 @dataclass
 class Program:
@@ -264,7 +266,7 @@ def _local_names(scope: Scope) -> Iterator[None]:
                 _name(scope, name, value, own)
 
     folder = Path(__file__).parent
-    formula_files = {str(file) for file in folder.glob("*.py")} - {__file__, *OWN_FILES}
+    formula_files = {str(file) for file in folder.glob("*.py")} - OWN_FILES
     before = sys.getprofile()
     sys.setprofile(on_return)
     try:

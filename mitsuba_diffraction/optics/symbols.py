@@ -302,20 +302,20 @@ def components_of(scope: Scope, vector: Symbol) -> tuple[Any, ...]:
 
 def is_vector(value: Any) -> bool:
     """Whether a value is three real numbers that are a direction or a colour."""
-    return (
-        type(value) is tuple and len(value) == 3
-        and all(isinstance(v, int | float) or kind_of(v) == "float" for v in value)
-        and any(isinstance(v, Symbol) for v in value)
-    )  # fmt: skip
+    if type(value) is not tuple or len(value) != 3:
+        return False
+    return all(isinstance(v, int | float) or getattr(v, "kind", "") == "float" for v in value)
 
 
 def kind_of(value: Any) -> str:
     """Return the kind of an argument or a result of a function."""
     if isinstance(value, Symbol):
         return value.kind
-    if not (isinstance(value, int | float) or is_vector(value)):
+    if is_vector(value):
+        return "vector"
+    if not isinstance(value, int | float):
         refuse(f"{value!r} is no number")
-    return "vector" if isinstance(value, tuple) else "float"
+    return "float"
 
 
 def argument_of(value: Any, scope: Scope | None = None) -> Any:

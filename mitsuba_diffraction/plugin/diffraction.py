@@ -64,9 +64,10 @@ height_scale_max : float [of a bitmap]
 The table
 ---------
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto` is the
-    width of the table or the recipe, else 65 (sunlight), or the smaller side of a narrower scan: a
-    wider window shows the scan's repetition as a grating. Patches that repeat exactly keep 65.
+    Width over which light is coherent, µm, 4σ of its Gaussian amplitude window. `auto` is the width
+    of the table or the recipe, else 65 (sunlight). The mirror direction (order 0) has it from any
+    scan. Other orders of a scan have a window as wide as the scan's smaller side at most: a wider
+    one would show its repetition as a grating. Patches that repeat exactly set no limit.
 coherence : string [ensemble]
     `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
     `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the

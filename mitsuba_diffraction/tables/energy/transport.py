@@ -60,7 +60,8 @@ class Orders:
         densest: float = 1.0,
         finer: int = 1,
     ) -> None:
-        self.sigma, self.roughness, self.height_scale = table.sigma, table.roughness, height_scale
+        self.sigma, self.sigma_0 = table.sigma, table.sigma_0
+        self.roughness, self.height_scale = table.roughness, height_scale
         self.densest, settings = densest, energy_settings()
         longest = float(wavenumber(table.wavelength_range[0]))
         rings, steps = finer * settings.rings, finer * settings.steps
@@ -115,6 +116,7 @@ class Transport:
         self._k = above * path.left.index  # where the light goes to
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
+        self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
         self._shares = self._order_0_shares(theta, grid)
         self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
         self._others: list[Callable[[Array], Array]] = []
@@ -150,7 +152,7 @@ class Transport:
         The distance of a Gaussian lobe's directions from the normal has Rice's distribution. In
         cosθo, since d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon.
         """
-        cos_i, sine, width, path = *self._start(theta[:, None]), self._width, self._path
+        cos_i, sine, width, path = *self._start(theta[:, None]), self._width_0, self._path
         low = np.clip(sine - _LOBE * width, 0.0, 1.0)
         high = np.minimum(sine + _LOBE * width, 1.0)
         first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
