@@ -134,7 +134,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     table = table_of(scan)
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
-    row["coherence_width_um"] = table.coherence_width
+    row |= {"coherence_width_um": table.coherence_width, "window_width_um": table.window_width}
     row["tiling"] = REPEATS if table.source.get("repeats") else ""
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]

@@ -28,6 +28,8 @@ BANDS, BANDED = 4, 0.75
 _EVEN = 0.1
 #: Orders 0 over κ.
 ORDER_0_NODES = 256
+#: Width of the window of a patch that sets no limit, µm.
+_UNLIMITED = 1e9
 #: Width of the texture of draws, a power of 2: coordinates of its pixels are exact.
 DRAWS_WIDTH = 1024
 
@@ -190,6 +192,7 @@ def patch_constants(
         "DRAWS_ROWS": textures.rows,
         "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
+        "SCAN_WIDTH": table.settings.window_width or _UNLIMITED,
         "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},

@@ -64,9 +64,10 @@ height_scale_max : float [of a bitmap]
 The table
 ---------
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto` is the
-    width of the table or the recipe, else 65 (sunlight), or the smaller side of a narrower scan: a
-    wider window shows the scan's repetition as a grating. Patches that repeat exactly keep 65.
+    Width over which light is coherent, µm, 4σ of its Gaussian amplitude window. `auto` is the width
+    of the table or the recipe, else 65 (sunlight). The mirror direction (order 0) has it from any
+    scan. Other orders of a scan have a window as wide as the scan's smaller side at most: a wider
+    one would show its repetition as a grating. Patches that repeat exactly set no limit.
 coherence : string [ensemble]
     `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
     `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the
@@ -260,10 +261,8 @@ class Diffraction(DiffractingSurface):
         self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
         self.layering, self.vcavity = read.layering, read.vcavity
         self._second_order = read.second_order
-        self._energy = None
-        if read.scales_energy:
-            mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
+        mean, conserving = read.surface.mean_table, read.surface.energy_conserving
+        self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
         self.ready()
 
     # ------------------------------------------------------------------ the diffraction
@@ -321,7 +320,7 @@ class Diffraction(DiffractingSurface):
         value = self.lobe(ctx, site, pair, self.boundary, factor * power, active)
         if self.mirror is not None:
             value += self.face(ctx, site, pair.outer, self.mirror, active)
-        if self._energy is not None and self._energy.active_factors:
+        if self._energy.active_factors:
             # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
             value *= mi.Spectrum(self._energy.factor(pair, site.wavenumbers, site.scale))
         return value
@@ -329,7 +328,7 @@ class Diffraction(DiffractingSurface):
     def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
         """See `NestingBSDF.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._energy is not None and self._light_beneath:
+        if self._light_beneath:
             ratios = tuple(
                 self._energy.reflected(direction, site.frame, site.wavenumbers, site.scale)
                 for direction in (site.si.wi, wo)
@@ -373,8 +372,7 @@ class Diffraction(DiffractingSurface):
     def derive(self) -> None:
         """Compute what depends on the parameters: indices, scales of energy, the second order."""
         self.fresnel.derive()
-        if self._energy is not None:
-            self._energy.update(self.scale_range(), self._light_beneath)
+        self._energy.update(self.scale_range(), self._light_beneath)
         if self._second_order is not None:
             self._second_order.update()
         material = self.boundary.material
@@ -385,7 +383,7 @@ class Diffraction(DiffractingSurface):
             str(self.boundary),
             self.coat is None,
             self._second_order is None,
-            0 if self._energy is None else self._energy.active_factors,
+            self._energy.active_factors,
             # these choose other kernels
             getattr(material, "reflects_all", False),
             getattr(material, "channels", None),
@@ -410,7 +408,7 @@ class Diffraction(DiffractingSurface):
         energy, nested, second_order = None, None, None
         if self._second_order is not None and (ratios := self.table.slope_ratios) is not None:
             second_order = SecondOrder(self._second_order.index, ratios)
-        if self._energy is not None and self._energy.conserving | self._light_beneath:
+        if self._energy.conserving | self._light_beneath:
             energy = Energy(self._energy_scale, self._reflected_ratio)
         if self.nested is not None:
             blend = self.layering
@@ -427,17 +425,16 @@ class Diffraction(DiffractingSurface):
     @property
     def energy_conserving(self) -> bool:
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
-        return self._energy is not None and self._energy.conserving
+        return self._energy.conserving
 
     def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
-        """See `description.Energy.scale`."""
-        if self._energy is None or not self._energy.conserving or self.coat is not None:
-            return None
-        return self._energy.scale(height_scale)
+        """See `description.Energy.scale`; shaders have none under a coat, where it is near 1."""
+        shown = self._energy.conserving and self.coat is None
+        return self._energy.scale(height_scale) if shown else None
 
     def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.reflected`."""
-        if not self._light_beneath or self._energy is None:
+        if not self._light_beneath:
             return None
         return self._energy.ratio(height_scale)
 
