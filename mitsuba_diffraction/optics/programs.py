@@ -51,19 +51,15 @@ class Program:
     complex_numbers: bool = False
     _owners: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
-    def add(
-        self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
-    ) -> Function:
+    def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> Function:
         """Write a formula, and the formulas that it calls, as functions.
 
         Parameters
         ----------
         formula : function of this folder.
         arguments : of each parameter its kind ("float", "complex", "vector": three components), a
-            tuple of kinds, or else a value that is constant in the program, such as a function by
-            `supplied` or a symbol by `known`.
+            tuple of kinds, or else a value that is constant in the program.
         name : of the function; the formula's by default.
-        comment : of the function; the docstring's first paragraph by default.
 
         Raises
         ------
@@ -72,14 +68,10 @@ class Program:
         """
         name = name or formula.__name__.lstrip("_")
         self._check_name(formula, name)
-        return self._add(formula, arguments, name, comment)
+        return self._add(formula, arguments, name)
 
     def _add(
-        self,
-        formula: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        name: str = "",
-        comment: str = "",
+        self, formula: Callable[..., Any], arguments: tuple[Any, ...], name: str = ""
     ) -> Function:
         formula = getattr(formula, "__wrapped__", formula)
         key = (formula, name, *map(_key, arguments))
@@ -88,8 +80,7 @@ class Program:
                 self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
             )
             parameters, result = scope.run(arguments)
-            words = comment or _comment(formula)
-            self.functions[key] = Printer(scope).function(parameters, result, words)
+            self.functions[key] = Printer(scope).function(parameters, result, _comment(formula))
         return self.functions[key]
 
     def _check_name(self, formula: Callable[..., Any], name: str) -> None:
@@ -161,23 +152,19 @@ class Scope:
 
     def _check(self, parts: Iterable[Any]) -> None:
         for part in parts:
-            if isinstance(part, Symbol) and part.scope not in (None, self):
+            if isinstance(part, Symbol) and part.scope is not self:
                 refuse("it reads a variable of another function; hand it on as an argument")
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
-        """Write a call of another formula, and the formula itself if it is new."""
+        """Return the results of a call of another formula, which is written if it is new."""
         function = self.program._add(formula, tuple(map(kind_of, values)))
-        results = self.call(function.name, [argument_of(v) for v in values], function.kinds)
-        return results[0] if function.record is None else function.record(results)
-
-    def call(self, name: str, arguments: Sequence[Any], kinds: Sequence[str]) -> list[Any]:
-        """Return the results of a function; a vector as its components."""
-        self.callees.add(name)
-        call = self.expression(kinds[0] if len(kinds) == 1 else "call", "call", (name, *arguments))
-        results = [call]
-        if len(kinds) > 1:
-            results = [self.expression(k, "result", (call, n)) for n, k in enumerate(kinds)]
-        return [components_of(self, r) if r.kind == "vector" else r for r in results]
+        self.callees.add(function.name)
+        parts, kinds = (function.name, *map(argument_of, values)), function.kinds
+        if function.record is None:
+            return _components(self.expression(kinds[0], "call", parts))
+        call = self.expression("call", "call", parts)
+        results = [self.expression(kind, "result", (call, n)) for n, kind in enumerate(kinds)]
+        return function.record(list(map(_components, results)))
 
     def run(self, arguments: Sequence[Any]) -> tuple[list[Symbol], Any]:
         """Run the formula on symbols; return those of its parameters, and its result."""
@@ -219,6 +206,11 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
         ]
         return record_of(argument)(parts)
     return argument
+
+
+def _components(result: Symbol) -> Any:
+    """Return a number, or the components of a vector."""
+    return components_of(current(), result) if result.kind == "vector" else result
 
 
 def _key(argument: Any) -> Any:

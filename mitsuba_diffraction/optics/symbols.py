@@ -36,6 +36,11 @@ def current() -> Scope:
     return scopes[-1]
 
 
+def _condition(operation: str) -> Callable[[Any, Any], Any]:
+    """Return a method of `Symbol` whose result is a condition."""
+    return lambda self, other: _node(operation, self, other, kind="bool")
+
+
 class Symbol:
     """Expression of a formula.
 
@@ -45,7 +50,7 @@ class Symbol:
     operation, parts : operator or function, and its operands; "name" and its text for a variable.
     name, hint : of the variable that holds the value in the formula, and in a function that the
         formula runs.
-    scope : function that the expression belongs to, None where it is known everywhere.
+    scope : function that the expression belongs to.
     """
 
     __slots__ = ("hint", "kind", "name", "operation", "parts", "scope")
@@ -90,29 +95,9 @@ class Symbol:
     def __abs__(self) -> Any:
         return _node("abs", self)
 
-    def __lt__(self, other: Any) -> Any:
-        return _node("<", self, other, kind="bool")
-
-    def __le__(self, other: Any) -> Any:
-        return _node("<=", self, other, kind="bool")
-
-    def __gt__(self, other: Any) -> Any:
-        return _node(">", self, other, kind="bool")
-
-    def __ge__(self, other: Any) -> Any:
-        return _node(">=", self, other, kind="bool")
-
-    def __eq__(self, other: object) -> Any:
-        return _node("==", self, other, kind="bool")
-
-    def __ne__(self, other: object) -> Any:
-        return _node("!=", self, other, kind="bool")
-
-    def __and__(self, other: Any) -> Any:
-        return _node("&&", self, other, kind="bool")
-
-    def __or__(self, other: Any) -> Any:
-        return _node("||", self, other, kind="bool")
+    __lt__, __le__, __gt__, __ge__ = map(_condition, ("<", "<=", ">", ">="))
+    __eq__, __ne__ = map(_condition, ("==", "!="))
+    __and__, __or__ = map(_condition, ("&&", "||"))
 
     def __invert__(self) -> Any:
         return _node("!", self, kind="bool")
@@ -268,31 +253,6 @@ def _real(x: Any) -> Any:
 
 def _imag(x: Any) -> Any:
     return x.imag if isinstance(x, Symbol | complex) else 0.0
-
-
-def known(name: str, kind: str = "float") -> Symbol:
-    """Return a symbol that every function of a program may read: a uniform or a macro."""
-    return Symbol(kind, "name", (name,))
-
-
-def components(name: str) -> tuple[Symbol, Symbol, Symbol]:
-    """Return the components of a vector that every function of a program may read."""
-    vector = known(name, "vector")
-    x, y, z = (Symbol("float", axis, (vector,)) for axis in "xyz")
-    return x, y, z
-
-
-def supplied(name: str, *kinds: str) -> Callable[..., Any]:
-    """Return a function that the language supplies; kinds : of its results, one `float` if none.
-
-    The function may take numbers, and tuples of three as a vector.
-    """
-
-    def call(*values: Any) -> Any:
-        results = current().call(name, [argument_of(v) for v in values], kinds or ("float",))
-        return results[0] if len(results) == 1 else tuple(results)
-
-    return call
 
 
 def components_of(scope: Scope, vector: Symbol) -> tuple[Any, ...]:
