@@ -216,6 +216,16 @@ def illuminant_of(name: str) -> Reals:
     return np.asarray(quanta / quanta.mean())
 
 
+def responses(eye: Eye) -> Reals:
+    """Return the responses (receptors, GRID) to power, 1/nm, of integral 1: catches of quanta.
+
+    Sensitivities below a thousandth of the largest are 0, so that a table need not serve them.
+    """
+    curves = eye.sensitivity * GRID
+    curves = np.where(curves > 1e-3 * curves.max(axis=1, keepdims=True), curves, 0.0)
+    return np.asarray(curves / curves.sum(axis=1, keepdims=True))
+
+
 def quantum_catches(
     eye: Eye, wavelengths: ArrayLike, value: ArrayLike, illuminant: ArrayLike = 1.0
 ) -> Reals:
