@@ -24,6 +24,8 @@ MAX_TAPS = 64
 MAX_TERMS = 400
 #: Largest factor on heights.
 MAX_HEIGHT_SCALE = 1e3
+#: Width over which sunlight is coherent, µm: 4σ for a source 0.53° wide.
+USUAL_WIDTH = 65.0
 #: Widest coherence window, µm. Sunlight has 65 µm; lobes of much wider windows are narrower than
 #: the cells from which directions are drawn.
 MAX_COHERENCE_WIDTH = 500.0
@@ -103,6 +105,10 @@ def _width(value: Any) -> str | float:
     return "auto" if value == "auto" else _between(0.0, MAX_COHERENCE_WIDTH)(value)
 
 
+def _window_width(value: Any) -> float | None:
+    return None if value is None else _between(0.0, MAX_COHERENCE_WIDTH)(value)
+
+
 def _windows(value: Any) -> str | float | None:
     if value is None or value == "none":
         return None
@@ -130,8 +136,8 @@ class TableSettings:
 
     Attributes
     ----------
-    coherence_width : 4σ of the Gaussian amplitude window, µm; "auto" is 65 µm, or the smaller side
-        of a narrower patch, unless the patch repeats exactly (`heights.coherence`).
+    coherence_width : µm over which the light is coherent, 4σ₀ of order 0's amplitude window; "auto"
+        is 65 µm, that of sunlight.
     coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
     basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
     tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.
@@ -146,6 +152,8 @@ class TableSettings:
     second_order : whether light is multiplied by the second order of small slope: True, False, or
         "auto" for where it changes colours enough (`optics.second_order_change`). Unless False, the
         table holds the slope ratios. "auto" is False for coherence "patch" and basis "taylor".
+    window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
+        (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
 
     Raises
     ------
@@ -154,8 +162,8 @@ class TableSettings:
     """
 
     coherence_width: str | float = _setting(
-        "auto", _width, "µm, 4σ of the amplitude window; auto is 65, or the smaller side of a "
-        "narrower scan", f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
+        "auto", _width, "µm over which the light is coherent, 4σ of its window; auto is 65",
+        f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
         metavar="auto|W", type=str,
     )  # fmt: skip
     coherence: str = _setting(
@@ -197,19 +205,28 @@ class TableSettings:
         "auto", _auto_or_flag, "the second order of small slope; auto applies it where it changes "
         "colours by 5 %% or more", "auto, true or false", metavar="auto|true|false", type=str,
     )  # fmt: skip
+    window_width: float | None = _setting(
+        None, _window_width, "µm, 4σ of the window of all orders but 0",
+        "a positive number of µm, at most coherence_width", metavar="W", type=float,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name in _BY_NAME:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
+        if self.window_width is not None and not self.window_width < self.light_width:
+            object.__setattr__(self, "window_width", None)
         if self.second_order == "auto" and (self.coherent or self.basis == "taylor"):
             object.__setattr__(self, "second_order", False)
 
     @property
+    def light_width(self) -> float:
+        """Width over which the light is coherent, µm: `coherence_width`, or 65 for "auto"."""
+        return USUAL_WIDTH if isinstance(self.coherence_width, str) else self.coherence_width
+
+    @property
     def width(self) -> float:
-        """Coherence width, µm, of settings that `heights.coherence.resolved` returned."""
-        if isinstance(self.coherence_width, str):
-            raise ValueError("coherence_width is to be resolved first")
-        return self.coherence_width
+        """Width of the window of all orders but 0, µm, as `heights.coherence.resolved` left it."""
+        return self.light_width if self.window_width is None else self.window_width
 
     @property
     def coherent(self) -> bool:

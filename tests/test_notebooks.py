@@ -13,8 +13,6 @@ from tests.support.notebooks import (
     NOTEBOOKS,
     SAYS,
     SMALLER,
-    SMOKE,
-    check,
     kinds,
     read,
     streams,
@@ -73,8 +71,3 @@ def test_what_is_no_notebook_is_one_clear_line(tmp_path, capsys):
         assert main([str(path)]) == 1
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert f"'{path}' is not a notebook that can be read" in line
-
-
-def test_one_runs_without_a_warning_and_keeps_its_promises(tmp_path):
-    (path,) = (path for path in NOTEBOOKS if path.stem == SMOKE)
-    check(path, tmp_path)

@@ -12,7 +12,6 @@ from tests.support import ROOT
 from tests.support.instruments import nanoscope
 from tests.support.notebooks import (
     NOTEBOOKS,
-    SMOKE,
     check,
     hindrance,
     read,
@@ -27,10 +26,7 @@ pytestmark = [
 ]
 
 
-OTHERS = [path for path in NOTEBOOKS if path.stem != SMOKE]  # which test_notebooks.py runs
-
-
-@pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_runs_without_a_warning_and_keeps_its_promises(path, tmp_path):
     check(path, tmp_path)
 

@@ -8,9 +8,12 @@ import sys
 from pathlib import Path
 
 import psutil
+import pytest
 
 from mitsuba_diffraction import system
 from tests.support import ROOT
+
+pytestmark = pytest.mark.thorough
 
 # Python as on Windows: modules and functions of POSIX alone are absent. Other packages keep them.
 WITHOUT_POSIX = """

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import DiffractionError
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
@@ -16,10 +18,18 @@ from ..heights.read import LoadOptions, treated_by_default
 FEWEST_PIXELS = 32
 
 
-def crops_of(path: Path, options: LoadOptions, count: int) -> list[HeightField]:
+def crops_of(
+    path: Path, options: LoadOptions, count: int, side: float | None = None
+) -> list[HeightField]:
     """Return crops of equal size, side by side, each treated as a scan of its own.
 
-    path : heights of any format; options : how they are read and treated.
+    Parameters
+    ----------
+    path : heights of any format.
+    options : how they are read and treated.
+    count : crops, at least 1.
+    side : of square crops, µm, of which as many as fit are returned, spread over the scan; whole
+        scans that are narrower. Without, `count` crops share the scan.
 
     Raises
     ------
@@ -31,7 +41,8 @@ def crops_of(path: Path, options: LoadOptions, count: int) -> list[HeightField]:
     raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
     whole = load_heights(path, raw)
     treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)
-    return [treated_by_default(part, treatment) for part in _parts(whole, count)]
+    parts = _parts(whole, count) if side is None else _squares(whole, count, side)
+    return [treated_by_default(part, treatment) for part in parts]
 
 
 def cropped(fields: Sequence[HeightField], side: float) -> list[HeightField]:
@@ -39,6 +50,26 @@ def cropped(fields: Sequence[HeightField], side: float) -> list[HeightField]:
     from ..heights.preprocess import crop
 
     return [crop(field, (side, side)) if min(field.extent) > side else field for field in fields]
+
+
+def _squares(whole: HeightField, count: int, side: float) -> list[HeightField]:
+    """Cut at most `count` squares, spread over the field, or return the field if it is narrower."""
+    nx, ny = (round(side / pixel) for pixel in whole.pixel_size)
+    columns, rows = whole.shape[1] // nx, whole.shape[0] // ny
+    if not columns * rows:
+        return [whole]
+    cells = np.unique(np.linspace(0, columns * rows - 1, count).round().astype(int))
+    # the squares lie evenly between the edges
+    left = np.linspace(0, whole.shape[1] - nx, columns).round().astype(int)
+    low = np.linspace(0, whole.shape[0] - ny, rows).round().astype(int)
+    result = []
+    for n, cell in enumerate(cells.tolist(), 1):
+        row, column = divmod(cell, columns)
+        y, x = low[row], left[column]
+        line = f"crop {n} of {len(cells)}, {side:g} µm"
+        heights = whole.heights[y : y + ny, x : x + nx]
+        result.append(whole.changed(heights, line, cut_out=True, periodic=False))
+    return result
 
 
 def _parts(whole: HeightField, count: int) -> list[HeightField]:

@@ -141,7 +141,7 @@ def diffracted_light(
             f"{table.wavelength_range[0]:g} nm; build it with a wider wavelength_range"
         )
     coefficients, _, scale, expansion = power_series(table.averaged)
-    width = min(WINDOW, table.coherence_width)
+    width = min(WINDOW, table.window_width)
     qx, qy = (
         spacing * np.arange(-last, last + 1)
         for spacing, last in zip(table.spacing, table.grid.last, strict=True)

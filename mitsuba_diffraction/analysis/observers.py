@@ -16,12 +16,22 @@ ocular media and cone photoreceptor distribution in two species of passerine bir
 A 186, 375-387 (2000): blue tit, `avian_uv`.
 A. J. Sillman, V. I. Govardovskii, P. Röhlich, J. A. Southard and E. R. Loew, The photoreceptors and
 visual pigments of the garter snake, J. Comp. Physiol. A 181, 89-101 (1997): `snake`.
+N. S. Hart, Vision in the peafowl (Aves: Pavo cristatus), J. Exp. Biol. 205, 3925-3935 (2002):
+`avian_v`; pigments, numbers of cones, and the peaks that media and droplets give them, 432, 477,
+537 and 605 nm. The cut-offs here are those that give these peaks; the first has the media in it.
+E. R. Loew, L. J. Fleishman, R. G. Foster and I. Provencio, Visual pigments and oil droplets in
+diurnal lizards, J. Exp. Biol. 205, 927-938 (2002): `lizard`, anoles; pigments without droplets.
+J. Neitz, T. Geist and G. H. Jacobs, Color vision in the dog, Visual Neuroscience 3, 119-125 (1989):
+`dog`.
+R. Menzel, in Photoreceptor Optics (Springer 1975), 372-387: `bee`, the honeybee.
+A. Stockman and L. T. Sharpe, Vision Research 40, 1711-1737 (2000): `human`, the cone fundamentals
+of CIE 2006 (170-1), for 2 degrees.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,11 +40,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
 from ..files import read_text
+from ..optics.colour import cone_fundamentals, illuminant_power
 
 Reals = NDArray[np.float64]
 
 #: Wavelengths of sensitivities, nm: the range in which animals see.
 GRID = np.arange(300.0, 701.0)
+#: Lights of catches: as many quanta everywhere; CIE's daylight of direct sun, of sun and sky, and
+#: of the northern sky, in open shade (G. Wyszecki and W. S. Stiles, Color Science, Wiley 1982).
+ILLUMINANTS = ("ideal", "d55", "d65", "d75")
 #: Weber fraction of the most frequent receptor, of birds' long-wave cones.
 WEBER = 0.1
 
@@ -104,12 +118,26 @@ def _modelled(
     return Eye(tuple(names[-len(peaks) :]), curves, tuple(density))
 
 
-#: Animals by name: λmax, relative numbers of receptors, oil droplets and their λcut.
-EYES = {
+def _human() -> Eye:
+    """Model the human eye: cone fundamentals per quantum."""
+    curves = cone_fundamentals(GRID) / GRID
+    return Eye(("s", "m", "l"), curves / curves.sum(axis=1, keepdims=True), (1.0, 1.0, 1.0))
+
+
+#: Animals by name: λmax, relative numbers of receptors (1 if unknown), oil droplets, their λcut.
+EYES: dict[str, Callable[[], Eye]] = {
     "avian_uv": lambda: _modelled(
         (371.0, 448.0, 502.0, 563.0), (1.0, 2.0, 2.0, 4.0), "TCYR", (300.0, 413.0, 507.0, 572.0),
         bird_media(),
     ),
+    "avian_v": lambda: _modelled(
+        (424.0, 458.0, 505.0, 567.0), (1.0, 1.9, 2.2, 2.1), "CCYR", (383.5, 440.0, 505.5, 569.5),
+        names="vsml",
+    ),
+    "lizard": lambda: _modelled((365.0, 455.0, 495.0, 564.0), (1.0, 1.0, 1.0, 1.0)),
+    "dog": lambda: _modelled((429.0, 555.0), (1.0, 1.0), names="sl"),
+    "bee": lambda: _modelled((350.0, 440.0, 540.0), (1.0, 1.0, 1.0), names="usm"),
+    "human": _human,
     "snake": lambda: _modelled((360.0, 482.0, 554.0), (1.0, 1.0, 12.0), names="uml"),
 }  # fmt: skip
 
@@ -129,14 +157,8 @@ def eye_of(name: str) -> Eye:
             f"observer={quoted(name)} is unknown; choose one of {', '.join(EYES)}, or a CSV of "
             "wavelengths (nm) and a column for each receptor"
         )
-    header, *lines = read_text(name).splitlines() or [""]
-    try:
-        table = np.array([[float(x) for x in line.split(",")] for line in lines if line.strip()])
-    except ValueError:
-        table = np.empty((0, 0))
-    names = tuple(word.strip() for word in header.split(",")[1:])
-    right = table.ndim == 2 and len(table) > 1 and len(names) > 1
-    if not (right and table.shape[1] == 1 + len(names) and (np.diff(table[:, 0]) > 0.0).all()):
+    names, table = _columns(name)
+    if len(names) < 2:
         raise DiffractionError(
             f"'{name}' is no eye: give a header, wl and a name for each receptor, and rows of "
             "wavelengths in nm, increasing, and sensitivities"
@@ -147,6 +169,61 @@ def eye_of(name: str) -> Eye:
         )
     curves = np.stack([np.interp(GRID, table[:, 0], c, 0.0, 0.0) for c in table[:, 1:].T])
     return Eye(names, curves / curves.sum(axis=1, keepdims=True), (1.0,) * len(names))
+
+
+def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
+    """Return the names of a CSV's columns behind wavelengths, and its numbers; none if wrong."""
+    header, *lines = read_text(name).splitlines() or [""]
+    names = tuple(word.strip() for word in header.split(",")[1:])
+    try:
+        table = np.array([[float(x) for x in line.split(",")] for line in lines if line.strip()])
+    except ValueError:
+        return (), np.empty((0, 0))
+    right = table.ndim == 2 and len(table) > 1 and table.shape[1] == 1 + len(names)
+    if not (right and (np.diff(table[:, 0]) > 0.0).all()):
+        return (), np.empty((0, 0))
+    return names, table
+
+
+def illuminant_of(name: str) -> Reals:
+    """Return the quanta of a light at `GRID`, of mean 1: by name, or from a CSV of photons.
+
+    name : one of `ILLUMINANTS`, or a CSV of wavelengths in nm and relative photons.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such light, or the file does not cover 300 to 700 nm.
+    """
+    if name in ILLUMINANTS:
+        quanta = (
+            np.ones_like(GRID) if name == "ideal" else illuminant_power(name.upper(), GRID) * GRID
+        )
+        return np.asarray(quanta / quanta.mean())
+    if Path(name).suffix.lower() != ".csv":
+        raise DiffractionError(
+            f"illuminant={quoted(name)} is unknown; choose one of {', '.join(ILLUMINANTS)}, or a "
+            "CSV of wavelengths (nm) and photons"
+        )
+    names, table = _columns(name)
+    covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
+    if not (covers and table[:, 1].min() >= 0.0 < table[:, 1].max()):
+        raise DiffractionError(
+            f"'{name}' is no light: give a header, wl and a name, and rows of wavelengths from 300 "
+            "to 700 nm, increasing, and photons"
+        )
+    quanta = np.interp(GRID, table[:, 0], table[:, 1])
+    return np.asarray(quanta / quanta.mean())
+
+
+def responses(eye: Eye) -> Reals:
+    """Return the responses (receptors, GRID) to power, 1/nm, of integral 1: catches of quanta.
+
+    Sensitivities below a thousandth of the largest are 0, so that a table need not serve them.
+    """
+    curves = eye.sensitivity * GRID
+    curves = np.where(curves > 1e-3 * curves.max(axis=1, keepdims=True), curves, 0.0)
+    return np.asarray(curves / curves.sum(axis=1, keepdims=True))
 
 
 def quantum_catches(

@@ -84,14 +84,16 @@ def save_colours(groups: Groups, path: Any) -> None:
     write_table(path, columns, rows)
 
 
-def save_catches(groups: Groups, eye: Eye, catches_path: Any, contrasts_path: Any) -> None:
+def save_catches(
+    groups: Groups, eye: Eye, illuminant: Reals, catches_path: Any, contrasts_path: Any
+) -> None:
     """Write an animal's quantum catches of each spectrum, and its contrasts of each pair in JND.
 
-    The illuminant is ideal, of as many quanta at every wavelength.
+    illuminant : quanta of the light, of `observers.illuminant_of`.
     """
     names = [name for group, each in groups.items() for name in each.names(group)]
     catches = np.concatenate(
-        [quantum_catches(eye, each.wavelength, each.value) for each in groups.values()]
+        [quantum_catches(eye, each.wavelength, each.value, illuminant) for each in groups.values()]
     )
     rows = [
         {"spectrum": name, **{r: f"{q:.6g}" for r, q in zip(eye.names, row, strict=True)}}

@@ -13,7 +13,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from ..progress import Progress, silent
 from ..tables.build.checks import warnings_of
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
+from .crops import crops_of
 from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
@@ -59,6 +60,8 @@ class Job:
     variant: str  # variant of Mitsuba
     threads: int  # threads of Dr.Jit
     surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF of the map; R = 1 without
+    # which crop of `iridescence.WINDOW` of how many; None for the whole scan
+    crop: tuple[int, int] | None = None
 
     @property
     def key(self) -> str:
@@ -66,7 +69,8 @@ class Job:
         treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
         variant = self.variant.partition("_")[2]
         parameters = (VERSION, self.theta, self.resolution, variant, *self.surface)
-        return key_of("survey", self.files.digest, treatment, *parameters)[:32]
+        crop = () if self.crop is None else ("crop", *self.crop)
+        return key_of("survey", self.files.digest, treatment, *parameters, *crop)[:32]
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,11 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
     scan = read_scan(path, job.treatment.options, job.treatment.settings)
+    if job.crop is not None:
+        which, count = job.crop
+        crops = crops_of(path, job.treatment.options, count, WINDOW)
+        scan = scan._replace(patches=[crops[which]])
+        row["crop"] = which + 1
     patches = scan.patches
     for name in ("range", "rms_height", "rms_slope"):
         row[f"{name}_um" if name != "rms_slope" else name] = getattr(patches[0], name)
@@ -125,7 +134,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     table = table_of(scan)
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
-    row["coherence_width_um"] = table.coherence_width
+    row |= {"coherence_width_um": table.coherence_width, "window_width_um": table.window_width}
     row["tiling"] = REPEATS if table.source.get("repeats") else ""
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]
@@ -180,6 +189,7 @@ def run_survey(
     threads: int = 0,
     surface: Mapping[str, Any] | None = None,
     repeats: str = "name",
+    crops: int | None = None,
     client: Any = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
@@ -202,6 +212,8 @@ def run_survey(
     threads : threads of Dr.Jit in workers; 0 for one per core.
     surface : parameters of the map's BSDF, e.g. {"material": "keratin"}; R = 1 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
+    crops : measure so many crops of each scan, of `iridescence.WINDOW`, or as many as fit; scans
+        that are narrower, and recipes, are measured as a whole.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
 
@@ -219,22 +231,27 @@ def run_survey(
         raise DiffractionError("there is no scan to survey; name files")
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
-    named = [{"file": str(file), "sample": sample_of(file, repeats)} for file in files]
     shown = tuple((surface or {}).items())
     rows: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job] = {}
-    for n, file in enumerate(files):
+    named: list[dict[str, str]] = []
+    for file in files:
+        name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
             treatment = treatment_for(file, treatments).updated(common or Treatment())
             job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
+            parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
-            rows[n] = {"reason": str(error)}
+            rows[len(named)] = {"reason": str(error)}
+            named.append(name)
             continue
-        stored = _stored_row(scans, job)
-        if stored is None:
-            jobs[n] = job
-        else:
-            rows[n] = stored
+        for part in parts:
+            stored = _stored_row(scans, part)
+            if stored is None:
+                jobs[len(named)] = part
+            else:
+                rows[len(named)] = stored
+            named.append(name)
     todo = list(jobs)
     progress(0, len(todo), "scans")
     results = run_jobs(client, measure, [jobs[n] for n in todo])
@@ -243,7 +260,7 @@ def run_survey(
         if isinstance(result, Failed):
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
-            rows[n] = _store(scans, files[n], jobs[n], result)
+            rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
         write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
     result = write_rows(folder / TABLE, named, rows)
@@ -274,6 +291,17 @@ def _files_of(file: Path) -> SceneFiles:
     if kind_of(file) is FileKind.RECIPE:
         Recipe.load(file)
     return files
+
+
+def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
+    """Return a job for each crop of a scan; the job itself for recipes and narrow scans."""
+    if kind_of(file) is FileKind.RECIPE:
+        return [job]
+    options = job.treatment.options
+    found = crops_of(file, options, count, WINDOW)
+    if min(found[0].extent) < 0.99 * WINDOW:
+        return [job]
+    return [replace(job, crop=(n, count)) for n in range(len(found))]
 
 
 def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ solve                  orders of a periodic profile
 orders                 efficiencies of solved orders as a CSV
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
+observed               `render --observer`: what the receptors of an animal catch
 tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 spectrum               reflectance spectra as a spectrometer measures them

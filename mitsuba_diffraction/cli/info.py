@@ -161,7 +161,7 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "kind": "height field",
         **field.summary(),
         **_periods(field),
-        "window": width_reason(resolved(settings, [field]).width, [field]),
+        "window": width_reason(resolved(settings, [field]), [field]),
         "warnings": [*warnings, *filter(None, suggested)],
         "limits": options.LIMITS,
     }
@@ -196,7 +196,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],
-        "window": width_reason(resolved(settings, fields).width, fields),
+        "window": width_reason(resolved(settings, fields), fields),
         "warnings": options.table_warnings(fields, settings),
     }
 

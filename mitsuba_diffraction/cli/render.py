@@ -1,7 +1,6 @@
 """`mitsuba-diffraction render`: from an XML scene to a picture.
 
-With --frames: which frames exist, why each of the others is rendered, and the film of them.
-"""
+With --frames: which frames exist, why others are rendered, and their film."""
 
 from __future__ import annotations
 
@@ -33,6 +32,7 @@ from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
+from .observed import add_observer, run_observed
 from .options import number_between, whole_number
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, default_output, save_report
@@ -71,11 +71,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "without any, planned first",
     )  # fmt: skip
     add_plan_options(parser)
+    add_observer(parser)
     options.add_json(parser, "what was rendered")
     film = parser.add_argument_group("animation")
-    film.add_argument(
-        "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
-    )
+    count = whole_number(1)
+    film.add_argument("--frames", metavar="N", type=count, help="render N pictures, frame_0000.png")
     film.add_argument(
         "--animate", metavar="KEY=FROM:TO", type=scene_options.change, action="append", default=[],
         help="change a parameter of the scene from the first frame to the last, e.g. "
@@ -87,9 +87,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "sun_azimuth for the light or turn for the snake; may be given several times",
     )  # fmt: skip
     film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
-    film.add_argument(
-        "--fps", metavar="N", type=number_between(1, 100), help="frames a second; default: 24"
-    )
+    fps = number_between(1, 100)
+    film.add_argument("--fps", metavar="N", type=fps, help="frames a second; default: 24")
     add_workers(parser)
     add_threads(parser)
 
@@ -98,6 +97,8 @@ def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
     check_plan_options(args)
     scene_options.put_on_stage(args)
+    if args.observer is not None:
+        return run_observed(args)
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
@@ -237,8 +238,7 @@ def _finish(
     else:
         write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
-    width, height = result.bitmap.size()
-    samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    (width, height), samples = result.bitmap.size(), f"{result.spp} samples"
     seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "

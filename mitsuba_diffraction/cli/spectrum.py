@@ -57,8 +57,15 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--observer", metavar="ANIMAL|CSV",
-        help="also quantum catches and contrasts (JND) of an eye: avian_uv, snake, or a "
-        "file of wavelengths (nm) and a column of sensitivities a receptor",
+        help="also quantum catches and contrasts (JND) of an eye: avian_uv, avian_v, lizard, "
+        "snake, dog, bee, human, or a file of wavelengths (nm) and a column of sensitivities for "
+        "each receptor",
+    )  # fmt: skip
+    parser.add_argument(
+        "--illuminant", metavar="LIGHT|CSV",
+        help="light of --observer: ideal, the same number of quanta at all wavelengths; d55, sun; "
+        "d65, sun and sky; d75, sky in open shade; or a file of wavelengths (nm) and photons, e.g. "
+        "measured under leaves; default: ideal",
     )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
@@ -87,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     check_outputs([*written, errors] if repeated else written, files, "spectrum")
     lam = _wavelengths(args)
-    eye = _eye(args, lam)
+    eye, light = _eye(args, lam)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
@@ -117,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         files_of_spectra.save_errors(spectra, errors)
     files_of_spectra.save_colours(spectra, written[2])
     if eye is not None:
-        files_of_spectra.save_catches(spectra, eye, *written[3:5])
+        files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
     title = _title(groups, args)
     with atomic_path(written[1]) as temporary:
         files_of_spectra.spectra_figure(spectra, title).savefig(temporary, format="png")
@@ -147,15 +154,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _eye(args: argparse.Namespace, lam: Any) -> Any:
-    """Return the eye of --observer, or None; refuse wavelengths that do not cover it."""
+def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
+    """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
     if args.observer is None:
-        return None
-    from ..analysis.observers import eye_of, quantum_catches
+        if args.illuminant is not None:
+            args.parser.error("argument --illuminant: is the light of --observer; name one")
+        return None, None
+    from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 
     eye = eye_of(args.observer)
     quantum_catches(eye, lam, [[0.0]] * len(lam))
-    return eye
+    return eye, illuminant_of(args.illuminant or "ideal")
 
 
 def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:

@@ -17,6 +17,9 @@ from .options import number_between, whole_number
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, on_workers, worker_threads
 
+# Ratio of the widths of scans from which on they are not compared.
+_SIZES = 1.5
+
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
@@ -47,6 +50,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="which scans are of one sample: those whose names differ in their last number, or "
         "those of one folder; default: name",
     )  # fmt: skip
+    parser.add_argument(
+        "--crops", metavar="N", type=whole_number(1),
+        help="measure N crops of 10 µm of each scan, or as many as fit: compares scans of "
+        "different sizes, and gives errors of single scans",
+    )  # fmt: skip
     options.add_mode(parser)
     add_material(parser.add_argument_group("the surface of the maps, by default R = 1"))
     options.add_heights(parser)
@@ -68,10 +76,19 @@ def run(args: argparse.Namespace) -> int:
         if row["reason"]:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
     failed = sum(bool(row["reason"]) for row in rows)
+    from ..analysis.iridescence import WINDOW
+
+    wide = sorted(row["width_um"] for row in rows if not row["reason"])
+    if wide and wide[-1] > _SIZES * max(wide[0], WINDOW):
+        say(
+            f"scans are {wide[0]:.3g} to {wide[-1]:.3g} µm wide: small ones have more colour by "
+            "chance; compare them with --crops 4, crops of 10 µm"
+        )
     seconds = time.perf_counter() - start
     save_report(args, {"rows": rows, "seconds": seconds})
     print(
-        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, "
+        f"{args.output}: {len(rows) - failed} {'scans' if args.crops is None else 'crops'} in "
+        f"survey.csv, {failed} failed, "
         f"{len({row['sample'] for row in rows})} samples in samples.csv, {seconds:.1f} s"
     )
     return 1 if failed else 0
@@ -98,6 +115,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
             args.files, args.output, treatments=treatments,
             common=Treatment(own_options, settings), variant=variant, theta=args.theta,
             resolution=args.resolution, threads=worker_threads(args), repeats=args.repeats,
-            surface=surface_parameters(args),
+            surface=surface_parameters(args), crops=args.crops,
             client=client, progress=bar,
         )  # fmt: skip

@@ -11,16 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
-from ..settings import TableSettings
+from ..settings import COHERENCES, USUAL_WIDTH, TableSettings
 from .field import HeightField
 
-#: Width over which sunlight is coherent, µm: 4σ for a source 0.53° wide.
-USUAL_WIDTH = 65.0
 #: A side narrower than this fraction of the window is reported: lobes vary by 8 % there.
 SMALLER = 0.9
 #: Mark of results under such a window.
 REPEATS = "wider than the patch: its repetition shows as a grating"
+_GREEN = 0.55  # µm
 #: Narrowest useful window, µm: a wavelength and a half.
 NARROWEST = 1.0
 
@@ -44,16 +44,38 @@ def widest_window(patches: Sequence[HeightField]) -> float:
 
 
 def resolved_width(width: str | float, patches: Sequence[HeightField]) -> float:
-    """Return a coherence width in µm; "auto" is the smaller of 65 µm and `widest_window`."""
-    return min(USUAL_WIDTH, widest_window(patches)) if isinstance(width, str) else width
+    """Return the width of one window for all orders, µm: at most `widest_window`."""
+    return widths_of(width, patches, COHERENCES[1]).window
+
+
+class Widths(NamedTuple):
+    """Widths of coherence windows, 4σ in µm: of all orders but 0, and of order 0."""
+
+    window: float
+    light: float
+
+
+def widths_of(width: str | float, patches: Sequence[HeightField], coherence: str) -> Widths:
+    """Return the widths for a coherence width of the light in µm or "auto", 65 µm.
+
+    The patches limit the window of all orders but 0; if a width is asked for, scans and other parts
+    of larger surfaces do (`HeightField.cut_out`). One window, of coherence "patch" or "surface",
+    has one width for all orders, and as asked.
+    """
+    averaged, asked = coherence == COHERENCES[0], not isinstance(width, str)
+    light = USUAL_WIDTH if isinstance(width, str) else width
+    if asked:
+        patches = [patch for patch in patches if patch.cut_out and averaged]
+    window = min(light, widest_window(patches))
+    return Widths(window, light if averaged else window)
 
 
 def resolved(settings: TableSettings, patches: Sequence[HeightField]) -> TableSettings:
-    """Return settings whose coherence width is a number; "auto" is at most a window of a scan."""
-    width = resolved_width(settings.coherence_width, patches)
-    if settings.coherence_width == "auto" and isinstance(settings.windows, float):
-        width = min(width, settings.windows)
-    return replace(settings, coherence_width=width)
+    """Return settings whose widths are numbers, limited by patches and windows of a scan."""
+    window, light = widths_of(settings.coherence_width, patches, settings.coherence)
+    if isinstance(settings.windows, float):
+        window = min(window, settings.windows)
+    return replace(settings, coherence_width=light, window_width=window)
 
 
 def repeats(width: float, patches: Sequence[HeightField]) -> bool:
@@ -61,15 +83,27 @@ def repeats(width: float, patches: Sequence[HeightField]) -> bool:
     return widest_window(patches) < SMALLER * width
 
 
-def width_reason(width: float, patches: Sequence[HeightField]) -> str:
-    """Say in one line what speaks for a width of the window, µm, or against it."""
+def width_reason(settings: TableSettings, patches: Sequence[HeightField]) -> str:
+    """Say in one line what speaks for the widths of resolved settings, or against them."""
+    width, light = settings.width, settings.light_width
     if repeats(width, patches):
         return f"{width:.4g} µm, {REPEATS}"
+    if width < light:
+        return f"{light:.4g} µm for the mirror direction, {width:.4g} µm for orders: {blur(width)}"
     if width < resolved_width("auto", patches):
         return f"{width:.4g} µm, as asked"
     if width < USUAL_WIDTH:
         return f"{width:.4g} µm, the patch's smaller side; a wider window shows its repetition"
     return f"{width:.4g} µm, over which sunlight is coherent"
+
+
+def blur(width: float) -> str:
+    """Say within which angle of the mirror a scan of a width, µm, knows no light but the mirror."""
+    angle = math.degrees(math.asin(min(_GREEN / width, 1.0)))  # of the longest wave in the scan
+    return (
+        f"a scan of {width:.4g} µm knows nothing of light within {angle:.2g}° of the mirror "
+        "but the mirror"
+    )
 
 
 def window_warning(width: float, patches: Sequence[HeightField]) -> str:

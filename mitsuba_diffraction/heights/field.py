@@ -179,13 +179,14 @@ class HeightField:
 
     @cached_property
     def _digest(self) -> str:
-        shape = (self.shape, self.pixel_size, *(["periodic"] if self.periodic else []))
+        flags = [name for name in ("periodic", "cut_out") if getattr(self, name)]
+        shape = (self.shape, self.pixel_size, *flags)
         content = hashlib.sha256(repr(shape).encode())
         content.update(np.ascontiguousarray(self.heights, dtype="<f8").data)
         return content.hexdigest()
 
     def digest(self) -> str:
-        """Return the SHA-256 of shape, pixel size, `periodic` and heights in hexadecimal."""
+        """Return the SHA-256 of shape, pixel size, flags and heights in hexadecimal."""
         return self._digest
 
     def summary(self) -> dict[str, Any]:

@@ -154,6 +154,12 @@ def squared(z: Number) -> Number:
     return z.real * z.real + z.imag * z.imag if is_complex(z) else z * z
 
 
+def modulus(z: Number) -> Number:
+    """Return |z| of a real or a complex number."""
+    xp = of(z)
+    return xp.sqrt(squared(z)) if is_complex(z) else xp.absolute(z)
+
+
 #: Writes a call of a formula while `programs.Program` writes another; None otherwise.
 emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 from ..errors import DiffractionError
-from .arithmetic import Number, formula, of, squared
+from .arithmetic import Number, of, squared
 from .blend import RoughnessTable, kirchhoff_weight
 from .fresnel import Face, Filmed, Index, amplitudes, faces, normal_reflectance, reflectance
 
@@ -82,7 +82,6 @@ class Heights(NamedTuple):
     variance: Number
 
 
-@formula
 def geometry(wi: Direction, wo: Direction) -> Geometry:
     """Return the geometry of directions ωi and ωo, which point away from the surface."""
     (x0, y0, z0), (x, y, z) = wi, wo
@@ -118,7 +117,6 @@ def geometry(wi: Direction, wo: Direction) -> Geometry:
     )  # fmt: skip
 
 
-@formula
 def facets(geometry: Geometry, r_s: Number, r_p: Number) -> Jones:
     """Return U(ωo) diag(r_s, r_p) U(ωi), facets with coefficients r_s and r_p at their own axes."""
     cc, cs, sc, ss = geometry[-4:]
@@ -130,7 +128,6 @@ def facets(geometry: Geometry, r_s: Number, r_p: Number) -> Jones:
     )
 
 
-@formula
 def kirchhoff(geometry: Geometry, index: Index) -> Jones:
     """Return 2 cosθi cosθo K of the tangent plane, eq. 7.
 
@@ -145,7 +142,6 @@ def kirchhoff(geometry: Geometry, index: Index) -> Jones:
     return facets(geometry, r_s * one, r_p * one)
 
 
-@formula
 def kirchhoff_power(geometry: Geometry, index: Index) -> Number:
     """Return ½ Σ|J|² of `kirchhoff`, without its turns."""
     if isinstance(index, Filmed):
@@ -154,7 +150,6 @@ def kirchhoff_power(geometry: Geometry, index: Index) -> Number:
     return reflectance(cosine, index) * (one * one)
 
 
-@formula
 def small_slope(geometry: Geometry, index: Index) -> Jones:
     """Return 2 cosθi cosθo B of the first-order small-slope approximation, eq. 8.
 
@@ -193,19 +188,16 @@ def _of_face(geometry: Geometry, came: Face, there: Face) -> Jones:
     )
 
 
-@formula
 def mixed(first: Jones, second: Jones, weight: Number) -> Jones:
     """Return the second matrix, and as much of the first as its weight says."""
     return tuple((a - b) * weight + b for a, b in zip(first, second, strict=True))
 
 
-@formula
 def azimuth_cosine(wi: Direction, wo: Direction) -> Number:
     """Return t̂·t̂0, the cosine between the tangential parts of −ωi and ωo."""
     return geometry(wi, wo).dot
 
 
-@formula
 def power(jones: Jones) -> Number:
     """Return N = ½ Σ|J|², the power of unpolarised light of unit power."""
     ss, sp, ps, pp = jones

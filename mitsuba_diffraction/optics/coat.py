@@ -23,13 +23,43 @@ although the face returns all of it and some leaves in the end (docs/validation/
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
-from .arithmetic import Number, formula, of, squared
+from .arithmetic import Number, formula, modulus, of, squared
 from .boundary import Direction, Geometry, Heights, Jones, geometry, power
 from .fresnel import Index, amplitudes
 
 #: Powers of both polarisations, s and p.
 Powers = tuple[Number, Number]
+
+
+class Coat(NamedTuple):
+    """Coat over a structure, for a pair of directions.
+
+    Attributes
+    ----------
+    n : relative index.
+    cos_i, cos_o : cosines of ωi and ωo outside of the coat.
+    """
+
+    n: Number
+    cos_i: Number
+    cos_o: Number
+
+
+class Crossing(NamedTuple):
+    """Face of a coat, as light of one direction sees it from either side.
+
+    Attributes
+    ----------
+    s, p : transmittances T_s and T_p.
+    r_s, r_p : amplitudes reflected outside. √(1 − T) would lose digits at Brewster's angle.
+    """
+
+    s: Number
+    p: Number
+    r_s: Number
+    r_p: Number
 
 
 @formula
@@ -43,54 +73,86 @@ def refracted(direction: Direction, n: Number) -> Direction:
 
 
 @formula
-def transmittances(cosine: Number, n: Number) -> Powers:
-    """Return T_s and T_p of a face for the cosine of the angle outside; equal both ways."""
+def crossing(cosine: Number, n: Number) -> Crossing:
+    """Return T_s, T_p, r_s and r_p of a face, for the cosine of the angle outside."""
     xp = of(cosine, n)
     inside = xp.sqrt(xp.maximum(cosine * cosine + (n * n - 1.0), 0.0))
-    outside = 4.0 * cosine * inside
-    over_s, over_p = xp.reciprocal(inside + cosine), xp.reciprocal(n * n * cosine + inside)
-    return outside * (over_s * over_s), n * n * outside * (over_p * over_p)
+    outside, steep = 4.0 * cosine * inside, n * n * cosine
+    over_s, over_p = xp.reciprocal(inside + cosine), xp.reciprocal(steep + inside)
+    return Crossing(
+        outside * (over_s * over_s),
+        n * n * outside * (over_p * over_p),
+        (cosine - inside) * over_s,
+        (steep - inside) * over_p,
+    )
+
+
+def transmittances(cosine: Number, n: Number) -> Powers:
+    """Return T_s and T_p of a face for the cosine of the angle outside; equal both ways."""
+    s, p, _, _ = crossing(cosine, n)
+    return s, p
 
 
 @formula
-def bounced(face: Powers, structure: Powers) -> Number:
-    """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
-    xp = of(*face, *structure)
-    # At Brewster's angle R is 0 to rounding
-    first, second = (
-        xp.sqrt(xp.maximum(r * rho, 0.0)) for r, rho in zip(face, structure, strict=True)
-    )
-    largest, least = xp.maximum(*structure), xp.minimum(*face)
-    return xp.reciprocal(xp.maximum(xp.fma(-first, second, 1.0), largest * (1.0 - least)))
+def face_transmittance(cosine: Number, n: Number) -> Number:
+    """Return the transmittance of a face for unpolarised light, for the cosine outside."""
+    s, p = transmittances(cosine, n)
+    return 0.5 * (s + p)
+
+
+def passed_powers(geometry: Geometry, index: Index, came: Crossing, left: Crossing) -> list[Number]:
+    """Return T T G of the entries of a Jones matrix; arguments as for `transmitted`."""
+    xp = of(*came, *left)
+    ends = []
+    for cosine, square, (t_s, t_p, r_s, r_p) in (
+        (geometry.cos_i, geometry.square_i, came),
+        (geometry.cos_o, geometry.square_o, left),
+    ):
+        mirror_s, mirror_p = map(modulus, amplitudes(cosine, square, index))
+        s = t_s, xp.absolute(r_s) * mirror_s, mirror_s
+        ends.append([s, (t_p, xp.absolute(r_p) * mirror_p, mirror_p)])
+    return [_passed(into, out) for out in ends[1] for into in ends[0]]
+
+
+def _passed(into: tuple[Number, ...], out: tuple[Number, ...]) -> Number:
+    """Return T T G of T, |r| of the face times that of the structure, and the latter."""
+    (t_in, sent_in, mirror_in), (t_out, sent_out, mirror_out) = into, out
+    xp = of(*into, *out)
+    mirror = xp.maximum(mirror_in, mirror_out)
+    least = mirror * mirror * xp.maximum(t_in, t_out)
+    bounces = xp.maximum(xp.fma(-sent_in, sent_out, 1.0), least)
+    return t_in * t_out * xp.reciprocal(bounces)
 
 
 def transmitted(
-    jones: Jones, geometry: Geometry, index: Index, came: Powers, left: Powers
+    jones: Jones, geometry: Geometry, index: Index, came: Crossing, left: Crossing
 ) -> Jones:
     """Return √(T T G) J, the structure's matrix as seen from outside of the coat.
 
     Parameters
     ----------
     jones, geometry, index : of the structure in the coat; index over that of the coat.
-    came, left : `transmittances` of the incident and of the outgoing light.
+    came, left : the face for the incident and for the outgoing light.
     """
-    mirror_i = amplitudes(geometry.cos_i, geometry.square_i, index)
-    mirror_o = amplitudes(geometry.cos_o, geometry.square_o, index)
-    factors = []
-    for out in range(2):
-        for into in range(2):
-            through = came[into], left[out]
-            structure = squared(mirror_i[into]), squared(mirror_o[out])
-            again = bounced((1.0 - through[0], 1.0 - through[1]), structure)
-            factors.append(through[0] * through[1] * again)
+    factors = passed_powers(geometry, index, came, left)
     return tuple(
         entry * of(factor).sqrt(factor) for entry, factor in zip(jones, factors, strict=True)
     )
 
 
+def coated_power(
+    jones: Jones, geometry: Geometry, index: Index, came: Crossing, left: Crossing
+) -> Number:
+    """Return N' outside of the coat, the `boundary.power` of `transmitted` without its roots."""
+    ss, sp, ps, pp = passed_powers(geometry, index, came, left)
+    j_ss, j_sp, j_ps, j_pp = map(squared, jones)
+    return 0.5 * (ss * j_ss + sp * j_sp + ps * j_ps + pp * j_pp)
+
+
 def cosine_within(cosine: Number, n: Number) -> Number:
     """Return the cosine in a coat of relative index n, for the cosine outside."""
-    return of(cosine, n).sqrt(of(cosine, n).maximum(cosine * cosine + (n * n - 1.0), 1e-12)) / n
+    xp = of(cosine, n)
+    return xp.sqrt(xp.maximum(cosine * cosine + (n * n - 1.0), 1e-12)) / n
 
 
 def coated_reflectance(face: Number, beneath: Number) -> Number:
@@ -110,8 +172,7 @@ def pair_power(
     index: Index,
     kappa: Number,
     variance: Number,
-    came: Powers | None = None,
-    left: Powers | None = None,
+    coat: Coat | None = None,
 ) -> Number:
     """Return N' of a boundary model for a pair of directions, eq. 5 and 6.
 
@@ -120,14 +181,15 @@ def pair_power(
     jones : of a `boundary.Model`; None of a perfect reflector.
     wi, wo, index : of the structure, in the coat if it has one.
     kappa, variance : see `boundary.Heights`.
-    came, left : transmittances of the coat, see `transmitted`; None without a coat.
+    coat : None without a coat.
     """
     pair = geometry(wi, wo)
     if jones is None:
         return pair.one_plus_dot * pair.one_plus_dot
     matrix = jones(pair, index, Heights(kappa, variance))
-    if came is not None and left is not None:
-        matrix = transmitted(matrix, pair, index, came, left)
+    if coat is not None:
+        came, left = crossing(coat.cos_i, coat.n), crossing(coat.cos_o, coat.n)
+        return coated_power(matrix, pair, index, came, left)
     return power(matrix)
 
 
@@ -138,10 +200,9 @@ def relative_power(
     index: Index,
     kappa: Number,
     variance: Number,
-    came: Powers | None = None,
-    left: Powers | None = None,
+    coat: Coat | None = None,
 ) -> Number:
     """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
     # not 0 of opposite grazing directions
     edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
-    return pair_power(jones, wi, wo, index, kappa, variance, came, left) / (edge * edge)
+    return pair_power(jones, wi, wo, index, kappa, variance, coat) / (edge * edge)

@@ -74,6 +74,26 @@ def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(scale * np.interp(lam, observer.wavelengths, power))
 
 
+def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:
+    """Relative power of a CIE illuminant, e.g. D55, shape of λ (300 to 780 nm)."""
+    import colour
+
+    light = colour.SDS_ILLUMINANTS[name]
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(np.interp(lam, light.wavelengths, light.values))
+
+
+def cone_fundamentals(wavelength: ArrayLike) -> NDArray[np.float64]:
+    """Stockman and Sharpe's sensitivities of S, M and L to power, 2 degrees, (3, n) of λ (n,)."""
+    import colour
+
+    lam = np.asarray(wavelength, np.float64)
+    cones = colour.MSDS_CMFS["Stockman & Sharpe 2 Degree Cone Fundamentals"]
+    return np.stack(
+        [np.interp(lam, cones.wavelengths, row, 0.0, 0.0) for row in cones.values.T[::-1]]
+    )
+
+
 def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[np.floating]:
     """Linear sRGB of X, Y, Z, shape (..., 3), in the precision of the input; white is (1, 1, 1).
 

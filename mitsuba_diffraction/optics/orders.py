@@ -59,6 +59,36 @@ def order_cell(
     return OrderCell(c, k_continuous, band, channel, kind_a, t, r)
 
 
+class OrderDirection(NamedTuple):
+    """Direction of an order in the medium outside, from the grating equation.
+
+    Attributes
+    ----------
+    x : tangential component across the grooves; along them it is that of the mirror direction.
+    square : squared cosine to the normal, at most 0 of an order that does not propagate.
+    """
+
+    x: Number
+    square: Number
+
+
+@formula
+def order_direction(x: Number, y: Number, order: Number, stride: Number) -> OrderDirection:
+    """Return the direction of order m of light along ωi, by the grating equation.
+
+    x, y : tangential part of ωi.
+    stride : λ/d.
+    """
+    xp = of(x, y, order)
+    out = xp.fma(order, stride, -x)
+    return OrderDirection(out, 1.0 - xp.fma(out, out, y * y))
+
+
+def least_c(index: float) -> float:
+    """Return the least c = √(1 − y²) in a medium of light from outside."""
+    return math.sqrt(1.0 - 1.0 / index**2)
+
+
 @formula
 def smooth_coordinate(t: Number) -> Number:
     """Return τ of t = sin²(πτ/2), in which square roots at both ends vanish."""

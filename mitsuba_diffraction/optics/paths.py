@@ -19,7 +19,7 @@ import numpy as np
 from . import boundary, through
 from .blend import Real
 from .boundary import Direction, Heights, Jones
-from .coat import refracted, transmittances, transmitted
+from .coat import crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
 
 
@@ -152,7 +152,7 @@ class Path:
             assert not isinstance(self.index, Filmed)  # no coat lies on it
             pair = boundary.geometry(refracted(wi, n), refracted(wo, n))
             jones = model.jones(pair, self.index, heights)
-            faces = (transmittances(direction[2], n) for direction in (wi, wo))
+            faces = (crossing(direction[2], n) for direction in (wi, wo))
             return pair, transmitted(jones, pair, self.index, *faces)
         pair = boundary.geometry(wi, wo)
         return pair, model.jones(pair, self.index, heights)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import DiffractionError
-from .symbols import Scope, Symbol, kind_of, kinds_of, leaves_of
+from .symbols import Scope, Symbol, argument_of, is_vector, kind_of
 
 _WIDTH = 100
 _JOINT = "\xa0"  # no line break
@@ -30,41 +30,38 @@ class Function:
     ----------
     name : in the program.
     text : its definition.
-    callees : names of functions that it calls.
-    result : kinds of the results, in tuples as the formula returns them.
-    used : whether each number of the formula's arguments is a parameter.
+    kinds : of the results.
+    record : makes what the formula returns of several results; None of a single one.
     """
 
     name: str
     text: str
-    callees: set[str]
-    result: Any
-    used: list[bool]
+    kinds: list[str]
+    record: Callable[[list[Any]], tuple[Any, ...]] | None = None
 
 
 class Printer:
     """Text of a function from the symbols of its results."""
 
-    def __init__(self, scope: Scope, all_parameters: bool = True) -> None:
-        self._scope, self._dialect, self._all = scope, scope.dialect, all_parameters
+    def __init__(self, scope: Scope) -> None:
+        self._scope, self._dialect = scope, scope.dialect
         self._uses: dict[int, int] = {}
         self._variables: dict[int, str] = {}
         self._lines: list[str] = []
 
     def function(self, parameters: list[Symbol], result: Any, comment: str) -> Function:
         """Print a function; result : number, or tuple of numbers."""
-        leaves = list(leaves_of(result, self._scope))
-        structure = kind_of(result)
-        kinds = list(kinds_of(structure))
+        several = isinstance(result, tuple) and not is_vector(result)
+        values = result if several else (result,)
+        kinds = [kind_of(value) for value in values]
+        leaves = [argument_of(value, self._scope) for value in values]
         for leaf in leaves:
             self._count(leaf)
-        results = self._results(leaves, kinds, result) if len(leaves) > 1 else []
+        results = self._results(leaves, kinds, result) if several else []
         self._body(leaves, [name for _, name in results])
-        used = [self._all or self._uses.get(id(p), 0) > 0 for p in parameters]
-        head = [p for p, u in zip(parameters, used, strict=True) if u]
-        kind = "void" if results else self._dialect.types[kinds[0]]
-        text = self._written(self._scope.name, kind, head, results, comment)
-        return Function(self._scope.name, text, self._scope.callees, structure, used)
+        kind = "void" if several else self._dialect.types[kinds[0]]
+        text = self._written(self._scope.name, kind, parameters, results, comment)
+        return Function(self._scope.name, text, kinds, record_of(result) if several else None)
 
     def staged(
         self,
@@ -102,11 +99,7 @@ class Printer:
         second._body([result], [])
         last = [p for p in parameters if id(p) in kept]
         body = second._written(names[1], self._dialect.types[result.kind], last, [], comment)
-        callees, structure = self._scope.callees, result.kind
-        return (
-            Function(names[0], f"{values}\n{text}", callees, (), [True] * len(early)),
-            Function(names[1], body, callees, structure, [True] * len(last)),
-        )
+        return Function(names[0], f"{values}\n{text}", []), Function(names[1], body, [result.kind])
 
     def _body(self, leaves: list[Any], names: list[str]) -> None:
         """Print the statements that assign results, or return the only one without a name."""
@@ -164,7 +157,7 @@ class Printer:
             self._line(f"{name} = {self.text(symbol)};")
             self._variables[id(symbol)] = name
         elif symbol.operation not in _LEAVES and (symbol.name or (uses > 1 and _long(symbol))):
-            name = self._scope.take(symbol.name or f"t{len(self._variables)}")
+            name = self._scope.take(symbol.name or symbol.hint or f"t{len(self._variables)}")
             self._line(f"{self._dialect.types[symbol.kind]} {name} = {self.text(symbol)};")
             self._variables[id(symbol)] = name
 
@@ -272,12 +265,20 @@ class Printer:
         return f"(1.0 / {self.text(divisor, 8)})"
 
 
+def record_of(values: tuple[Any, ...]) -> Callable[[list[Any]], tuple[Any, ...]]:
+    """Return a function that makes a tuple of the same type from a list."""
+    make: Callable[[list[Any]], tuple[Any, ...]] = getattr(values, "_make", tuple)
+    return make
+
+
 def _name_of(value: Any, otherwise: str = "") -> str:
-    """Return the name of a symbol: its variable's, or its function's and a number."""
+    """Return the name of a symbol: its variable's, its vector's, or its function's and a number."""
+    if isinstance(value, Symbol) and value.operation in ("x", "y", "z"):
+        return f"{value.parts[0].parts[0]}_{value.operation}"
     if not isinstance(value, Symbol) or value.operation != "result":
-        return getattr(value, "name", None) or otherwise
+        return getattr(value, "name", None) or getattr(value, "hint", None) or otherwise
     call, number = value.parts
-    return value.name or f"{call.parts[0]}{number}"
+    return value.name or value.hint or f"{call.parts[0]}{number}"
 
 
 def _one(value: Any) -> bool:

@@ -15,25 +15,26 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from ..errors import DiffractionError
 from . import arithmetic
 from .dialects import Dialect
-from .printer import Function, Printer
+from .printer import Function, Printer, record_of
 from .symbols import (
+    OWN_FILES,
     Symbol,
+    argument_of,
     components_of,
     current,
     kind_of,
-    kinds_of,
-    leaves_of,
-    like,
     refuse,
     scopes,
-    structured,
 )
+
+OWN_FILES.add(__file__)
 
 
 @dataclass
@@ -50,19 +51,15 @@ class Program:
     complex_numbers: bool = False
     _owners: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
-    def add(
-        self, formula: Callable[..., Any], *arguments: Any, name: str = "", comment: str = ""
-    ) -> Function:
+    def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> Function:
         """Write a formula, and the formulas that it calls, as functions.
 
         Parameters
         ----------
         formula : function of this folder.
         arguments : of each parameter its kind ("float", "complex", "vector": three components), a
-            tuple of kinds, or else a value that is constant in the program, such as a function by
-            `supplied` or a symbol by `known`.
+            tuple of kinds, or else a value that is constant in the program.
         name : of the function; the formula's by default.
-        comment : of the function; the docstring's first paragraph by default.
 
         Raises
         ------
@@ -71,26 +68,19 @@ class Program:
         """
         name = name or formula.__name__.lstrip("_")
         self._check_name(formula, name)
-        return self._add(formula, arguments, name, comment)
+        return self._add(formula, arguments, name)
 
     def _add(
-        self,
-        formula: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        name: str = "",
-        comment: str = "",
-        *,
-        all_parameters: bool = True,
+        self, formula: Callable[..., Any], arguments: tuple[Any, ...], name: str = ""
     ) -> Function:
         formula = getattr(formula, "__wrapped__", formula)
-        key = (formula, name, all_parameters, *map(_key, arguments))
+        key = (formula, name, *map(_key, arguments))
         if key not in self.functions:
             scope = Scope(
                 self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
             )
             parameters, result = scope.run(arguments)
-            printer = Printer(scope, all_parameters)
-            self.functions[key] = printer.function(parameters, result, comment or _comment(formula))
+            self.functions[key] = Printer(scope).function(parameters, result, _comment(formula))
         return self.functions[key]
 
     def _check_name(self, formula: Callable[..., Any], name: str) -> None:
@@ -162,25 +152,19 @@ class Scope:
 
     def _check(self, parts: Iterable[Any]) -> None:
         for part in parts:
-            if isinstance(part, Symbol) and part.scope not in (None, self):
+            if isinstance(part, Symbol) and part.scope is not self:
                 refuse("it reads a variable of another function; hand it on as an argument")
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
-        """Write a call of another formula, and the formula itself if it is new."""
-        function = self.program._add(formula, tuple(map(kind_of, values)), all_parameters=False)
-        leaves = [leaf for value in values for leaf in leaves_of(value)]
-        leaves = [leaf for leaf, used in zip(leaves, function.used, strict=True) if used]
-        results = self.call(function.name, leaves, list(kinds_of(function.result)))
-        return structured(function.result, iter(results))
-
-    def call(self, name: str, arguments: Sequence[Any], kinds: Sequence[str]) -> list[Any]:
-        """Return the results of a function; a vector as its components."""
-        self.callees.add(name)
-        call = self.expression(kinds[0] if len(kinds) == 1 else "call", "call", (name, *arguments))
-        results = [call]
-        if len(kinds) > 1:
-            results = [self.expression(k, "result", (call, n)) for n, k in enumerate(kinds)]
-        return [components_of(self, r) if r.kind == "vector" else r for r in results]
+        """Return the results of a call of another formula, which is written if it is new."""
+        function = self.program._add(formula, tuple(map(kind_of, values)))
+        self.callees.add(function.name)
+        parts, kinds = (function.name, *map(argument_of, values)), function.kinds
+        if function.record is None:
+            return _components(self.expression(kinds[0], "call", parts))
+        call = self.expression("call", "call", parts)
+        results = [self.expression(kind, "result", (call, n)) for n, kind in enumerate(kinds)]
+        return function.record(list(map(_components, results)))
 
     def run(self, arguments: Sequence[Any]) -> tuple[list[Symbol], Any]:
         """Run the formula on symbols; return those of its parameters, and its result."""
@@ -220,8 +204,13 @@ def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol])
             _parameter(scope, _word(name, argument, field), part, parameters)
             for field, part in zip(fields, argument, strict=True)
         ]
-        return like(argument, parts)
+        return record_of(argument)(parts)
     return argument
+
+
+def _components(result: Symbol) -> Any:
+    """Return a number, or the components of a vector."""
+    return components_of(current(), result) if result.kind == "vector" else result
 
 
 def _key(argument: Any) -> Any:
@@ -250,7 +239,8 @@ def _active(scope: Scope) -> Iterator[None]:
 
 def _emitted(formula: Callable[..., Any], values: tuple[Any, ...]) -> Any:
     """Call a formula from within another: write a call if a symbol is among its arguments."""
-    if not any(isinstance(leaf, Symbol) for value in values for leaf in leaves_of(value)):
+    parts = [part for value in values for part in (value if isinstance(value, tuple) else [value])]
+    if not any(isinstance(part, Symbol) for part in parts):
         return formula(*values)
     return current().called(formula, values)
 
@@ -262,11 +252,13 @@ def _local_names(scope: Scope) -> Iterator[None]:
     def on_return(frame: FrameType, event: str, _: Any) -> None:
         if event != "return" or scopes[-1:] != [scope]:
             return
-        own = frame.f_code is scope.formula.__code__
-        if own or frame.f_code.co_filename == scope.formula.__code__.co_filename:
+        own, file = frame.f_code is scope.formula.__code__, frame.f_code.co_filename
+        if own or file == scope.formula.__code__.co_filename or file in formula_files:
             for name, value in frame.f_locals.items():
                 _name(scope, name, value, own)
 
+    folder = Path(__file__).parent
+    formula_files = {str(file) for file in folder.glob("*.py")} - OWN_FILES
     before = sys.getprofile()
     sys.setprofile(on_return)
     try:
@@ -278,8 +270,10 @@ def _local_names(scope: Scope) -> Iterator[None]:
 def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
     """Name a symbol, or the parts of a tuple; own : a variable of the formula itself."""
     if isinstance(value, Symbol):
-        if value.scope is scope and (own or value.name is None):
+        if value.scope is scope and own:
             value.name = name
+        elif value.scope is scope and value.hint is None:
+            value.hint = name
     elif isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))
         for suffix, part in zip(fields, value, strict=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import linecache
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TypeAlias
@@ -36,6 +36,11 @@ def current() -> Scope:
     return scopes[-1]
 
 
+def _condition(operation: str) -> Callable[[Any, Any], Any]:
+    """Return a method of `Symbol` whose result is a condition."""
+    return lambda self, other: _node(operation, self, other, kind="bool")
+
+
 class Symbol:
     """Expression of a formula.
 
@@ -43,17 +48,19 @@ class Symbol:
     ----------
     kind : one of `KINDS`.
     operation, parts : operator or function, and its operands; "name" and its text for a variable.
-    name : of the variable that holds the value in the formula.
-    scope : function that the expression belongs to, None where it is known everywhere.
+    name, hint : of the variable that holds the value in the formula, and in a function that the
+        formula runs.
+    scope : function that the expression belongs to.
     """
 
-    __slots__ = ("kind", "name", "operation", "parts", "scope")
+    __slots__ = ("hint", "kind", "name", "operation", "parts", "scope")
 
     def __init__(
         self, kind: str, operation: str, parts: tuple[Any, ...], scope: Scope | None = None
     ) -> None:
         self.kind, self.operation, self.parts, self.scope = kind, operation, parts, scope
         self.name: str | None = None
+        self.hint: str | None = None
 
     def __add__(self, other: Any) -> Any:
         return self if _is(other, 0.0) else _node("+", self, other)
@@ -88,29 +95,9 @@ class Symbol:
     def __abs__(self) -> Any:
         return _node("abs", self)
 
-    def __lt__(self, other: Any) -> Any:
-        return _node("<", self, other, kind="bool")
-
-    def __le__(self, other: Any) -> Any:
-        return _node("<=", self, other, kind="bool")
-
-    def __gt__(self, other: Any) -> Any:
-        return _node(">", self, other, kind="bool")
-
-    def __ge__(self, other: Any) -> Any:
-        return _node(">=", self, other, kind="bool")
-
-    def __eq__(self, other: object) -> Any:
-        return _node("==", self, other, kind="bool")
-
-    def __ne__(self, other: object) -> Any:
-        return _node("!=", self, other, kind="bool")
-
-    def __and__(self, other: Any) -> Any:
-        return _node("&&", self, other, kind="bool")
-
-    def __or__(self, other: Any) -> Any:
-        return _node("||", self, other, kind="bool")
+    __lt__, __le__, __gt__, __ge__ = map(_condition, ("<", "<=", ">", ">="))
+    __eq__, __ne__ = map(_condition, ("==", "!="))
+    __and__, __or__ = map(_condition, ("&&", "||"))
 
     def __invert__(self) -> Any:
         return _node("!", self, kind="bool")
@@ -268,68 +255,32 @@ def _imag(x: Any) -> Any:
     return x.imag if isinstance(x, Symbol | complex) else 0.0
 
 
-def known(name: str, kind: str = "float") -> Symbol:
-    """Return a symbol that every function of a program may read: a uniform or a macro."""
-    return Symbol(kind, "name", (name,))
-
-
-def components(name: str) -> tuple[Symbol, Symbol, Symbol]:
-    """Return the components of a vector that every function of a program may read."""
-    vector = known(name, "vector")
-    x, y, z = (Symbol("float", axis, (vector,)) for axis in "xyz")
-    return x, y, z
-
-
-def supplied(name: str, *kinds: str) -> Callable[..., Any]:
-    """Return a function that the language supplies; kinds : of its results, one `float` if none.
-
-    The function may take numbers, and tuples of three as a vector.
-    """
-
-    def call(*values: Any) -> Any:
-        results = current().call(name, [argument_of(v) for v in values], kinds or ("float",))
-        return results[0] if len(results) == 1 else tuple(results)
-
-    return call
-
-
 def components_of(scope: Scope, vector: Symbol) -> tuple[Any, ...]:
     """Return the three components of a vector."""
     return tuple(scope.expression("float", axis, (vector,)) for axis in "xyz")
 
 
-def like(structure: tuple[Any, ...], parts: Iterable[Any]) -> Any:
-    """Return parts in a tuple of a structure's type."""
-    if hasattr(structure, "_make"):
-        return structure._make(parts)
-    return tuple(parts)
-
-
-def _vector(value: Any) -> bool:
+def is_vector(value: Any) -> bool:
     """Whether a value is three real numbers that are a direction or a colour."""
-    return (
-        type(value) is tuple and len(value) == 3
-        and all(isinstance(v, int | float) or kind_of(v) == "float" for v in value)
-        and any(isinstance(v, Symbol) for v in value)
-    )  # fmt: skip
+    if type(value) is not tuple or len(value) != 3:
+        return False
+    return all(isinstance(v, int | float) or getattr(v, "kind", "") == "float" for v in value)
 
 
-def kind_of(value: Any) -> Any:
-    """Return the kind of a value as `Program.add` takes it."""
+def kind_of(value: Any) -> str:
+    """Return the kind of an argument or a result of a function."""
     if isinstance(value, Symbol):
         return value.kind
-    if isinstance(value, int | float):
-        return "float"
-    if _vector(value):
+    if is_vector(value):
         return "vector"
-    if isinstance(value, tuple):
-        return like(value, map(kind_of, value))
-    return value
+    if not isinstance(value, int | float):
+        refuse(f"{value!r} is no number")
+    return "float"
 
 
 def argument_of(value: Any, scope: Scope | None = None) -> Any:
     """Return three components as a vector, and other numbers as they are."""
-    if not _vector(value):
+    if not is_vector(value):
         return value
     scope = scope or current()
     first = value[0]
@@ -338,26 +289,3 @@ def argument_of(value: Any, scope: Scope | None = None) -> Any:
         if all(v is c for v, c in zip(value, components_of(scope, vector), strict=True)):
             return vector
     return scope.expression("vector", "vector", value)
-
-
-def leaves_of(value: Any, scope: Scope | None = None) -> Iterator[Any]:
-    """Return the numbers and vectors of a value that are arguments of a function, or results."""
-    if isinstance(value, Symbol | int | float) or _vector(value):
-        yield argument_of(value, scope)
-    elif isinstance(value, tuple):
-        for part in value:
-            yield from leaves_of(part, scope)
-
-
-def kinds_of(structure: Any) -> Iterator[str]:
-    if isinstance(structure, str):
-        yield structure
-    else:
-        for part in structure:
-            yield from kinds_of(part)
-
-
-def structured(structure: Any, values: Iterator[Any]) -> Any:
-    if isinstance(structure, str):
-        return next(values)
-    return like(structure, [structured(part, values) for part in structure])

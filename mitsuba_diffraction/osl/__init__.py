@@ -5,6 +5,7 @@ Contents
 export            write a shader with its textures and the script into a folder
 orders            texture and constants of a table of solved orders
 patch             textures and constants of a patch of heights
+formulas          formulas of optics that the shaders call, as functions in OSL
 spectrum          wavelengths that a shader draws, and their colours
 sockets           inputs of the shaders, with names and tooltips
 blender_material  script that runs in Blender and adds the material to a file

@@ -22,13 +22,13 @@ from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
-from .orders import interpolation_error, order_constants, order_formulas, order_texture
+from .formulas import order_formulas, patch_formulas, shader_file
+from .orders import interpolation_error, order_constants, order_texture
 from .patch import (
     energy_texture,
     mean_transmittance,
     patch_constants,
     patch_error,
-    patch_formulas,
     patch_textures,
 )
 from .sockets import (
@@ -272,10 +272,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
     constants = {"N_NODES": NODES, **shader.constants}
     lines = [f"#define {key} {_literal(value)}" for key, value in constants.items()]
     lines += [f'#define SPACE_{n} "{space}"' for n, space in enumerate(WORKING_SPACES)]
-    folder = resources.files(__package__).joinpath("shaders")
-    common, own = (
-        folder.joinpath(file).read_text(encoding="utf-8") for file in ("common.osl", shader.source)
-    )
+    common, own = shader_file("common.osl"), shader_file(shader.source)
     own = own.replace("SHADER(PARAMETERS)", f"{name}(\n    " + ",\n    ".join(parameters) + "\n)")
     head = _HEAD.format(surface=one_line(shader.surface), version=version("mitsuba_diffraction"))
     return "\n".join([head + "\n".join(lines), "", common, shader.formulas, own])

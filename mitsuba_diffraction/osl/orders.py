@@ -8,16 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.dialects import OSL
-from ..optics.orders import (
-    cell_wavelengths,
-    order_cell,
-    smooth_coordinate,
-    wavelength_coordinate,
-)
-from ..optics.programs import Program
+from ..optics.orders import least_c
 from ..tables.orders import OrderTable, cells
-from ..tables.orders.grids import face_transmittance, least_c, rows
+from ..tables.orders.grids import leaving_transmittance, rows
 from ..tables.orders.table import Counts
 from .spectrum import NODES, drawn_spectrum
 
@@ -136,16 +129,6 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
     }
 
 
-def order_formulas() -> str:
-    """Return the functions of `optics.orders` that `shaders/orders.osl` calls."""
-    program = Program(OSL)
-    for formula, count in (
-        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 5), (wavelength_coordinate, 4),
-    ):  # fmt: skip
-        program.add(formula, *["float"] * count)
-    return program.text
-
-
 def _samples(period: float) -> int:
     """Return the number of wavelengths whose orders are lobes of a sample; period : µm."""
     wavelengths = drawn_spectrum().wavelengths
@@ -168,7 +151,7 @@ def _mean_remainder(table: OrderTable) -> float:
     orders = np.arange(-most, most + 1)
     light = [a[..., None] / n for a in (x, y)]
     sums = table.efficiency(light[0], light[1], 550.0, orders).sum(axis=-1)
-    through = face_transmittance((x**2 + y**2) / n**2, n)
+    through = leaving_transmittance((x**2 + y**2) / n**2, n)
     return float(np.clip(np.mean((1.0 - sums) * through), 0.0, 1.0))
 
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from ..optics.boundary import Model
-from ..optics.coat import pair_power
-from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
-from ..optics.programs import Program
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
 from ..tables.powers import order_0_power
@@ -32,6 +28,8 @@ BANDS, BANDED = 4, 0.75
 _EVEN = 0.1
 #: Orders 0 over κ.
 ORDER_0_NODES = 256
+#: Width of the window of a patch that sets no limit, µm.
+_UNLIMITED = 1e9
 #: Width of the texture of draws, a power of 2: coordinates of its pixels are exact.
 DRAWS_WIDTH = 1024
 
@@ -194,32 +192,11 @@ def patch_constants(
         "DRAWS_ROWS": textures.rows,
         "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
+        "SCAN_WIDTH": table.settings.window_width or _UNLIMITED,
         "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
     }
-
-
-def patch_formulas(model: Model | None) -> str:
-    """Return the functions of `optics` that `shaders/patch.osl` calls.
-
-    model : of the boundary; None of a perfect reflector.
-
-    Raises a DiffractionError if the model's formula cannot be written in OSL.
-    """
-    program = Program(OSL)
-    jones = None if model is None else model.jones
-    program.add(
-        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
-    )
-    flat = reflectance if model is not None else _everything
-    program.add(flat, "float", "complex", name="flat_reflectance")
-    return program.text
-
-
-def _everything(cosine: Any, index: Any) -> float:
-    """Return the reflectance of a perfect reflector."""
-    return 1.0
 
 
 def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:

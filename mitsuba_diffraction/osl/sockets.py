@@ -81,8 +81,8 @@ def window_socket(coherence_width: float) -> Socket:
     """Return the socket of the coherence width, µm."""
     return Socket(
         "CoherenceWidth", "Coherence Width (µm)", "float", coherence_width,
-        "Width over which light is coherent, 65 in sunlight. Narrower windows blur the orders: "
-        "the roughness of their lobes",
+        "Width over which light is coherent, 65 in sunlight. Narrower windows blur the mirror and "
+        "the orders: the roughness of their lobes. A small scan limits that of the orders",
     )  # fmt: skip
 
 

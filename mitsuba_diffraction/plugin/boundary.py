@@ -27,7 +27,7 @@ from ..optics.boundary import (
     model_of,
     power,
 )
-from ..optics.coat import Powers, transmittances, transmitted
+from ..optics.coat import Crossing, coated_power, crossing, transmitted
 from .directions import Pair, TablePoint
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import CoatedPair, UnderFilm
@@ -113,13 +113,14 @@ class Boundary:
             return self._channels([self.model.power(light.pair, index) for index in indices])
         matrices = [self.model.jones(light.pair, *channel) for channel in channels]
         if light.passed:
-            matrices = [
-                transmitted(jones, light.pair, index, *light.passed)
+            outside = transmitted if mi.is_polarized else coated_power
+            results = [
+                outside(jones, light.pair, index, *light.passed)
                 for jones, index in zip(matrices, indices, strict=True)
             ]
-        if mi.is_polarized:
-            return light.mueller(matrices)
-        return self._channels([power(jones) for jones in matrices])
+        else:
+            results = matrices if mi.is_polarized else [power(jones) for jones in matrices]
+        return light.mueller(results) if mi.is_polarized else self._channels(results)
 
     def heights(
         self, pair: Pair | TablePoint, height_scale: Float, wavenumbers: list[Float]
@@ -157,13 +158,13 @@ class LightPath:
     pair : geometry at the structure.
     ends : directions of travel outside.
     above : whether light stays above the surface.
-    passed : transmittances of a coat's face at both ends; empty without a coat.
+    passed : a coat's face at both ends; empty without a coat.
     """
 
     pair: Geometry
     ends: tuple[Vector3f, Vector3f]
     above: bool
-    passed: tuple[Powers, ...]
+    passed: tuple[Crossing, ...]
 
     @classmethod
     def of(cls, pair: Pair, mode: mi.TransportMode) -> LightPath:
@@ -173,9 +174,9 @@ class LightPath:
         ends, cosines = [outer.wi, outer.wo], [outer.cos_i, outer.cos_o]
         if mode != mi.TransportMode.Importance:
             inner, ends, cosines = inner[::-1], ends[::-1], cosines[::-1]
-        passed: tuple[Powers, ...] = ()
+        passed: tuple[Crossing, ...] = ()
         if isinstance(pair, CoatedPair):
-            passed = tuple(transmittances(cosine, pair.n) for cosine in cosines)
+            passed = tuple(crossing(cosine, pair.n) for cosine in cosines)
         side = mi.Vector3f(1.0, 1.0, 1.0 if outer.above else -1.0)
         travel = -ends[0] * side, ends[1] * side
         return cls(geometry(*inner), travel, outer.above, passed)

@@ -56,6 +56,9 @@ class DeviceTable:
         self.record = Record.aligned(*table.coefficients.shape[3:])
         self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
+        # order 0's lobe is that of a window `order_0_ratio` times as large in area
+        self._ratio = table.order_0_ratio
+        self._lobe = [_log2(self._ratio * exponent) for exponent in table.grid.exponents]
         packets_a_bin = self.record.numbers // packet_size(self.record.numbers)
         if table.coefficients.size // table.expansion.terms * packets_a_bin >= _MOST_PACKETS:
             raise DiffractionError(
@@ -83,8 +86,9 @@ class DeviceTable:
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         first, across, along = self._place(x, y, interval)
 
-        lobe_x, lobe_y = grid.exponents
-        lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
+        lobe = dr.exp2(dr.fma(self._lobe[0], dr.square(x), self._lobe[1] * dr.square(y)))
+        if self._ratio != 1.0:
+            lobe *= self._ratio
 
         if windows:
             total = self._over_windows(first, across, along, weights, windows)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.directional import SHARE, DirectionalTable
+from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
 from .directions import PatchFrame
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
@@ -34,22 +34,31 @@ class DirectionLookup:
         self._pages = self._polar = self._azimuthal = 1
 
     def update(
-        self, tables: list[DirectionalTable] | None, nodes: list[float], scales: ScaleRange
+        self,
+        tables: list[DirectionalTable] | None,
+        nodes: list[float],
+        scales: ScaleRange,
+        slopes: Sequence[tuple[Float, list[DirectionalTable]]] = (),
     ) -> None:
-        """Take the tables at evenly spaced height scales, or none."""
+        """Take the tables at evenly spaced height scales, or none.
+
+        slopes : differentiable numbers, and derivatives of the tables with respect to them.
+        """
         self.present = tables is not None
         if tables is None:
             return
         height_scale, varies = scales.height_scale, scales.varies
-        maps = np.stack([_cells(table, scales.centre) for table in tables])
+        maps = _maps(tables, scales.centre)
+        rates = [(number, _maps(rate, scales.centre)) for number, rate in slopes]
         self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
             share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-            self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
+            here = [(x, rate[0] * (1 - share) + rate[1] * share) for x, rate in rates]
+            self._values = _attached(maps[0] * (1 - share) + maps[1] * share, here)
         # Where there is but one node nothing varies with the height scale
-        self._nodes = upload(mi.Float, maps) if varies or width > 0.0 else None
+        self._nodes = _attached(maps, rates) if varies or width > 0.0 else None
         wavelengths = tables[0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
@@ -121,6 +130,17 @@ class DirectionLookup:
         return [dr.lerp(*both, share) for both in zip(*ends, strict=True)]
 
 
+def at_horizon(cosine: Float) -> Float:
+    """Factor on light within half a degree of the horizon, where tables of directions end.
+
+    An albedo that gains there rises as 1/cosθ, of wide lobes faster.
+
+    cosine : of the angle to the normal, above 0.
+    """
+    near = dr.clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
+    return near * dr.sqrt(near)
+
+
 def scales_of(tables: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:
     """Scales at several height scales, 1 where there is none; None if there is none at all."""
     some = next((table for table in tables if table is not None), None)
@@ -138,6 +158,20 @@ def between(
     width = nodes[1] - nodes[0]
     share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
+
+
+def _attached(values: Array, slopes: Sequence[tuple[Float, Array]]) -> Buffer:
+    """Upload values that have these derivatives with respect to differentiable numbers."""
+    buffer = upload(mi.Float, values)
+    for number, rate in slopes:
+        buffer += (number - dr.detach(number)) * upload(mi.Float, rate)
+    dr.eval(buffer)
+    return buffer
+
+
+def _maps(tables: list[DirectionalTable], stretch: float) -> Array:
+    """Cells of tables, see `_cells`."""
+    return np.stack([_cells(table, stretch) for table in tables])
 
 
 def _cells(table: DirectionalTable, stretch: float) -> Array:

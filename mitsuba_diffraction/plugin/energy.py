@@ -19,13 +19,13 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
-from ..tables.directional import FINE, LAST_ANGLE, DirectionalTable
+from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
-from ..tables.film import mean_exponents
+from ..tables.film import exponents_at, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary
-from .direction_lookup import DirectionLookup, between, scales_of
+from .direction_lookup import DirectionLookup, at_horizon, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
 from .fresnel import Dielectric, Inside, Perfect, Reflectance
@@ -51,8 +51,6 @@ THICKNESS_STEP = 1.0
 #: Step of a height scale over which the slope of g is taken. g bends by less than 1e-3 of its slope
 #: over it, and single precision leaves four digits of the difference.
 SLOPE_STEP = 2.0**-9
-#: Cosine of the last angle of tables of directions.
-LAST_COSINE = math.cos(LAST_ANGLE)
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
@@ -113,7 +111,9 @@ class EnergyModel:
             height_scale = scales.height_scale
             near = [height_scale, height_scale + (SLOPE_STEP if scales.differentiable else 0.0)]
             around = nodes if scales.varies else near
-            self._mean.update([self._mean_gain(node) for node in around], around, scales)
+            exponents = mean_exponents(self._table, self._exact, self._energy.wavelength_range)
+            gains = [_gain(exponents, node) for node in around]
+            self._mean.update(gains, around, scales, self._mean_slopes(exponents, around))
         if not (self.conserving or beneath):
             return
         conserved = [self._energy.at(node) for node in nodes]
@@ -189,10 +189,7 @@ class EnergyModel:
                     [incident * outgoing for incident, outgoing in both]
                 )
         if self._scale.present:
-            # beyond the table's angles an albedo that gains rises as 1/cosθ, of wide lobes faster
-            for cosine in (outer.cos_i, outer.cos_o):
-                near = dr.minimum(cosine * (1.0 / LAST_COSINE), 1.0)
-                product *= near * dr.sqrt(near)
+            product *= at_horizon(outer.cos_i) * at_horizon(outer.cos_o)
         return product
 
     def reflected(
@@ -208,11 +205,21 @@ class EnergyModel:
             self._reflected.at(direction, cosine, frame, wavenumbers, height_scale)
         )
 
-    def _mean_gain(self, height_scale: float) -> DirectionalTable:
-        """g at a height scale."""
-        exponents = mean_exponents(self._table, self._exact, self._energy.wavelength_range)
-        values = limited(exponents.values * height_scale**2).astype(np.float32)
-        return DirectionalTable(exponents.wavelengths, values)
+    def _mean_slopes(
+        self, exponents: DirectionalTable, nodes: list[float]
+    ) -> list[tuple[Float, list[DirectionalTable]]]:
+        """Derivatives of g at height scales with respect to numbers of the film that have them."""
+        wavelengths = exponents.wavelengths
+        film, light = self._exact(wavelengths), wavelengths * self._scales.centre
+        assert isinstance(film, fresnel.Filmed)
+        assert isinstance(self._material, UnderFilm)
+        slopes = []
+        for number, step, changed in self._material.changes(film, light):
+            moved = exponents_at(self._table.roughness, changed, wavelengths)
+            ends = ((_gain(exponents, node), _gain(moved, node)) for node in nodes)
+            rates = [(after.values - before.values) / step for before, after in ends]
+            slopes.append((number, [DirectionalTable(wavelengths, rate) for rate in rates]))
+        return slopes
 
     def _ratio(self, conserved: Conservation) -> DirectionalTable:
         albedo = conserved.albedo
@@ -226,6 +233,12 @@ class EnergyModel:
         if isinstance(index, fresnel.Filmed):  # which may reflect next to nothing
             values = np.minimum(values, MOST_RATIO)
         return DirectionalTable(albedo.wavelengths, values.astype(np.float32))
+
+
+def _gain(exponents: DirectionalTable, height_scale: float) -> DirectionalTable:
+    """g at a height scale, from ln g at 1."""
+    values = limited(exponents.values * height_scale**2).astype(np.float32)
+    return DirectionalTable(exponents.wavelengths, values)
 
 
 def indices_of(
@@ -278,8 +291,8 @@ def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:
 def _rounded_indices(
     material: Reflectance | Inside | UnderFilm, step: float, wavelengths: NDArray[np.float64]
 ) -> Indices | None:
-    """`indices_of`, to a step: an optimisation of them waits rarely, and sees s, g and the ratio of
-    albedos as constants.
+    """`indices_of`, to a step: an optimisation of them waits rarely, and sees s and the ratio of
+    albedos as constants; g under a film has derivatives with respect to the film's numbers.
     """
     exact = indices_of(material, wavelengths)
     if exact is None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics.colour import LONGEST, SHORTEST, metal_tint
 from ..optics.fresnel import normal_reflectance
-from ..optics.materials import TISSUES
+from ..optics.materials import SODIUM, TISSUES
 from .conductors import (
     extended_texture,
     parameters_of,
@@ -139,6 +139,9 @@ class Conductor:
         #: Whether light that is not reflected is absorbed, and none goes beneath.
         self.absorbs = True
         self.medium: Dielectric | None = None  #: what lies above, if not air
+        #: Index of the medium above over that of `medium`, which is one number; None if it is 1.
+        self.dispersion: Texture | None = None
+        self.above = ""  #: name of the medium whose dispersion it is
         # of RGB's channels: the index over wavelengths, and as the channels have it
         self._spectrum: tuple[Array, Array] | None = None
         #: Columns of `optics.colour.metal_tint`, in RGB variants and of a tabulated material.
@@ -173,6 +176,24 @@ class Conductor:
             conductor._spectrum = index, conductor._channels()
         return conductor
 
+    def disperse(self, above: str, wavelength: float) -> None:
+        """Give the medium above, a tissue by name, its index over wavelength.
+
+        wavelength : nm, where mono variants take it.
+        """
+        nodes = TISSUES[above].nodes
+        ratio = dispersion_of(above, nodes)
+        spectrum: dict[str, Any] = {
+            "type": "spectrum",
+            "value": list(zip(nodes.tolist(), ratio.tolist(), strict=True)),
+        }
+        if mi.is_monochromatic:
+            one = float(dispersion_of(above, np.array(wavelength)))
+            spectrum = {"type": "uniform", "value": one}
+        # a conductor's spectra are without bounds in every variant
+        loaded = _load("conductor", eta=spectrum, k={"type": "uniform", "value": 0.0})
+        self.above, self.dispersion = above, children(loaded)["eta"]
+
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
         indices = self.indices(si, active)
@@ -182,8 +203,18 @@ class Conductor:
         """The complex index n + ik of each channel, over that of the medium above."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
         if self.medium is not None:
-            eta, k = eta / self.medium.eta, k / self.medium.eta
+            above = self.medium.eta
+            if self.dispersion is not None:
+                above = above * self.dispersion.eval(si, active)
+            eta, k = eta / above, k / above
         return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
+
+    def _dispersion_spectrum(self) -> tuple[Array, Array]:
+        """Return `dispersion` at the wavelengths of the tint, and of RGB's channels."""
+        if self.dispersion is None:
+            return np.ones(1), np.ones(1)
+        channels = self.dispersion.eval(dr.zeros(mi.SurfaceInteraction3f), True)
+        return dispersion_of(self.above, _VISIBLE), np.array(channels).ravel()
 
     def _channels(self) -> Array:
         """n + ik of RGB's channels, without a medium."""
@@ -203,13 +234,22 @@ class Conductor:
         self.tint = None
         if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
             return
-        medium = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
-        spectrum, channels = (normal_reflectance(index / medium) for index in self._spectrum)
+        above = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
+        spectrum, channels = (
+            normal_reflectance(index / (above * ratio))
+            for index, ratio in zip(self._spectrum, self._dispersion_spectrum(), strict=True)
+        )
         self.tint = [mi.Color3f(rgb) for rgb in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
         dr.make_opaque(self.tint)
 
     def __str__(self) -> str:
         return f"{'conductor' if self.absorbs else 'dielectric'}[{self.name}]"
+
+
+def dispersion_of(tissue: str, wavelengths: Array) -> Array:
+    """Return a tissue's real index at wavelengths in nm over that at sodium's line."""
+    index = TISSUES[tissue].index
+    return np.asarray(index(wavelengths).real / index(SODIUM).real)
 
 
 Reflectance = Perfect | Dielectric | Conductor

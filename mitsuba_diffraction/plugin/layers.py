@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ..optics.arithmetic import is_complex
-from ..optics.coat import refracted
+from ..optics.coat import coated_reflectance, cosine_within, refracted
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.fresnel import Filmed, reflectance
 from ..optics.geometry import wavenumber
@@ -58,14 +60,10 @@ class UnderCoat:
         self.changeable = (*material.changeable, *coat.changeable)
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """1 − T T / (1 − R R) of coat and material, for the cosine of the angle outside."""
-        n = self.coat.eta
-        inside = dr.sqrt(dr.maximum(dr.fma(cos_theta, cos_theta, n * n - 1.0), 1e-12)) / n
+        """Reflectance of coat and material together, for the cosine of the angle outside."""
         face = self.coat.reflectance(cos_theta, si, active)
-        beneath = self.material.reflectance(inside, si, active)
-        through = (1.0 - face) * (1.0 - beneath)
-        # Mirrors that reflect everything let nothing through
-        return 1.0 - through * dr.rcp(dr.maximum(1.0 - face * beneath, 1e-6))
+        inside = cosine_within(cos_theta, self.coat.eta)
+        return coated_reflectance(face, self.material.reflectance(inside, si, active))
 
     def traverse(self, callback: Callback) -> None:
         """Expose the material's index, and the coat's over that of the medium above it."""
@@ -81,6 +79,8 @@ class UnderCoat:
         return f"{self.material} under coat[eta = {dr.slice(self.coat.eta):.5g}]"
 
 
+#: Steps of an index and of a thickness, nm, for slopes: a fringe advances by less than 0.01 rad.
+INDEX_CHANGE, THICKNESS_CHANGE = 1e-4, 0.1
 #: Path there and back, nm, over which light interferes: λ²/Δλ at 550 nm of a band of 25 nm.
 COHERENCE = 12e3
 #: Power that comes back of light that would see the material alone, below which nobody sees it.
@@ -118,6 +118,21 @@ class Channels:
             dr.maximum(sum(w * v for w, v in zip(row, values, strict=True)), 0.0)
             for row in self.weights
         ]
+
+
+class FilmChange(NamedTuple):
+    """Small change of a film.
+
+    Attributes
+    ----------
+    number : parameter that is changed.
+    step : of the number.
+    film : with the number changed.
+    """
+
+    number: Float
+    step: float
+    film: Filmed
 
 
 class UnderFilm:
@@ -217,6 +232,20 @@ class UnderFilm:
     def numbers(self) -> tuple[complex, float]:
         """The film's index and its thickness, nm."""
         return complex(plain(self.film.eta), plain(self.k)), plain(self.thickness)
+
+    def changes(self, film: Filmed, wavelengths: NDArray[np.float64]) -> list[FilmChange]:
+        """Return changes of a film at wavelengths (nm), one of each number with a derivative."""
+        material, index, depth = film.parts
+        step, longer = INDEX_CHANGE, 2.0 * np.pi * THICKNESS_CHANGE / wavelengths
+        changes = [
+            FilmChange(self.film.eta, step, Filmed(material, index + step, depth)),
+            FilmChange(self.k, step, Filmed(material, index + 1j * step, depth)),
+            FilmChange(self.thickness, THICKNESS_CHANGE, Filmed(material, index, depth + longer)),
+        ]
+        if isinstance(self.material, Dielectric):
+            moved = Filmed(material + step, index, depth)
+            changes.append(FilmChange(self.material.eta, step, moved))
+        return [change for change in changes if dr.grad_enabled(change.number)]
 
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if self.channels is not None:

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError, warn
-from ..optics.materials import PERFECT, material_named
+from ..optics.materials import PERFECT, TISSUES, material_named
 from ..tables.table import DiffractionTable
 from .fresnel import INDEX_PARTS, Conductor, Dielectric, Perfect, Reflectance
 from .layers import UnderFilm
@@ -63,7 +63,11 @@ def _named(props: Properties, coat: Dielectric | None) -> Reflectance:
         )
         metal = Conductor(eta, k, f"n = {material.real:g} + {material.imag:g}i")
     else:
-        metal = Conductor.of_material(material, number(props, "wavelength", DEFAULT_WAVELENGTH))
+        wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
+        metal = Conductor.of_material(material, wavelength)
+        above = material_named(str(props.get("coat_ior", props.get("ext_ior", ""))) or PERFECT)
+        if above in TISSUES:
+            metal.disperse(str(above), wavelength)
     metal.medium = _medium(props, coat)
     return metal
 

@@ -71,7 +71,7 @@ class SpectralPower:
     ) -> None:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
-        self._sigma = table.sigma
+        self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
         #: Least and largest 2π/λ that the table serves, rad/µm, to rounding.
         longest, shortest = (float(wavenumber(lam)) for lam in reversed(table.wavelength_range))
         self._served = longest * (1.0 - 1e-5), shortest * (1.0 + 1e-5)
@@ -147,11 +147,12 @@ class SpectralPower:
         return self.flat(pair, si) * mi.UnpolarizedSpectrum(powers)
 
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
-        """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
-        apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
+        """See `PowerModel.flat`: (σ₀/σ)² exp(−σ₀²k²|(u, v)|²)/λ²."""
+        apart = -(self._sigma_0**2) * dr.squared_norm(pair.uv)
+        peak = self._ratio * (0.5 / dr.pi) ** 2
         squares = [dr.select(self._serves(k), dr.square(k), 0.0) for k in self.wavenumbers(si)]
         return mi.UnpolarizedSpectrum(
-            [dr.exp(apart * square) * (square * (0.5 / dr.pi) ** 2) for square in squares]
+            [dr.exp(apart * square) * (square * peak) for square in squares]
         )
 
     def _serves(self, k: Float) -> Mask:

@@ -143,7 +143,7 @@ class RGBPower:
         self._order_0 = upload(mi.Float, proposals.order_0)
         self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
-        self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
+        self._sharpness = [(2.0 * math.pi * table.sigma_0 / lam) ** 2 for lam in LOBES]
 
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""

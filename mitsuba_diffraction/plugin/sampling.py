@@ -2,7 +2,7 @@
 
 For one wavelength the density of ωo per solid angle is
 
-    [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
+    [p₀ (σ₀²/π) exp(−σ₀²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
 
 with p₀ the power of order 0 towards the mirror direction and P as in `tables.sampling`.
 Dispersion is dealt with by drawing for one wavelength and using the mean of all wavelengths'
@@ -62,7 +62,7 @@ class OrderSampler:
 
     def __init__(self, table: DiffractionTable) -> None:
         densities = proposals(table)
-        self._sigma = table.sigma
+        self._sigma, self._sigma_0 = table.sigma, table.sigma_0
         self._origin, self._cell = densities.origin, densities.cell
         self._rows, self._columns = densities.columns.shape[1], densities.columns.shape[2] - 1
         self._words = densities.levels.shape[2] // 4
@@ -96,8 +96,8 @@ class OrderSampler:
 
     def density(self, q: Vector2f, strategy: Strategy) -> Float:
         """Density of drawing the frequency q, per (rad/µm)²."""
-        variance = self._sigma**2
-        glossy = dr.exp2(dr.squared_norm(q) * (-variance / math.log(2.0))) * (variance / dr.pi)
+        variance, sharp = self._sigma**2, self._sigma_0**2
+        glossy = dr.exp2(dr.squared_norm(q) * (-sharp / math.log(2.0))) * (sharp / dr.pi)
         x, y = (
             dr.fma(part, 1.0 / cell, -origin / cell)
             for part, cell, origin in zip(q, self._cell, self._origin, strict=True)
@@ -121,7 +121,7 @@ class OrderSampler:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
         share, band, _ = self.strategy(k, cos_i, height_scale)
         sample2 = dr.minimum(sample2, BELOW_ONE)
-        glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma * dr.sqrt(2.0)))
+        glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma_0 * dr.sqrt(2.0)))
         start = band * (self._rows + 1)
         row, y = invert(self._row_sums, start, self._rows, self._rows, sample2.y)
         start = (band * self._rows + row) * (self._columns + 1)

@@ -192,9 +192,8 @@ def table_of_heights(
     heights: HeightField, asked: Mapping[str, Any], height_scale: float, provider: TableProvider
 ) -> DiffractionTable:
     """Return the table of a height field."""
-    digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
     factors = Factors(height_scale, 1.0)
-    return provider(_request(digest, lambda: [heights], asked, factors, None))
+    return provider(_request(heights.digest(), lambda: [heights], asked, factors, None))
 
 
 def _request(

@@ -22,12 +22,14 @@ from ..optics.boundary import MODELS
 from ..settings import COHERENCES
 from .bsdf import brdf, mueller
 from .integral import screen_power, window_power
+from .model import Sigmas
 from .orders import orders_brdf
 from .transmission import btdf
 
 __all__ = [
     "COHERENCES",
     "MODELS",
+    "Sigmas",
     "brdf",
     "btdf",
     "mueller",

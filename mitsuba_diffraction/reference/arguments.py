@@ -9,30 +9,32 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
-from ..heights.coherence import resolved_width
+from ..heights.coherence import widths_of
 from ..heights.field import HeightField
 from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import SURFACE, checked
-from .model import Light
+from .model import Light, Sigmas
 
 
-def width_of(value: str | float, field: HeightField) -> float:
-    """Return a coherence width in µm, checked; unlike a table's, it has no largest value."""
-    if value == "auto":
-        return resolved_width("auto", [field])
-    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    if not (number and 0.0 < float(value) < np.inf):
-        shown = f"{value:g}" if number else quoted(value)
-        raise DiffractionError(f"coherence_width={shown} must be a positive number of µm, or auto")
-    return float(value)
+def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
+    """Return σ and σ₀ of a checked coherence width; unlike a table's, it has no largest value."""
+    if value != "auto":
+        number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+        if not (number and 0.0 < float(value) < np.inf):
+            shown = f"{value:g}" if number else quoted(value)
+            raise DiffractionError(
+                f"coherence_width={shown} must be a positive number of µm, or auto"
+            )
+        value = float(value)
+    return Sigmas(*map(sigma_of, widths_of(value, [field], coherence)))
 
 
 class Window(NamedTuple):
-    """Coherence window: σ in µm, coherence, and centres (n, 2) in µm or None for the patch's."""
+    """Coherence window: σ and σ₀, coherence, and centres (n, 2) in µm or None for the patch's."""
 
-    sigma: float
+    sigmas: Sigmas
     coherence: str
     centres: NDArray[np.float64] | None
 
@@ -42,17 +44,21 @@ class Window(NamedTuple):
 
 
 def window_of(
-    coherence_width: float, coherence: str, place: ArrayLike | None, count: int
+    coherence_width: str | float,
+    field: HeightField,
+    coherence: str,
+    place: ArrayLike | None,
+    count: int,
 ) -> Window:
-    """Check a window's coherence and place, for so many direction pairs; its width is in µm."""
-    sigma = sigma_of(coherence_width)
+    """Check a window's width, µm, coherence and place, for so many direction pairs."""
+    sigmas = sigmas_of(coherence_width, field, coherence)
     if coherence != SURFACE:
         checked("coherence", coherence)
     if (place is None) == (coherence == SURFACE):
         text = "needs a place: (x, y) on the patch in µm" if place is None else "takes no place"
         raise DiffractionError(f"coherence='{coherence}' {text}")
     if place is None:
-        return Window(sigma, coherence, None)
+        return Window(sigmas, coherence, None)
     try:
         centres = np.broadcast_to(np.asarray(place, np.float64), (count, 2))
     except ValueError as error:
@@ -61,7 +67,7 @@ def window_of(
         ) from error
     if not np.all(np.isfinite(centres)):
         raise DiffractionError("place must be finite, in µm")
-    return Window(sigma, coherence, centres)
+    return Window(sigmas, coherence, centres)
 
 
 def model_of(

@@ -24,7 +24,7 @@ from . import boundary
 from . import coat as coats
 from . import film as films
 from . import model as models
-from .arguments import Window, directions_of, index_of, model_of, width_of, window_of
+from .arguments import Window, directions_of, index_of, model_of, window_of
 from .integral import window_power
 from .model import Light
 from .second_order import resolved
@@ -81,8 +81,8 @@ def brdf(
     wi, wo : (n, 3) or (3,), unit vectors in the patch's frame, pointing away from the surface;
         x runs along rows, y along columns, z is the normal.
     wavelength : (n,) or scalar, vacuum wavelength in nm.
-    coherence_width : 4σ of the amplitude window, µm; "auto" is 65 µm, or the smaller side of a
-        narrower patch, unless it repeats exactly (`heights.coherence`).
+    coherence_width : µm over which the light is coherent, 4σ₀; "auto" is 65 µm. The window of all
+        orders but 0 is at most as wide as a patch that does not repeat (`heights.coherence`).
     coherence : "ensemble", the power averaged over every position of the window; "patch", the
         power under one window centred on the patch; "surface", under one centred on `place`.
     place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
@@ -107,12 +107,12 @@ def brdf(
         place that is missing or superfluous, or arrays whose shapes do not fit.
     """
     light = directions_of(wi, wo, wavelength)
-    window = window_of(width_of(coherence_width, field), coherence, place, len(light.wavelength))
+    window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
     material = _material(field, model_of(model, index), index, coat, window, second_order)
     if material.index is None:
         power = window_power(field, *light, *window)
-        return kirchhoff_factor(*light, window.sigma) * power
+        return kirchhoff_factor(*light, window.sigmas.orders) * power
     return _reflected(boundary.unpolarised, field, light, material, window)
 
 
@@ -138,7 +138,7 @@ def mueller(
     `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     light = directions_of(wi, wo, wavelength)
-    window = window_of(width_of(coherence_width, field), coherence, place, len(light.wavelength))
+    window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
     material = _material(field, model_of(model, index), index, coat, window, second_order)
     if material.index is None:
@@ -198,17 +198,17 @@ def _lit(
             else _matrices(field, light, index, material.model)
         )
         power = window_power(field, *light, *window)
-        return models.reflected(light, window.sigma, power, jones, measure)
+        return models.reflected(light, window.sigmas.orders, power, jones, measure)
     if material.coat is not None:
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
         power, jones = _structure(field, inside, relative, material, window)
-        return coats.reflected(light, window.sigma, material.coat, relative, power, jones, measure)
+        return coats.reflected(light, window.sigmas, material.coat, relative, power, jones, measure)
     if material.model == "small_slope" and window.coherence == COHERENCES[0]:
         return models.default_brdf(
-            field, light, index, window.sigma, material.second_order, measure
+            field, light, index, window.sigmas, material.second_order, measure
         )
     power, jones = _structure(field, light, index, material, window)
-    return models.reflected(light, window.sigma, power, jones, measure)
+    return models.reflected(light, window.sigmas.orders, power, jones, measure)
 
 
 def _structure(
@@ -220,7 +220,7 @@ def _structure(
     s = models.share(field, light, index)
     jones = models.blended(models.kirchhoff(light, index), models.small_slope(light, index), s)
     if material.second_order:
-        return models.ensemble_power(field, light, window.sigma, (index, s)), jones
+        return models.ensemble_power(field, light, window.sigmas, (index, s)), jones
     return window_power(field, *light, *window), jones
 
 

@@ -23,7 +23,7 @@ def refracted_light(light: Light, coat: float) -> Light:
 
 def reflected(
     light: Light,
-    sigma: float,
+    sigmas: model.Sigmas,
     coat: float,
     index: Complex,
     power: Real,
@@ -40,12 +40,13 @@ def reflected(
     """
     inside = refracted_light(light, coat)
     outside = transmitted(jones, light.wi, light.wo, coat, index)
+    sigma, sigma_0 = sigmas
     structure = model.reflected(inside, sigma, power / coat**2, outside, measure)
     # The face is a mirror: ⟨|P|²⟩ of a flat patch
     tangential = (light.wi + light.wo)[:, :2]
-    lobe = np.exp(-((sigma * wavenumber(light.wavelength)) ** 2) * np.sum(tangential**2, axis=1))
+    lobe = np.exp(-((sigma_0 * wavenumber(light.wavelength)) ** 2) * np.sum(tangential**2, axis=1))
     face = model.kirchhoff(light, np.asarray(coat, complex))
-    flat = 4 * np.pi**2 * sigma**4 * lobe
+    flat = 4 * np.pi**2 * sigma**2 * sigma_0**2 * lobe
     return structure + model.reflected(light, sigma, flat, face, measure)
 
 

@@ -5,7 +5,8 @@ orders of `model`, each under the window's spectrum ĝ(q) = 2πσ² exp(−σ²q
 
     P(q) = Σ_j a_j ĝ(q − q_j) exp(−i q_j·x₀)   (up to a phase common to all orders).
 
-The mean of |P|² over all positions x₀ keeps the diagonal alone, eq. (3) of `model`. A sampled
+The mean of |P|² over all positions x₀ keeps the diagonal alone, eq. (3) of `model`, where order 0
+has the light's own window. One window has one width, σ, for all orders. A sampled
 surface has no orders beyond its Nyquist frequency π/dx.
 """
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.geometry import diffraction_coordinates, wavenumber
-from .model import orders_near, window_sum
+from .model import Sigmas, orders_near, window_sum
 
 
 def window_power(
@@ -24,7 +25,7 @@ def window_power(
     wi: NDArray[np.float64],
     wo: NDArray[np.float64],
     wavelength: NDArray[np.float64],
-    sigma: float,
+    sigmas: Sigmas,
     coherence: str,
     positions: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
@@ -40,7 +41,7 @@ def window_power(
         screen = np.exp(1j * (k[n] * w[n]) * field.heights)
         centre = None if positions is None else (positions[n, 0], positions[n, 1])
         power[n] = screen_power(
-            screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigma, coherence, centre
+            screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigmas, coherence, centre
         )
     return power
 
@@ -50,17 +51,19 @@ def screen_power(
     pixel_size: tuple[float, float],
     alpha: float,
     beta: float,
-    sigma: float,
+    sigmas: Sigmas,
     coherence: str,
     centre: tuple[float, float] | None = None,
 ) -> float:
     """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm.
 
+    sigmas : of the windows; one of `patch` has that of the orders.
     centre : of the window in µm, instead of the patch's centre.
     """
+    sigma = sigmas.orders
     orders = orders_near((alpha, beta), sigma, screen, pixel_size)
     if coherence == "ensemble":
-        return window_sum(orders, (alpha, beta), sigma, 1.0)
+        return window_sum(orders, (alpha, beta), sigmas, 1.0)
     ny, nx = screen.shape
     x, y = centre or (0.5 * nx * pixel_size[0], 0.5 * ny * pixel_size[1])
     window_x = np.exp(-0.5 * (sigma * (alpha - orders.qx)) ** 2) * np.exp(-1j * orders.qx * x)

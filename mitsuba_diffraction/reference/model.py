@@ -6,7 +6,7 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
 
     (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
     a_j(κ) = mean of exp(iκh) exp(i q_j·r) over the pixels                                      (2)
-    ⟨|P|²⟩ = 4π²σ⁴ Σ_j F_j |a_j|² exp(−σ²|q − q_j|²)                                            (3)
+    ⟨|P|²⟩ = 4π²σ² Σ_j F_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²),   σ_j = σ for j ≠ 0               (3)
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩,   A = πσ²                                         (4)
     N = ½ Σ |J|² over the four entries of J                                                     (5)
     J = (1 − s) K + s B                                                                         (6)
@@ -18,13 +18,14 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
 
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
-over positions of the window (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s,
-r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
-d. Rows and columns of J are s and p, outgoing and incoming. B is first-order small slope (Rice
-1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend on directions and
-index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and across q_j, slopes
-filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays (n,) as in `Light`.
-coat.py, film.py and transmission.py wrap this.
+over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
+window has the light's σ₀; a small scan limits σ of other orders alone. K is Kirchhoff's tangent
+plane: Fresnel's r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|,
+p = d×s of light along d. Rows and columns of J are s and p, outgoing and incoming. B is first-order
+small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
+on directions and index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and
+across q_j, slopes filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays
+(n,) as in `Light`. coat.py, film.py and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -55,19 +56,31 @@ class Light(NamedTuple):
     wavelength: Real
 
 
+class Sigmas(NamedTuple):
+    """σ of the window of all orders but 0, and σ₀ of order 0's, the light's; both in µm."""
+
+    orders: float
+    zeroth: float
+
+    @classmethod
+    def same(cls, sigma: float) -> Sigmas:
+        """Return one width for all orders."""
+        return cls(sigma, sigma)
+
+
 def default_brdf(
     field: HeightField,
     light: Light,
     index: Complex,
-    sigma: float,
+    sigmas: Sigmas,
     second_order: bool,
     measure: Callable[[Complex], Real] = unpolarised,
 ) -> Real:
     """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
     s = share(field, light, index)
     jones = blended(kirchhoff(light, index), small_slope(light, index), s)
-    power = ensemble_power(field, light, sigma, (index, s) if second_order else None)
-    return reflected(light, sigma, power, jones, measure)
+    power = ensemble_power(field, light, sigmas, (index, s) if second_order else None)
+    return reflected(light, sigmas.orders, power, jones, measure)
 
 
 def reflected(
@@ -81,7 +94,7 @@ def reflected(
 
 
 def ensemble_power(
-    field: HeightField, light: Light, sigma: float, second: tuple[Complex, Real] | None
+    field: HeightField, light: Light, sigmas: Sigmas, second: tuple[Complex, Real] | None
 ) -> Real:
     """⟨|P|²⟩ of (3) in µm⁴; second : index and share s for the factors of (10), else F_j = 1."""
     k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
@@ -90,12 +103,12 @@ def ensemble_power(
         u, v, w = wi + wo  # (1): frequency q, and phase per height κ
         q, kappa = (k[n] * u, k[n] * v), k[n] * w
         screen = np.exp(1j * kappa * field.heights)
-        orders = orders_near(q, sigma, screen, field.pixel_size)
+        orders = orders_near(q, sigmas.orders, screen, field.pixel_size)
         factors: Real | float = 1.0
         if second is not None and slopes is not None:
             c = slope_coefficients(wi, wo[None], second[0][n])[0]
             factors = second_order_factors(orders, screen, slopes, c, second[1][n])
-        power[n] = window_sum(orders, q, sigma, factors)
+        power[n] = window_sum(orders, q, sigmas, factors)
     return power
 
 
@@ -131,12 +144,16 @@ def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Com
 
 
 def window_sum(
-    orders: Orders, q: tuple[float, float], sigma: float, factors: Real | float
+    orders: Orders, q: tuple[float, float], sigmas: Sigmas, factors: Real | float
 ) -> float:
-    """4π²σ⁴ Σ_j F_j |a_j|² exp(−σ²|q − q_j|²) of (3)."""
+    """4π²σ² Σ_j F_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²) of (3)."""
+    sigma, ratio = sigmas.orders, (sigmas.zeroth / sigmas.orders) ** 2
     window_x = np.exp(-0.5 * (sigma * (q[0] - orders.qx)) ** 2)
     window_y = np.exp(-0.5 * (sigma * (q[1] - orders.qy)) ** 2)
-    total = window_y**2 @ (factors * np.abs(orders.a) ** 2) @ window_x**2
+    powers = factors * np.abs(orders.a) ** 2
+    total = window_y**2 @ powers @ window_x**2
+    lobe = np.exp(-(sigma**2) * (q[0] ** 2 + q[1] ** 2))  # of order 0, with σ₀ in place of σ:
+    total += (ratio * lobe**ratio - lobe) * powers[orders.qy == 0][:, orders.qx == 0].sum()
     return float(4 * np.pi**2 * sigma**4 * total)
 
 

@@ -9,10 +9,10 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics import through as formulas
 from ..optics.blend import ScaleRoughness
-from ..optics.geometry import sigma_of, wavenumber
+from ..optics.geometry import wavenumber
 from ..settings import checked
 from . import boundary, through
-from .arguments import directions_of, index_of, model_of, width_of
+from .arguments import directions_of, index_of, model_of, sigmas_of
 from .coat import refracted
 from .integral import screen_power
 from .model import blended
@@ -39,8 +39,8 @@ def btdf(
     eta : real index of the dielectric, above 1.
     thin : whether the direction below is outside of a thin sheet, beyond its flat other side.
     """
-    width = width_of(coherence_width, field)
     checked("coherence", coherence)
+    sigma, sigma_0 = sigmas = sigmas_of(coherence_width, field, coherence)
     first, second, lam = directions_of(wi, wo, wavelength)
     model = model_of(model, index_of(eta, 0.0, lam, None), formulas.MODELS)
     if not 1.0 < float(eta) < np.inf:
@@ -55,7 +55,7 @@ def btdf(
     if thin:
         inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
     k, total = wavenumber(lam), above + eta * inside
-    kappa, sigma = -k * total[:, 2], sigma_of(width)
+    kappa = -k * total[:, 2]
     roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
@@ -67,10 +67,11 @@ def btdf(
     screens = [np.exp(1j * phase * field.heights) for phase in kappa]
     frequency = -k[:, None] * total[:, :2]
     power = [
-        screen_power(screen, field.pixel_size, x, y, sigma, coherence)
+        screen_power(screen, field.pixel_size, x, y, sigmas, coherence)
         for screen, (x, y) in zip(screens, frequency, strict=True)
     ]
-    lobe = 4 * np.pi**2 * sigma**4 * np.exp(-(sigma**2) * np.sum(frequency**2, axis=1))
+    lobe = 4 * np.pi**2 * sigma**2 * sigma_0**2
+    lobe = lobe * np.exp(-(sigma_0**2) * np.sum(frequency**2, axis=1))
     # order 0 has what the flat surface transmits; speckle may be darker than it is on average
     zeroth = np.minimum(np.abs([screen.mean() for screen in screens]) ** 2 * lobe, power)
     cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)

@@ -10,11 +10,12 @@ traceback; warnings go to a logger of its own.
 
 from __future__ import annotations
 
+import contextlib
 import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
@@ -23,6 +24,9 @@ from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from ..system import memory
 from .parameters import check_parameters, refuse_pipes
+
+if TYPE_CHECKING:
+    from .bands import Bands
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -81,16 +85,24 @@ def set_variant(name: str | None) -> str:
     return name
 
 
-def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = False) -> Any:
+def load_scene(
+    file: Path,
+    parameters: Mapping[str, Any],
+    *,
+    box_filter: bool = False,
+    bands: Bands | None = None,
+) -> Any:
     """Load an XML scene in the variant that is set.
 
     box_filter : give all films a box as reconstruction filter instead of their own.
+    bands : give all films these bands in place of colours, and heights tables that cover them.
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
     import mitsuba as mi
 
     from .additions import split_materials
+    from .bands import WiderTables
 
     readable_file(file)
     parameters, materials = split_materials(parameters)
@@ -100,7 +112,8 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
         if name in parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
-        scene = _instantiated(file, parameters, materials, box_filter)
+        with contextlib.nullcontext() if bands is None else WiderTables(bands.first):
+            scene = _instantiated(file, parameters, materials, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -118,12 +131,14 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
 
 
 def _instantiated(
-    file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool
-) -> Any:
+    file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool,
+    bands: Bands | None,
+) -> Any:  # fmt: skip
     """Parse a scene, put meshes, materials and filters in, and make Mitsuba's objects of it."""
     import mitsuba as mi
 
     from .additions import fit_meshes, put_box_filters, put_materials
+    from .bands import put_bands
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -142,6 +157,8 @@ def _instantiated(
             mi.parser.transform_all(config, state)
             if box_filter:
                 put_box_filters(state)
+            if bands is not None:
+                put_bands(state, bands)
             return mi.parser.instantiate(config, state)
     finally:
         mi.set_file_resolver(before)

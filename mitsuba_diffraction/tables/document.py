@@ -38,6 +38,7 @@ _MOST_NODES = 1 << 12
 _ROUNDED = 1e-6  # relative tolerance of fields that follow from others
 #: Largest share of the light in an order: 1 and the error of a table of a large tolerance.
 _LARGEST_POWER = 2.0
+_LARGEST_RATIO_0 = 1e8  # windows of 500 and of 0.05 µm
 _LARGEST_RATIO, _MOST_CELLS = 128.0, 1 << 12  # r, and cells along an axis
 _BLOCK = 1 << 22  # coefficients at a time
 
@@ -163,6 +164,8 @@ def _check_agreement(table: DiffractionTable) -> None:
     grid, expansion, settings = table.grid, table.expansion, table.settings
     _require(grid.coherent == settings.coherent, "coherent beside coherence")
     _require(expansion.kind == "amplitude" or not grid.coherent, "coherence of powers")
+    single = not grid.coherent or settings.window_width is None
+    _require(single and table.order_0_ratio <= _LARGEST_RATIO_0, "window_width beside coherence")
     steps = [table.sigma * spacing for spacing in table.spacing]
     _require(np.allclose(grid.steps, steps, rtol=_ROUNDED, atol=0.0), "steps beside spacing")
     radius = [q / spacing for q, spacing in zip(table.frequency_limit, table.spacing, strict=True)]

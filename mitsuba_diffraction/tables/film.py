@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..optics import mean_second_order
 from ..optics.blend import RoughnessTable
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
-from .directional import FINE, DirectionalTable, DirectionGrid
+from .directional import FINE, DirectionalTable, DirectionGrid, Real
 from .energy.materials import PROBES, Index, Reflector, rounded
 from .energy.scaling import parallel
 from .energy.settings import energy_settings
@@ -35,10 +34,15 @@ def exponents(
     wavelengths = np.geomspace(low, high, count if high > low else 1)
     films = index(wavelengths)
     assert isinstance(films, Filmed)
+    return exponents_at(roughness, films, wavelengths)
+
+
+def exponents_at(roughness: RoughnessTable, films: Filmed, wavelengths: Real) -> DirectionalTable:
+    """Tabulate ln g of films at wavelengths (n,), nm."""
     grid = DirectionGrid(FINE.polar, 1)
     cosine = np.cos(grid.theta)
 
-    def at_wavelength(n: int) -> NDArray[np.float64]:
+    def at_wavelength(n: int) -> Real:
         k = float(wavenumber(wavelengths[n]))
         return mean_second_order.exponents(cosine, films[n], roughness, k)
 

@@ -26,9 +26,11 @@ def window_sum(
     kappa: ArrayLike,
     place: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
-    """Σ_j |a_j|² exp(−σ²|q − q_j|²), or |Σ_j a_j exp(−σ²|q − q_j|²/2) exp(−i q_j·x₀)|² for `patch`.
+    """Σ_j |a_j|² (σ_j/σ)² exp(−σ_j²|q − q_j|²), σ_j = σ but of order 0: the sum of eq. 3.
 
-    Either is ⟨|P|²⟩ / 4π²σ⁴, dimensionless, at most about 1.
+    For `patch` |Σ_j a_j exp(−σ²|q − q_j|²/2) exp(−i q_j·x₀)|².
+
+    Either is ⟨|P|²⟩ / 4π²σ⁴, dimensionless, at most about `table.order_0_ratio`.
 
     Parameters
     ----------
@@ -145,7 +147,9 @@ def weighted_sum(
             return np.sum(values**2, axis=1, keepdims=True)
         return values
 
-    total = bin_value(table.order_0_at(kappa)) * (kernels[0](x) * kernels[1](y))[:, None]
+    ratio = table.order_0_ratio
+    lobe = ratio * (kernels[0](x) * kernels[1](y)) ** ratio
+    total = bin_value(table.order_0_at(kappa)) * lobe[:, None]
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):

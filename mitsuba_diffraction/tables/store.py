@@ -251,7 +251,7 @@ DirectionalTables = dict[str, DirectionalTable]
 _directions: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DirectionalTables]] = (
     weakref.WeakKeyDictionary()
 )
-_COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
+_COLOUR_NUMBERS = ("scale", "radius_end", "sigma", "sigma_0")
 
 
 def table_key(digest: str, settings: TableSettings) -> str:

@@ -71,14 +71,26 @@ class DiffractionTable:
 
     @property
     def coherence_width(self) -> float:
-        """4σ of the Gaussian amplitude window, µm."""
+        """Width over which the light is coherent, µm: 4σ₀ of order 0's amplitude window."""
+        return self.settings.light_width
+
+    @property
+    def window_width(self) -> float:
+        """4σ of the amplitude window of all orders but 0, µm, at most `coherence_width`."""
         return self.settings.width
+
+    @property
+    def order_0_ratio(self) -> float:
+        """(σ₀/σ)²: order 0's lobe is so many times as high and as small as other orders' lobes."""
+        return (self.coherence_width / self.window_width) ** 2
 
     @property
     def width_text(self) -> str:
         """Coherence width in words, with a mark where the patch's repetition shows as a grating."""
         mark = f" ({REPEATS})" if self.source.get("repeats") else ""
-        return f"{self.coherence_width:.4g} µm{mark}"
+        limited = self.settings.window_width is not None
+        scan = f", of orders {self.window_width:.4g} µm" if limited else ""
+        return f"{self.coherence_width:.4g} µm{scan}{mark}"
 
     @property
     def coherence(self) -> str:
@@ -107,7 +119,12 @@ class DiffractionTable:
 
     @property
     def sigma(self) -> float:
-        """σ of the amplitude window, µm."""
+        """σ of the amplitude window of all orders but 0, µm."""
+        return sigma_of(self.window_width)
+
+    @property
+    def sigma_0(self) -> float:
+        """σ₀ of order 0's amplitude window, µm: that of the light."""
         return sigma_of(self.coherence_width)
 
     @property
@@ -212,6 +229,7 @@ class DiffractionTable:
             "stores": self.expansion.kind,
             "coherence": self.coherence,
             "coherence_width_um": self.coherence_width,
+            **({"window_width_um": self.window_width} if self.settings.window_width else {}),
             "wavelength_range_nm": list(self.wavelength_range),
             "height_scale_max": self.height_scale_max,
             "tolerance": self.tolerance,

@@ -12,6 +12,7 @@ from mitsuba_diffraction.analysis.observers import (
     GRID,
     contrasts,
     eye_of,
+    illuminant_of,
     noises,
     pigment_template,
     quantum_catches,
@@ -124,3 +125,38 @@ def test_eyes_are_names_or_files_and_see_what_spectra_cover(tmp_path):
         eye_of("dragon")
     with pytest.raises(DiffractionError, match="wavelength_range"):
         quantum_catches(eye_of("avian_uv"), [400.0, 700.0], [[1.0], [1.0]])
+
+
+def test_a_violet_sensitive_bird_s_cones_peak_where_they_were_measured():
+    """Hart 2002: 432, 477, 537 and 605 nm."""
+    peaks = GRID[eye_of("avian_v").sensitivity.argmax(axis=1)]
+    assert peaks == pytest.approx([432.0, 477.0, 537.0, 605.0], abs=1.0)  # the grid's step
+
+
+def test_people_s_cones_peak_where_quanta_are_counted():
+    """Stockman and Sharpe 2000, per quantum: about 441, 542 and 566 nm at the cornea."""
+    peaks = GRID[eye_of("human").sensitivity.argmax(axis=1)]
+    assert peaks == pytest.approx([441.0, 542.0, 566.0], abs=2.0)
+
+
+def test_lights_have_quanta_of_mean_1_and_the_sky_is_bluer_than_the_sun(tmp_path):
+    sun, sky, ideal = (illuminant_of(name) for name in ("d55", "d75", "ideal"))
+    assert [light.mean() for light in (sun, sky, ideal)] == pytest.approx([1.0] * 3, rel=1e-12)
+    assert ideal == pytest.approx(1.0)
+    assert sky[GRID == 350.0] > sun[GRID == 350.0]
+    file = tmp_path / "leaves.csv"
+    file.write_text("wl,photons\n300,1\n700,3\n")
+    assert illuminant_of(str(file))[[0, -1]] == pytest.approx([0.5, 1.5])
+    catches = quantum_catches(eye_of("dog"), LAM, SPECTRA[:, :1], sun)
+    expected = (np.interp(GRID, LAM, SPECTRA[:, 0]) * sun * eye_of("dog").sensitivity).sum(axis=1)
+    assert catches[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("content", ["wl,photons\n400,1\n700,1\n", "wl,photons\n300,0\n700,0\n"])
+def test_files_that_are_no_lights_are_one_line(tmp_path, content):
+    file = tmp_path / "light.csv"
+    file.write_text(content)
+    with pytest.raises(DiffractionError, match="is no light"):
+        illuminant_of(str(file))
+    with pytest.raises(DiffractionError, match="choose one of ideal, d55"):
+        illuminant_of("moon")

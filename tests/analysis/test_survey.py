@@ -281,3 +281,17 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
         chance = chance_iridescence(table, light)
         # chance differs by some 10 % from patch to patch
         assert (index > above * chance) == (field is grating), (index, chance)
+
+
+def test_scans_of_different_sizes_are_measured_on_crops_of_one(survey, tmp_path):
+    field = gratings.elaphe_like(25.0, 250)
+    for name, pixels in (("wide", 250), ("narrow", 80)):
+        np.save(tmp_path / f"{name}.npy", field.heights[:pixels, :pixels])
+    rows = survey([tmp_path / "wide.npy", tmp_path / "narrow.npy"], crops=3)
+    assert [row.get("crop", "") for row in rows] == [1, 2, 3, ""]
+    assert [row["width_um"] for row in rows] == pytest.approx([10.0, 10.0, 10.0, 8.0])
+    assert len({row["range_um"] for row in rows[:3]}) == 3
+    with (tmp_path / "out" / "samples.csv").open(encoding="utf-8") as file:
+        wide, narrow = csv.DictReader(file)
+    assert float(wide["range_um_se"]) > 0.0
+    assert narrow["range_um_se"] == ""

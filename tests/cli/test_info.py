@@ -34,7 +34,11 @@ def test_json_has_the_numbers(run, heights):
     # a sine's amplitude over √2, over two whole periods
     assert data["rms_height"] == pytest.approx(0.02 / np.sqrt(2), rel=1e-6)
     assert data["warnings"] == []
-    assert data["window"].startswith("6 µm, the patch's smaller side")
+    # of light of 550 nm: sin θ = 0.55/6
+    assert data["window"] == (
+        "65 µm for the mirror direction, 6 µm for orders: a scan of 6 µm knows nothing of light "
+        "within 5.3° of the mirror but the mirror"
+    )
 
 
 def test_treatments_are_listed(run, heights):

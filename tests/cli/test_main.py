@@ -227,7 +227,7 @@ def test_a_deleted_working_folder_is_one_line(heights, tmp_path):
 
 
 @posix
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize("closed", [">&-", ">&- 2>&- <&-"])
 def test_closed_streams_are_no_error(heights, closed, tmp_path):
     words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
     command = f"{shlex.join([*words, '--pixel-size', '0.08', '--json', 'a.json'])} {closed}"

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
-import signal
 
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
-from mitsuba_diffraction.cluster.jobs import OrderedMap, build_on_workers  # noqa: E402
+from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
 from mitsuba_diffraction.settings import TableSettings  # noqa: E402
 from mitsuba_diffraction.tables.build import windows as windows_module  # noqa: E402
 from mitsuba_diffraction.tables.build.windows import Windows  # noqa: E402
@@ -32,23 +30,6 @@ def scan():
 def alone(scan):
     """The table that this process builds by itself."""
     return DiffractionTable.build(scan, windows="auto", **SETTINGS)
-
-
-def test_two_workers_of_which_one_is_killed_build_the_same_table(client, scan, alone):
-    killed = []
-
-    def disturb(done, total, text):
-        if done >= 10 and not killed:
-            killed.append(next(iter(client.cluster.workers.values())).pid)
-            os.kill(killed[0], signal.SIGKILL)
-
-    table, work = build_on_workers(scan, WANTED, client, disturb)
-    assert killed
-    assert table.digest() == alone.digest()
-    assert table.error == alone.error
-    assert table.source == alone.source
-    assert work.tasks > 10
-    client.wait_for_workers(2, timeout=300)
 
 
 def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):

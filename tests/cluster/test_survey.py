@@ -59,6 +59,9 @@ def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run,
 
     with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
         rows = {row["file"].rpartition("/")[2]: row for row in csv.DictReader(file)}
-    assert list(rows) == [path.name for path in scans]
+    assert set(rows) == {path.name for path in scans}
+    assert list(rows)[-1] == "damaged.npy"  # failed scans come last
+    light = [float(row["iridescent_light"] or 0) for row in list(rows.values())[:-1]]
+    assert light == sorted(light, reverse=True)
     assert [name for name, row in rows.items() if row["reason"]] == ["damaged.npy"]
     assert float(rows["blazed.bmp"]["period_1_um"]) == pytest.approx(2.5, rel=0.01)

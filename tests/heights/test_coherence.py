@@ -9,7 +9,6 @@ from hypothesis import given
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.coherence import (
-    USUAL_WIDTH,
     repeats,
     resolved,
     resolved_width,
@@ -17,7 +16,7 @@ from mitsuba_diffraction.heights.coherence import (
     window_warning,
 )
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.settings import USUAL_WIDTH, TableSettings
 
 SIDES = st.integers(2, 40)
 PIXELS = st.floats(0.01, 20.0)
@@ -77,7 +76,25 @@ def test_a_scan_is_whole_periods_where_its_user_says_so():
 
 def test_what_is_asked_for_is_kept():
     settings = TableSettings(coherence_width="30")
-    assert resolved(settings, [scan()]).width == 30.0
+    array = HeightField(scan().heights, 0.1)
+    assert resolved(settings, [array]).width == 30.0
+
+
+@pytest.mark.parametrize("width", ["auto", 65.0, 30.0])
+def test_a_scan_limits_the_window_of_its_orders_and_not_the_light_s(width):
+    scanned = scan().changed(scan().heights, "cut out", cut_out=True)
+    limited = resolved(TableSettings(coherence_width=width), [scanned])
+    assert limited.coherence_width == (USUAL_WIDTH if width == "auto" else width)
+    assert limited.width == limited.window_width == min(scanned.extent)
+    assert resolved(limited, [scanned]) == limited
+    wide = scanned.treated(periodic="exact")
+    assert resolved(limited, [wide]).window_width is None
+
+
+@pytest.mark.parametrize("width", ["auto", 30.0])
+def test_one_window_has_one_width(width):
+    settings = TableSettings(coherence_width=width, coherence="patch")
+    assert resolved(settings, [scan()]).window_width is None
     assert resolved(TableSettings(), [scan()]).width == pytest.approx(6.4)
     assert resolved(TableSettings(windows=4.0), [scan()]).width == 4.0
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics import symbols
 from mitsuba_diffraction.optics.arithmetic import formula, is_complex, of, squared
 from mitsuba_diffraction.optics.dialects import GLSL, OSL
 from mitsuba_diffraction.optics.programs import Program
@@ -73,17 +72,6 @@ def test_an_expression_is_computed_once() -> None:
         return (x * y + 1.0) * (x * y + 2.0)
 
     assert printed(twice, "float", "float").count("x * y") == 1
-
-
-def test_looked_up_values_are_functions_of_the_language() -> None:
-    def looked_up(q: Any, read: Any, scale: Any) -> Any:
-        low, high = read(2.0 * q)
-        return scale * (low + high)
-
-    read = symbols.supplied("nodes_at", "float", "float")
-    text = printed(looked_up, "float", read, symbols.known("height_scale"))
-    assert "float low, high;\n    nodes_at(2.0 * q, low, high);" in text
-    assert "return height_scale * (low + high);" in text
 
 
 def branches(x: Any) -> Any:

@@ -22,7 +22,7 @@ from mitsuba_diffraction.osl.patch import (
 )
 from mitsuba_diffraction.plugin.description import Energy, Quantity, Surface
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
-from tests.support.patches import DEEP, DEFAULTS, PATCH
+from tests.support.patches import DEEP, DEFAULTS, PATCH, SMALL_SCAN
 
 
 def scale_of(height_scale):
@@ -113,6 +113,18 @@ def test_scales_of_energy_are_those_of_the_description(theta, phi, height_scale,
 def test_other_plugins_are_refused(tmp_path, some_variant):
     with pytest.raises(DiffractionError, match="diffraction"):
         md.osl.export(mi.load_dict({"type": "diffuse"}), tmp_path)
+
+
+def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path, some_variant):
+    for field, width in (
+        (SMALL_SCAN, "4.8"),
+        (SMALL_SCAN.treated(periodic="exact"), "1000000000.0"),
+    ):
+        exported = md.osl.export(mi.load_dict(md.bsdf_dict(field, second_order=False)), tmp_path)
+        document = json.loads(exported.document.read_text(encoding="utf-8"))
+        values = {item["identifier"]: item["default"] for item in document["inputs"]}
+        assert values["CoherenceWidth"] == 65.0
+        assert f"#define SCAN_WIDTH {width}\n" in exported.shader.read_text(encoding="utf-8")
 
 
 def test_patch_has_a_height_scale(tmp_path, some_variant):

@@ -35,7 +35,8 @@ PARAMETERS = {
     "eta.value": ({"eta": 0.9, "k": 6.0}, 0.9, 1e-3),
     "k.value": ({"eta": 0.9, "k": 6.0}, 6.0, 1e-2),
     "nested.reflectance.value": ({"pigment": PIGMENT}, 0.4, 1e-2),
-    "film_thickness": ({"film_ior": 2.0, "film_thickness": 200.0}, 200.0, 0.2),
+    # under a film g follows thickness and index in steps of 1 nm and, here, of 0.001
+    "film_thickness": ({"film_ior": 2.0, "film_thickness": 200.0}, 200.0, 1.0),
     "film_eta": ({"film_ior": 2.0, "film_thickness": 200.0}, 2.0, 1e-3),
     "film_k": ({"eta": 0.9, "k": 6.0, "film_ior": 2.0, "film_thickness": 200.0}, 0.05, 1e-3),
 }

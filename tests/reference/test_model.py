@@ -55,7 +55,7 @@ def test_the_reference_s_default_is_the_model(second):
     found = reference.brdf(
         FIELD, WI, WO, LIGHT.wavelength, eta=1.5, coherence_width=2.0, second_order=second
     )
-    expected = model.default_brdf(FIELD, LIGHT, index, sigma_of(2.0), second)
+    expected = model.default_brdf(FIELD, LIGHT, index, model.Sigmas.same(sigma_of(2.0)), second)
     assert np.array_equal(found, expected)
     matrices = reference.mueller(
         FIELD, WI, WO, LIGHT.wavelength, eta=1.5, coherence_width=2.0, second_order=second

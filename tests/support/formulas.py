@@ -77,9 +77,7 @@ def exact_faded(given: Pairs, index: complex) -> Array:
     return power * np.exp(-(given.kappa**2) * given.variance)
 
 
-def check(found: Array, exact: Array, *, coated: bool = False) -> None:
+def check(found: Array, exact: Array) -> None:
     """Compare in single precision: 1e-5 of the largest, and 1e-3 of each."""
-    # near Brewster's angle of a coat √(1 − T_p) has but half of the digits of T_p
-    largest = 3e-5 if coated else 1e-5
-    assert np.abs(found - exact).max() < largest * exact.max()
+    assert np.abs(found - exact).max() < 1e-5 * exact.max()
     assert np.all(np.abs(found - exact) < 1e-3 * exact)

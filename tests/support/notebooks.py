@@ -16,8 +16,6 @@ from mitsuba_diffraction import DiffractionError
 from tests.support import ROOT
 from tests.support.variants import obstacle
 
-#: The one that is run in the quick tier.
-SMOKE = "recover_patch"
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 

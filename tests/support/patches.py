@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction import reference
+from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from tests.support.directions import lit_pairs, rough_patch
 
@@ -14,6 +14,8 @@ WIDTH = 4.5
 #: Several wavelengths deep.
 DEEP = rough_patch((64, 64), (0.08, 0.08), 1.2)
 DEFAULTS = {"coherence_width": WIDTH}
+#: Part of a larger surface: it limits the window of all orders but 0.
+SMALL_SCAN = HeightField(PATCH.heights, PATCH.pixel_size, name="small scan", cut_out=True)
 
 
 def relative_error(table, field, n=400, seed=1):

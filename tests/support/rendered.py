@@ -18,8 +18,8 @@ PIXELS = 8
 #: Half the step of differences, relative to a parameter's value, below the steps in which
 #: coefficients follow an index (0.01).
 STEP = 1e-3
-#: The same for angles, degrees.
-DEGREES = 0.02
+#: Half the step of angles, degrees, and of a film's thickness, nm: g follows it in steps of 1 nm.
+STEPS = {"orientation": 0.02, "film_thickness": 1.0}
 
 #: Surfaces by what they show: plugin's parameters, and the values to take derivatives at.
 SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
@@ -127,7 +127,7 @@ def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
     assert number(dr.grad(total)) == pytest.approx(sum(backward.values()), abs=2e-3 * largest)
 
     for name, value in at.items():
-        step = DEGREES if name.endswith("orientation") else STEP * value
+        step = STEPS.get(name.rpartition(".")[2], STEP * value)
         ends = [number(weighted(at | {name: value + sign * step})) for sign in (1.0, -1.0)]
         difference = (ends[0] - ends[1]) / (2.0 * step)
         # single precision of the sums

@@ -23,6 +23,8 @@ from mitsuba_diffraction.thesis.period_fit import (
 )
 from tests.support.directions import rough_patch
 
+pytestmark = pytest.mark.thorough
+
 WAVELENGTHS = np.arange(380.0, 781.0, 20.0)
 ANGLES = np.linspace(-75.0, 30.0, 1051)
 

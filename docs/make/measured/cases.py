@@ -86,9 +86,12 @@ class Case:
 
     def thinned(self, step: int) -> Case:
         """Return the case with some of its wavelengths."""
-        rows = self.wavelengths, self.measured, self.error
-        names = "wavelengths", "measured", "error"
-        return replace(self, **{k: v[::step] for k, v in zip(names, rows, strict=True)})
+        return replace(
+            self,
+            wavelengths=self.wavelengths[::step],
+            measured=self.measured[::step],
+            error=self.error[::step],
+        )
 
     def missed(self, values: Real, step: int = 1) -> float:
         """Return the mean deviation of efficiencies from the measured ones."""

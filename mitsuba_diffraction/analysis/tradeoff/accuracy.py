@@ -18,7 +18,7 @@ from ...heights.field import HeightField
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...progress import Progress, silent
-from ...reference import window_power
+from ...reference import Sigmas, window_power
 from ...tables.table import DiffractionTable, q_limit_of
 
 Array = NDArray[np.float64]
@@ -58,11 +58,12 @@ class Sample:
     ) -> Sample:
         """Draw n pairs for a patch, and compute the exact sums from all of its pixels."""
         sigma = sigma_of(coherence_width)
+        sigmas = Sigmas.same(sigma)
         pairs = lit_pairs(field, sigma, n, seed=20140113)
         exact = np.empty(n)
         for i in range(n):
             wi, wo, wavelength = (values[i : i + 1] for values in pairs[:3])
-            exact[i] = window_power(field, wi, wo, wavelength, sigma, coherence)[0]
+            exact[i] = window_power(field, wi, wo, wavelength, sigmas, coherence)[0]
             progress(i + 1, n, f"the exact answer, {coherence}")
         return cls(*pairs, exact / (4.0 * np.pi**2 * sigma**4))
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import DiffractionError
-from ..coherence import USUAL_WIDTH
+from ...settings import USUAL_WIDTH
 from ..field import MAX_PIXELS, HeightField, check_pixel_count
 from ..lengths import count_between, number_between, pixel_size_of
 

@@ -6,9 +6,8 @@ import weakref
 from dataclasses import dataclass
 
 from ...errors import DiffractionError
-from ...heights.coherence import USUAL_WIDTH
 from ...heights.lengths import is_auto
-from ...settings import checked
+from ...settings import USUAL_WIDTH, checked
 from ...tables.orders import OrderTable
 from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData

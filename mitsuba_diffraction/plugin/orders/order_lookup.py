@@ -9,15 +9,17 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ...optics.coat import transmittances
+from ...optics.coat import face_transmittance
 from ...optics.orders import (
     cell_wavelengths,
+    least_c,
     order_cell,
+    order_direction,
     smooth_coordinate,
     wavelength_coordinate,
 )
 from ...tables.orders import OrderTable
-from ...tables.orders.grids import corners, least_c
+from ...tables.orders.grids import corners
 from ..memory import index_between, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 
@@ -166,10 +168,10 @@ class OrderLookup:
         if not self.coated:
             efficiency = dr.select(propagates, self._between(row, q, 0, propagates), 0.0)
             return Share(efficiency, efficiency)
-        x = dr.fma(order * self._steps, row.wavelength, -row.incident.x)
-        squared = dr.fma(x, x, dr.square(row.incident.y))
-        leaves = propagates & (squared < 1.0)
-        through = self._through(dr.safe_sqrt(1.0 - squared))
+        stride = self._steps * row.wavelength
+        square = order_direction(row.incident.x, row.incident.y, order, stride).square
+        leaves = propagates & (square > 0.0)
+        through = self._through(dr.safe_sqrt(square))
         mirror = dr.select(order == 0.0, row.face, 0.0)
         shares = (
             self._between(row, q, 0, propagates) * through,
@@ -222,8 +224,7 @@ class OrderLookup:
 
     def _through(self, cosine: Float) -> Float:
         """Return the unpolarised transmittance of the coat's face, for the cosine outside."""
-        s, p = transmittances(cosine, mi.Float(self.index))
-        return 0.5 * (s + p)
+        return face_transmittance(cosine, mi.Float(self.index))
 
     def _w(self, wavelength: Float, big_k: Float) -> Float:
         if self._cells.w == 1:

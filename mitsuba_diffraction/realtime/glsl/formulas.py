@@ -9,11 +9,12 @@ from typing import Any
 from ...optics.blend import small_slope_weight
 from ...optics.boundary import MODELS, Model, azimuth_cosine
 from ...optics.coat import (
+    Coat,
     coated_reflectance,
     cosine_within,
+    face_transmittance,
     refracted,
     relative_power,
-    transmittances,
 )
 from ...optics.colour import encoded_colour
 from ...optics.dialects import GLSL
@@ -25,6 +26,7 @@ from ...optics.orders import (
     lobe_falloff,
     lobe_peak,
     order_cell,
+    order_direction,
     order_lobe,
     smooth_coordinate,
     wavelength_coordinate,
@@ -40,8 +42,8 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
         order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
         order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
     },
-    "FACE": {transmittances: 2},
-    "COATED": {transmittances: 2, cosine_within: 2, coated_reflectance: 2},
+    "FACE": {face_transmittance: 2, order_direction: 4},
+    "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
     "SECOND_ORDER": {small_slope_weight: 3},
 }  # fmt: skip
@@ -77,9 +79,9 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(azimuth_cosine, "vector", "vector")
         program.add(added_power, ("float",) * 4, ("float",) * 4, "float")
     if index is not None and model is not None:
-        coat = ("float",) * 2 if "COATED" in names else None
+        coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(
-            relative_power, model.jones, "vector", "vector", index, "float", "float", coat, coat,
+            relative_power, model.jones, "vector", "vector", index, "float", "float", coat,
             late=("kappa", "variance") + (("index",) if index == "complex" else ()),
             names=("begin_boundary", "boundary_factor"),
         )  # fmt: skip

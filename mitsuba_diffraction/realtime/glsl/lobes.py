@@ -30,7 +30,7 @@ def pack_lobes(power: Callable[[Array], Array], sigma: float) -> Packed:
     """Pack directions of a surface's lobes and their densities.
 
     power : function that returns the brightness in the cells (rings, azimuths) between radii.
-    sigma : standard deviation of the amplitude window, µm.
+    sigma : standard deviation of the amplitude window of the narrowest lobe, µm.
     """
     smallest = _INNERMOST / (np.sqrt(2.0) * _GREEN * sigma)
     step = np.log(LARGEST_RADIUS / smallest) / (RINGS - 1)

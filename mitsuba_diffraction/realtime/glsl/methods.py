@@ -43,7 +43,7 @@ TOLERANCE = 0.02
 def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> Method:
     """Build a method of the thesis for a patch, with the thesis' settings.
 
-    table : table of the patch, whose coherence width and coherence the method uses.
+    table : table of the patch, whose window and coherence the method uses for all orders.
 
     Raises a DiffractionError if the series is too short for the patch, or the method needs a period
     and the patch has none.
@@ -54,7 +54,7 @@ def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> M
         )
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
-        name, heights, coherence_width=table.coherence_width, coherence=table.coherence,
+        name, heights, coherence_width=table.window_width, coherence=table.coherence,
         terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_cached_build, **settings,
     )  # fmt: skip
 
@@ -215,11 +215,16 @@ def method_tables(method: str, surface: Diffracting) -> Packed:
 
 
 def window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
-    """Return the uniforms of another coherence width in µm."""
-    sigma = sigma_of(coherence_width)
+    """Return the uniforms of another coherence width of the light in µm; a scan's limit stays."""
+    sigma = sigma_0 = sigma_of(coherence_width)
+    table_sigma, table_ratio = tables.uniforms.get("sigma"), tables.uniforms.get("order_0_ratio")
+    if isinstance(table_sigma, float) and isinstance(table_ratio, float) and table_ratio > 1.0:
+        sigma = min(sigma, table_sigma)
     factor = area_factor(sigma)
     exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms.get("area_factor")
-    uniforms: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
+    uniforms: dict[str, Uniform] = {
+        "sigma": sigma, "order_0_ratio": (sigma_0 / sigma) ** 2, "area_factor": factor
+    }  # fmt: skip
     if isinstance(exponents, tuple) and isinstance(table_factor, float):
         # exponents are proportional to σ², too
         uniforms["exponents"] = tuple(float(e) * factor / table_factor for e in exponents)

@@ -94,7 +94,7 @@ class Modelled:
         """Pack directions drawn from the lobes, for shaders/lobes.glsl."""
         colours = cached_colours(self.described.patch)
         factor = self.described.height_scale.number * self._coat
-        return pack_lobes(lambda edges: colour_power(colours, edges, factor), colours.sigma)
+        return pack_lobes(lambda edges: colour_power(colours, edges, factor), colours.sigma_0)
 
 
 def luminous_mean(table: DirectionalTable) -> NDArray[np.float32]:

@@ -11,10 +11,11 @@ from scipy.special import ndtr
 
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
+from ...optics.orders import least_c
 from ...plugin.description import Surface
 from ...tables.orders import OrderTable, cells
 from ...tables.orders.daylight import ENDS, daylight_weights
-from ...tables.orders.grids import face_transmittance, rows
+from ...tables.orders.grids import leaving_transmittance, rows
 from ...tables.orders.table import Counts
 from .lobes import AZIMUTHS, RINGS, pack_lobes
 from .texels import PAGE, Packed, Texture
@@ -121,6 +122,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
             "last_band": float(table.last_band),
             "period": table.period,
             "superstrate": table.superstrate,
+            "least_c": least_c(table.superstrate),
             "solved_range": (1e-3 * low, 1e-3 * high),
             "solved_reach": tuple(1e-3 * end for end in table.reach),
         },
@@ -155,7 +157,7 @@ def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
     x, y = ((radius / index * part)[:, None] for part in (np.cos(turn), np.sin(turn)))
     through = np.ones(_DIRECTIONS)
     if index > 1.0:
-        through = face_transmittance((radius / index) ** 2, index)
+        through = leaving_transmittance((radius / index) ** 2, index)
     daylight = np.diff(daylight_weights(sigma, table.period).cumulative)
     lam = ENDS[0] + (np.arange(len(daylight)) + 0.5) * (ENDS[1] - ENDS[0]) / len(daylight)
     some = np.linspace(*ENDS, _WAVELENGTHS)

@@ -113,6 +113,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "last_order": (table.grid.last[0], table.grid.last[1]),
             "spacing": (table.spacing[0], table.spacing[1]),
             "sigma": table.sigma,
+            "order_0_ratio": table.order_0_ratio,
             "interval_length": expansion.length,
             "intervals": expansion.intervals,
             "cells": cells,

@@ -33,7 +33,7 @@ def describe(patches: Sequence[HeightField], settings: TableSettings) -> dict[st
     scans = windows.scans if windows else patches
     first, coherence_width = scans[0], settings.width
     source = first.summary() | {"digest": first.digest()}
-    source["window"] = width_reason(coherence_width, scans)
+    source["window"] = width_reason(settings, scans)
     if repeats(coherence_width, scans):
         source["repeats"] = True
     if len(scans) > 1:

@@ -253,7 +253,7 @@ def windows_of(
     Raises
     ------
     DiffractionError
-        If their powers cannot be averaged, or windows would be narrower than the coherence width.
+        If their powers cannot be averaged.
     """
     if settings.windows is None or not scans:
         return scans
@@ -265,11 +265,6 @@ def windows_of(
     width = settings.windows
     if isinstance(width, str):
         width = AUTO * settings.width
-    elif width < settings.width:
-        raise build_error(
-            f"windows={width:g} µm are narrower than coherence_width={settings.width:g}; "
-            f"take windows='auto', {AUTO * settings.width:g} µm"
-        )
     if min(width / d for d in scans[0].pixel_size) < 4:
         return scans  # pixels so coarse that something else is wrong
     windows = Windows(scans, width, run)

@@ -143,7 +143,7 @@ def order_0_colour(
     lam, weights = wavelength_weights(0.5 * lobe_of(table) / 2.0)
     kappa = np.minimum(2 * np.pi * z[:, None] / lam, table.expansion.kappa_max)
     power = order_0_power(table, kappa)
-    lobe = np.exp(-((table.sigma * 2 * np.pi * radii[:, None] / lam) ** 2))
+    lobe = np.exp(-((table.sigma_0 * 2 * np.pi * radii[:, None] / lam) ** 2)) * table.order_0_ratio
     return np.einsum("nl,ml,lc->nmc", lobe, power, weights / lam[:, None] ** 2, optimize=True)
 
 

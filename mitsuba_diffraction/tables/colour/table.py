@@ -59,7 +59,7 @@ class ColourTable:
     order_0 : (radii, zs, 4) float32, the last number being 0; even from 0 to `radius_end` and
         from 0 to the largest z.
     radius_end : where order 0 ends.
-    sigma : σ of the window, µm.
+    sigma, sigma_0 : σ of the window of all orders but 0, and σ₀ of order 0's, µm.
     """
 
     grid: PolarGrid
@@ -69,6 +69,7 @@ class ColourTable:
     order_0: NDArray[np.float32]
     radius_end: float
     sigma: float
+    sigma_0: float
 
     @classmethod
     def build(cls, table: DiffractionTable) -> ColourTable:
@@ -92,7 +93,7 @@ class ColourTable:
         largest = float(np.abs(values).max())
         scale = half_scale(largest)
         values *= np.float32(scale)
-        radius_end = 4.5 * VISIBLE[1] * 1e-3 / (2 * math.pi * table.sigma)
+        radius_end = 4.5 * VISIBLE[1] * 1e-3 / (2 * math.pi * table.sigma_0)
         # Neighbouring z differ by at most a tenth in the phase of the deepest parts
         zs = 2 + math.ceil(10.0 * z_max * 4 * math.pi / 0.44 * table.expansion.half_range)
         return cls(
@@ -103,6 +104,7 @@ class ColourTable:
             order_0=_order_0(table, np.linspace(0.0, radius_end, _RADII), z_max, min(zs, 4096)),
             radius_end=radius_end,
             sigma=table.sigma,
+            sigma_0=table.sigma_0,
         )
 
     @property

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics.fresnel import reflectance
+from ...optics.coat import face_transmittance
+from ...optics.orders import least_c
 from . import cells
 from .cells import Array
 from .lookup import clamped
@@ -126,7 +127,7 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     places = grid.tau[:, None, None, None], grid.rho[:, None, None]
     lam = grid.wavelength[..., None]
     light = cells.from_cell(band.k, kind, channels, *places, lam, table.optical_period)
-    through = face_transmittance(light.x**2 + light.y**2, table.superstrate)
+    through = leaving_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
     back = _TRAPPED * (1.0 - through)
@@ -162,25 +163,20 @@ def _resampled(table: OrderTable, band: Band, values: NDArray[Any], grid: _Grid)
     return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True))
 
 
-def least_c(index: float) -> float:
-    """Return the least c = √(1 − y²) in a coat of light from outside."""
-    return math.sqrt(1.0 - 1.0 / index**2)
-
-
 def wavelength_of(table: OrderTable, big_k: Array, w: Array) -> Array:
     """Return the wavelength (vacuum, nm) at w of the even grids."""
     period, least = table.optical_period, least_c(table.superstrate)
     return cells.wavelength_of(big_k, w, table.wavelengths, period, least)
 
 
-def face_transmittance(squared_sine: Array, index: float) -> Array:
-    """Return the unpolarised transmittance of a coat's face; 0 at total reflection.
+def leaving_transmittance(squared_sine: Array, index: float) -> Array:
+    """Return the unpolarised transmittance of a coat's face for light within; 0 if all returns.
 
     squared_sine : of the angle within the coat.
     """
     outside = index**2 * squared_sine
     cosine = np.sqrt(np.maximum(1.0 - outside, 0.0))
-    return np.where(outside < 1.0, 1.0 - reflectance(cosine, index), 0.0)
+    return np.where(outside < 1.0, face_transmittance(np.maximum(cosine, 1e-9), index), 0.0)
 
 
 def _cells(table: OrderTable) -> Counts:

@@ -22,6 +22,8 @@ from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.reference import boundary, fresnel
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def keratin() -> list[PatchComparison]:

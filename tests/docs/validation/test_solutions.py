@@ -21,6 +21,8 @@ from docs.make.validation.solutions import CONVERGED, KEY, ROW, Solutions, load,
 from docs.make.validation.solve import solve_material, solve_scan
 from mitsuba_diffraction.errors import DiffractionError
 
+pytestmark = pytest.mark.thorough
+
 gratinglab = pytest.mark.skipif(
     not integral.available(), reason="gratinglab is not installed (extra `validation`)"
 )

@@ -1,28 +1,13 @@
-"""OpenGL for tests, and tables small enough to be built in a second."""
+"""Tables small enough to be built in a second."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
-from mitsuba_diffraction.realtime.glsl.context import headless_context
-
-
-@pytest.fixture(scope="session")
-def gl() -> Iterator[Any]:
-    """A moderngl context; Mesa's software rasteriser where there is no graphics card."""
-    pytest.importorskip("moderngl")
-    try:
-        context = headless_context()
-    except DiffractionError as error:
-        pytest.skip(str(error))
-    yield context
-    context.release()
+from mitsuba_diffraction import DiffractionTable, HeightField
 
 
 @pytest.fixture(scope="session")

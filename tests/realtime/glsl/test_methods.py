@@ -19,8 +19,8 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
-from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
+from mitsuba_diffraction.realtime.glsl.context import Bindings, compile_program, compiler_words
+from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method, window
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_beneath,
@@ -50,6 +50,7 @@ from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
+from tests.support.patches import SMALL_SCAN
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
 pytestmark = pytest.mark.thorough
@@ -121,6 +122,27 @@ def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable)
     close = np.hypot(at[:, 0], at[:, 1]) < 0.05
     assert close.any()
     assert difference(found[close], exact[close]) < 2e-3
+
+
+def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
+    table = DiffractionTable.build(SMALL_SCAN, second_order=False)
+    assert table.order_0_ratio > 100.0
+    at = places(600)
+    # many in the lobe of the light, 0.3° wide
+    at[::2, :2] = np.random.default_rng(3).normal(0.0, 0.006, (300, 2))
+    expected = summed(table, at)
+    shaders = {
+        "exact": pack_powers(table) | pack_responses(DAYLIGHT),
+        "fast": pack_colours(ColourTable.build(table)),
+    }
+    # the bounds of the tests above and below; of fast, eight digits and the rings between
+    for (method, packed), bound in zip(shaders.items(), (8e-3, 2e-2), strict=True):
+        found = probed(gl, method, packed | PERFECT, at)
+        for part in (slice(0, None, 2), slice(1, None, 2)):
+            assert difference(found[part], expected[part]) < bound, method
+    wider = window(Bindings(gl, pack_powers(table)), 130.0)
+    assert wider["sigma"] == pytest.approx(table.sigma)
+    assert wider["order_0_ratio"] == pytest.approx((130.0 / table.window_width) ** 2)
 
 
 def test_exact_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:

@@ -274,7 +274,7 @@ def test_every_surface_is_valid_glsl_of_its_own(
     assert set(names) - {"energy", "eta"} <= given
     material = Path(md.__file__).parent / "realtime/glsl/three/diffraction.js"
     code = re.sub(r"\s*//.*", "", shader.code)  # comments cost a program nothing
-    assert len(code.encode()) + material.stat().st_size < 33_000
+    assert len(code.encode()) + material.stat().st_size < 30_000
 
 
 @pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])

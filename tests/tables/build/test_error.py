@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.reference import screen_power
+from mitsuba_diffraction.reference import Sigmas, screen_power
 from mitsuba_diffraction.tables.build.error import FLOOR, GLOSSY_RADIUS, alternate, worst
 from tests.support.directions import rough_patch
 
@@ -29,7 +29,7 @@ def measured(table, kappas, seed):
     reached = (x / rx) ** 2 + (y / ry) ** 2 <= 1.0
     x, y = x[reached], y[reached]
     near = np.hypot(x * table.grid.steps[0], y * table.grid.steps[1]) <= GLOSSY_RADIUS
-    errors, sums = [], []
+    errors, sums, sigmas = [], [], Sigmas(table.sigma, table.sigma_0)
     for kappa in kappas:
         qx = (x + rng.uniform(-0.5, 0.5, x.size)) * table.spacing[0]
         qy = (y + rng.uniform(-0.5, 0.5, y.size)) * table.spacing[1]
@@ -37,7 +37,7 @@ def measured(table, kappas, seed):
         screen = np.exp(1j * kappa * PATCH.heights)
         exact = np.array(
             [
-                screen_power(screen, PATCH.pixel_size, a, b, table.sigma, table.coherence)
+                screen_power(screen, PATCH.pixel_size, a, b, sigmas, table.coherence)
                 for a, b in zip(qx[inside], qy[inside], strict=True)
             ]
         ) / (4 * np.pi**2 * table.sigma**4)

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import diffraction_coordinates, sigma_of, wavenumber
-from mitsuba_diffraction.reference import screen_power
+from mitsuba_diffraction.reference import Sigmas, screen_power
 
 pytestmark = [
     pytest.mark.thorough,
@@ -95,7 +95,9 @@ def check(seed: int, table: DiffractionTable, field: HeightField, asked: dict[st
     sigma = sigma_of(asked["coherence_width"])
     exact = np.array(
         [
-            screen_power(np.exp(1j * a), field.pixel_size, qx, qy, sigma, asked["coherence"])
+            screen_power(
+                np.exp(1j * a), field.pixel_size, qx, qy, Sigmas.same(sigma), asked["coherence"]
+            )
             for a, qx, qy in zip((k * w)[:, None, None] * field.heights, k * u, k * v, strict=True)
         ]
     ) / (4.0 * np.pi**2 * sigma**4)

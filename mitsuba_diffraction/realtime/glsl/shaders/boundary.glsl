@@ -6,18 +6,10 @@
 
 uniform float coat;               // index of the coat over that of the medium above
 
-// Transmittances T_s and T_p of the coat's face.
-vec2 face_transmittances(float cosine)
-{
-    vec2 found;
-    transmittances(cosine, coat, found.x, found.y);
-    return found;
-}
-
 // Reflection by the face, relative to the factor `outside` of the structure.
 float face_reflected;
 
-float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(face_transmittances(cosine), vec2(1.0)); }
+float face_reflectance(float cosine) { return 1.0 - face_transmittance(cosine, coat); }
 
 // Reflectance of a flat coated interface.
 vec3 flat_reflectance(float cosine)
@@ -36,7 +28,7 @@ vec3 flat_reflectance(float cosine) { return reflectance(cosine); }
 
 #ifndef BOUNDARY
 
-void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back) {}
+void begin_pair(vec3 wi, vec3 wo, vec2 outer) {}
 
 vec3 boundary(float cos_half, float r, float z) { return reflectance(cos_half); }
 float boundary_at_all(float cos_half) { return reflectance_at_all(cos_half); }
@@ -69,11 +61,11 @@ float height_statistic(float q) { return 0.0; }
 #if SURFACE_KIND == DIELECTRIC
 
 // Prepare the values of a pair of directions above the structure that all wavelengths share.
-// there, back: transmittances of a coat.
-void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back)
+// outer: their cosines outside of a coat.
+void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
 #ifdef COATED
-    begin_boundary(wi, wo, eta, there.x, there.y, back.x, back.y);
+    begin_boundary(wi, wo, eta, coat, outer.x, outer.y);
 #else
     begin_boundary(wi, wo, eta);
 #endif
@@ -95,10 +87,10 @@ vec3 boundary(float cos_half, float r, float z)
 
 #else
 
-void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back)
+void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
 #ifdef COATED
-    begin_boundary(wi, wo, there.x, there.y, back.x, back.y);
+    begin_boundary(wi, wo, coat, outer.x, outer.y);
 #else
     begin_boundary(wi, wo);
 #endif

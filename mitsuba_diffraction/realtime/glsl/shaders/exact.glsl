@@ -16,6 +16,7 @@ uniform sampler2D functions;     // factors of all terms over κ, and |a₀|²: 
 uniform ivec2 last_order;        // orders run from −last to last
 uniform vec2 spacing;            // spacing of orders, rad/µm
 uniform float sigma;
+uniform float order_0_ratio;     // (σ₀/σ)² of order 0's window, the light's
 uniform float interval_length;
 uniform int intervals;
 uniform int cells;
@@ -154,13 +155,14 @@ float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
     }
     power *= inverse_scale;
     float apart = sigma * k * r;
-    power += exp(-apart * apart) * specular;
+    float mirror = order_0_ratio * exp(-order_0_ratio * apart * apart);  // lobe of order 0
+    power += mirror * specular;
 #ifdef SECOND_ORDER
-    power += max(power - exp(-apart * apart), 0.0) * (second_order(uv, r, k, z) - 1.0);
+    power += max(power - mirror, 0.0) * (second_order(uv, r, k, z) - 1.0);
 #endif
     float reflected = power * boundary_at(cos_half, k, r, z);
 #ifdef COATED
-    reflected += exp(-apart * apart) * face_reflected;
+    reflected += mirror * face_reflected;
 #endif
     return reflected;
 }

@@ -7,6 +7,7 @@ uniform int order_columns;       // tiles in a row of the texture
 uniform float last_band;
 uniform float period;            // µm
 uniform float superstrate;       // index of the clear layer over the grooves
+uniform float least_c;           // least c of light from outside the layer
 uniform vec2 solved_range;       // shortest and longest wavelength of the table, µm
 uniform vec2 solved_reach;       // ends of the light that it reflects, µm
 
@@ -19,25 +20,13 @@ int row_tile;
 vec3 row_place;                  // τ, ρ and w
 float row_lit;                   // 0 beyond the table's wavelengths, else 1
 
-#ifdef FACE
-
-// Unpolarised transmittance of the layer's face, for the cosine outside.
-float through_face(float cosine)
-{
-    float s, p;
-    transmittances(cosine, superstrate, s, p);
-    return 0.5 * (s + p);
-}
-
-#endif
-
 // Begin with a direction to the eye.
 void begin_orders(vec3 wi, vec2 rotation)
 {
     row_incident = in_patch(wi, rotation);
     row_face = 0.0;
 #ifdef FACE
-    row_face = 1.0 - through_face(wi.z);
+    row_face = 1.0 - face_transmittance(wi.z, superstrate);
 #endif
 }
 
@@ -56,7 +45,6 @@ void find_row(float wavelength)
     int k = int(band);
     int first = k * (k + 1) * (2 * k + 1) / 3 + (kind_a ? 0 : (k + 1) * (k + 2));
     row_tile = first + int(row_channel) * int(row_channels + 1.0);
-    float least_c = sqrt(1.0 - 1.0 / (superstrate * superstrate));
     cell_wavelengths(orders, optical_period, solved_range.x, solved_range.y, least_c, shortest,
                      longest);
     row_place = vec3(smooth_coordinate(t), smooth_coordinate(r),
@@ -84,10 +72,10 @@ float efficiency_of(float order)
     float q = row_channel - order;
     if (q < 0.0 || q >= row_channels) return 0.0;
 #ifdef FACE
-    vec2 leaving = vec2(order * row_wavelength / period - row_incident.x, row_incident.y);
-    float squared = dot(leaving, leaving);
-    if (squared >= 1.0) return 0.0;
-    float twice = (1.0 - row_face) * through_face(sqrt(1.0 - squared));
+    float out_x, square;
+    order_direction(row_incident.x, row_incident.y, order, row_wavelength / period, out_x, square);
+    if (square <= 0.0) return 0.0;
+    float twice = (1.0 - row_face) * face_transmittance(sqrt(square), superstrate);
     return twice * efficiency_towards(q) + (order == 0.0 ? row_face : 0.0);
 #else
     return efficiency_towards(q);

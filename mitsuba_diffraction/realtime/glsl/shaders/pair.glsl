@@ -9,21 +9,18 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     float one_plus_dot = 0.5 * dot(sum, sum);
     float ratio = one_plus_dot / sum.z;
     float outside = area * ratio * ratio / wi.z;
-    vec2 there = vec2(1.0), back = vec2(1.0);
+    vec2 outer = vec2(wi.z, wo.z);
 #ifdef COATED
-    there = face_transmittances(wi.z);
-    back = face_transmittances(wo.z);
     float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
-    float leaving = wo.z;
     wi = refracted(wi, coat);
     wo = refracted(wo, coat);
     sum = wi + wo;
     one_plus_dot = 0.5 * dot(sum, sum);
     ratio = one_plus_dot / sum.z;
-    outside = area * ratio * ratio / wi.z * leaving / wo.z;
+    outside = area * ratio * ratio / wi.z * outer.y / wo.z;
     sum.z *= coat;  // κ is larger by the index of the coat
 #endif
-    begin_pair(wi, wo, there, back);
+    begin_pair(wi, wo, outer);
 #ifdef SECOND_ORDER
     begin_second_order(wi, wo);
 #endif

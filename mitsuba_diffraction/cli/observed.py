@@ -1,0 +1,90 @@
+"""`mitsuba-diffraction render --observer`: a picture as an animal's receptors catch it."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
+from ..scene.passes import Stop, render_passes
+from ..scene.pictures import count_bad, write_exr
+from . import scene_options
+from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
+from .report import check_writable, default_output, save_report
+
+
+def add_observer(parser: argparse.ArgumentParser) -> None:
+    """Add the animal."""
+    parser.add_argument(
+        "--observer", metavar="ANIMAL|CSV",
+        help="an eye, as in `spectrum`: the EXR has a channel for each receptor, the PNG is in "
+        "false colour with a legend; tables of heights then serve ultraviolet",
+    )  # fmt: skip
+
+
+def run_observed(args: argparse.Namespace) -> int:
+    """Render with a band for each receptor, and return the exit code."""
+    from ..analysis.observers import GRID, eye_of, responses
+
+    if args.frames is not None or args.plan is not None or args.denoise or args.workers:
+        args.parser.error("argument --observer: is for one picture in one process, without a plan")
+    eye = eye_of(args.observer)
+    parameters = scene_options.scene_parameters(args)
+    output = args.output or Path(default_output(args.name, ".exr").name)
+    if output.suffix.lower() != ".exr":
+        args.parser.error(f"argument -o: --observer writes an EXR, not {str(output)!r}")
+    png = output.with_suffix(".png")
+    for path in (output, png):
+        check_writable(path)
+    start = time.perf_counter()
+    variant = set_variant(args.mode)
+    if "_spectral" not in variant:
+        raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
+    from ..scene.bands import Bands
+
+    bands = Bands(GRID.tolist(), dict(zip(eye.names, responses(eye).tolist(), strict=True)))
+    with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, args.spp or 0, "loading")
+        scene = load_scene(args.scene, parameters, bands=bands)
+        sensor = sensor_of(scene, args.sensor)
+        if args.preview:
+            shrink(sensor)
+        spp = args.spp or preview_samples(sensor, args.preview)
+        with Stop() as stop:
+            result = render_passes(
+                scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
+            )
+    if result.spp == 0:
+        raise KeyboardInterrupt
+    if bad := count_bad(result.bitmap):
+        say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in the PNG")
+    channels = np.nan_to_num(np.array(result.bitmap, np.float64)[..., : len(eye.names)])
+    dark = [n for n, total in zip(eye.names, channels.sum(axis=(0, 1)), strict=True) if not total]
+    if dark:
+        say(f"receptors without light: {', '.join(dark)}: lights of colours and d65 begin at 360 "
+            "nm, sunsky at 320 nm; give spectra that reach further")  # fmt: skip
+    write_exr(
+        result.bitmap, output,
+        {"scene": str(args.scene), "variant": variant, "seed": args.seed, "spp": result.spp,
+         "observer": args.observer},
+    )  # fmt: skip
+    from ..analysis.false_colour import false_colour_figure
+
+    title = f"{args.name.name} as {Path(args.observer).stem}"
+    with atomic_path(png) as temporary:
+        figure = false_colour_figure(channels, eye, args.exposure, title)
+        figure.savefig(temporary, format="png")
+    width, height = result.bitmap.size()
+    seconds = time.perf_counter() - start
+    print(
+        f"{output} and {png}: {width} x {height} pixels, channels {', '.join(eye.names)}, "
+        f"{result.spp} samples per pixel, {seconds:.1f} s, {variant}"
+    )
+    save_report(args, {"scene": args.scene, "files": [output, png], "observer": args.observer,
+                       "receptors": list(eye.names), "spp": result.spp})  # fmt: skip
+    return INTERRUPTED if result.interrupted else 0

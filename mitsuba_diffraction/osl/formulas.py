@@ -1,0 +1,67 @@
+"""Formulas of `optics` that the shaders call, as functions in OSL."""
+
+from __future__ import annotations
+
+import functools
+import re
+from importlib import resources
+from typing import Any
+
+from ..optics.boundary import Model
+from ..optics.coat import face_transmittance, pair_power
+from ..optics.dialects import OSL
+from ..optics.fresnel import reflectance
+from ..optics.orders import (
+    cell_wavelengths,
+    order_cell,
+    order_direction,
+    smooth_coordinate,
+    wavelength_coordinate,
+)
+from ..optics.programs import Program
+
+
+@functools.cache
+def shader_file(name: str) -> str:
+    """Read a file of the folder shaders."""
+    return resources.files(__package__).joinpath("shaders", name).read_text(encoding="utf-8")
+
+
+def order_formulas() -> str:
+    """Return the functions of `optics` that `shaders/orders.osl` calls."""
+    program = _program()
+    for formula, count in (
+        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 5), (wavelength_coordinate, 4),
+        (face_transmittance, 2), (order_direction, 4),
+    ):  # fmt: skip
+        program.add(formula, *["float"] * count)
+    return program.text
+
+
+def patch_formulas(model: Model | None) -> str:
+    """Return the functions of `optics` that `shaders/patch.osl` calls.
+
+    model : of the boundary; None of a perfect reflector.
+
+    Raises a DiffractionError if the model's formula cannot be written in OSL.
+    """
+    program = _program()
+    jones = None if model is None else model.jones
+    program.add(
+        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
+    )
+    flat = reflectance if model is not None else _everything
+    program.add(flat, "float", "complex", name="flat_reflectance")
+    return program.text
+
+
+def _everything(cosine: Any, index: Any) -> float:
+    """Return the reflectance of a perfect reflector."""
+    return 1.0
+
+
+def _program() -> Program:
+    """Return an empty program; its functions never have a name of the shaders: md_… or a macro."""
+    files = resources.files(__package__).joinpath("shaders").iterdir()
+    text = "".join(shader_file(file.name) for file in files)
+    return Program(OSL, frozenset(re.findall(r"\b(?:md_\w+|[A-Z][A-Z_0-9]+)\b", text)))

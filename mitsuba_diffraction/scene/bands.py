@@ -1,0 +1,108 @@
+"""Scenes in the light of an eye: a film with a band for each receptor, and tables that cover it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Self
+
+import mitsuba as mi
+
+from ..errors import DiffractionError
+from ..plugin.description import describe
+from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest
+from ..tables.table import DiffractionTable
+
+# Parameters of a film that its size and format follow from.
+_KEPT = (
+    "width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y",
+    "sample_border",
+)  # fmt: skip
+
+
+class Bands(NamedTuple):
+    """Responses of a film's channels.
+
+    Attributes
+    ----------
+    wavelengths : (n,) nm, increasing.
+    responses : (n,) of each channel by name, 1/nm.
+    """
+
+    wavelengths: Sequence[float]
+    responses: Mapping[str, Sequence[float]]
+
+    @property
+    def first(self) -> float:
+        """Shortest wavelength that a channel responds to, nm; responses are linear between."""
+        seen = [any(values) for values in zip(*self.responses.values(), strict=True)]
+        return float(self.wavelengths[max(seen.index(True) - 1, 0)])
+
+
+def put_bands(state: Any, bands: Bands) -> None:
+    """Replace all films by spectral films of these bands.
+
+    A channel's value is ∫ L(λ) r(λ) dλ, with the radiance L per nanometre and its response r.
+
+    state : `mi.parser.ParserState`, its references resolved.
+    """
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        old, film = node.props, mi.Properties("specfilm")
+        for name in old.keys():  # noqa: SIM118 - Properties is no mapping
+            if name in _KEPT or old.type(name) == mi.Properties.Type.ResolvedReference:
+                film[name] = old[name]
+        film["component_format"] = "float32"
+        film.set_id(old.id())
+        lam = ", ".join(f"{x:g}" for x in bands.wavelengths)
+        for name, response in bands.responses.items():
+            values = ", ".join(f"{x:.8g}" for x in response)
+            film[name] = mi.load_dict({"type": "irregular", "wavelengths": lam, "values": values})
+        node.props = film
+
+
+class WiderTables:
+    """Context in which heights of loaded scenes have tables from a wavelength on.
+
+    first : nm; default tables begin at 360.
+    """
+
+    def __init__(self, first: float) -> None:
+        self._first = min(first, SHORTEST_WAVELENGTH)
+
+    def __enter__(self) -> Self:
+        for name, kind in _plugins().items():
+            mi.register_bsdf(name, self._maker(kind))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for name, kind in _plugins().items():
+            mi.register_bsdf(name, kind)
+
+    def _maker(self, kind: Callable[..., Any]) -> Callable[[Any], Any]:
+        def make(props: Any) -> Any:
+            bsdf = kind(props, self._table)
+            shortest = getattr(describe(bsdf), "shortest_wavelength", 0.0)
+            if shortest > self._first:
+                raise DiffractionError(
+                    f"the table begins at {shortest:g} nm, and the eye sees from {self._first:g} "
+                    f"nm; give heights, or DiffractionTable.build(wavelength_range="
+                    f"({self._first:g}, 830))"
+                )
+            return bsdf
+
+        return make
+
+    def _table(self, request: TableRequest) -> DiffractionTable:
+        _, last = request.settings.wavelength_range
+        first = min(self._first, request.settings.wavelength_range[0])
+        return request.cached(replace(request.settings, wavelength_range=(first, last)))
+
+
+def _plugins() -> dict[str, Callable[..., Any]]:
+    """Return the BSDFs that build tables, of the current variant."""
+    from ..plugin.diffraction import Diffraction
+    from ..plugin.transmission.diffraction_dielectric import DiffractionDielectric
+
+    return {"diffraction": Diffraction, "diffraction_dielectric": DiffractionDielectric}

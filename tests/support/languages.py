@@ -1,0 +1,132 @@
+"""N' of pairs by the functions that shaders have: GLSL by OpenGL, OSL by Cycles in Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+
+from mitsuba_diffraction.optics.boundary import Model
+from mitsuba_diffraction.osl.formulas import patch_formulas
+from mitsuba_diffraction.realtime.glsl.formulas import formulas
+from tests.support.blender import result_of
+from tests.support.formulas import COAT, Array, Pairs
+
+VERTEX = """#version 330
+const float PI = 3.14159265358979;
+float arcsine(float x) {{ return asin(x); }}
+{functions}
+in vec3 wi; in vec3 wo; in vec2 heights; out float result;
+void main()
+{{
+    {body}
+    float one = 0.5 * dot(a + b, a + b);
+    result = one * one * boundary_factor({late}heights.x, heights.y);
+}}
+"""
+
+
+def shaded(gl: Any, given: Pairs, model: Model, index: complex, coated: bool) -> Array:
+    """N' of pairs by the functions that the renderer's shaders have."""
+    real = index.imag == 0.0
+    n = COAT if coated else 1.0
+    relative = index / n
+    text = f"{relative.real:.9g}" if real else f"vec2({relative.real:.9g}, {relative.imag:.9g})"
+    definitions = {"BOUNDARY": model.name, "SURFACE_KIND": "1" if real else "2"}
+    early = "a, b" + (f", {text}" if real else "")
+    body = "vec3 a = wi, b = wo;\n"
+    if coated:
+        definitions["COATED"] = ""
+        body = f"vec3 a = refracted(wi, {n}), b = refracted(wo, {n});\n"
+        early += f", {n}, wi.z, wo.z"
+    body += f"    begin_boundary({early});"
+    source = VERTEX.format(
+        functions=formulas(definitions), body=body, late="" if real else f"{text}, "
+    )
+    program = gl.program(vertex_shader=source, varyings=["result"])
+    heights = np.stack([given.kappa, given.variance], axis=1)
+    data = np.concatenate([given.wi, given.wo, heights], axis=1).astype("f4")
+    buffer, output = gl.buffer(data.tobytes()), gl.buffer(reserve=4 * len(data))
+    lanes = gl.vertex_array(program, [(buffer, "3f 3f 2f", "wi", "wo", "heights")])
+    frame = gl.simple_framebuffer((1, 1))
+    frame.use()
+    lanes.transform(output, vertices=len(data), mode=0)
+    found = np.frombuffer(output.read(), np.float32).astype(float)
+    for thing in (lanes, program, buffer, output, frame):
+        thing.release()
+    return found
+
+
+_OSL = """
+shader probe(string Incident = "", string Outgoing = "", float Eta = 1.0, float Kappa = 0.0,
+             output closure color BSDF = 0)
+{
+    // a pixel of the picture is a pair: the plane spans 0 to 1
+    float kappa, variance;
+    color wi = texture(Incident, P[0], P[1], "interp", "closest", "alpha", kappa);
+    color wo = texture(Outgoing, P[0], P[1], "interp", "closest", "alpha", variance);
+    BSDF = emission() * boundary_factor(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
+}
+"""
+_CODE = """
+import bpy, _cycles, numpy as np
+from pathlib import Path
+folder, result = Path(folder), []
+compiled = folder / "probe.oso"
+assert _cycles.osl_compile(str(folder / "probe.osl"), str(compiled)), "no OSL"
+for n, k in indices:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.shading_system = "CPU", True
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+    scene.render.resolution_x = scene.render.resolution_y = side
+    material = bpy.data.materials.new("probe")
+    tree = material.node_tree
+    tree.nodes.clear()
+    script = tree.nodes.new("ShaderNodeScript")
+    script.mode, script.filepath = "EXTERNAL", str(compiled)
+    bsdf = script.outputs.new("NodeSocketShader", "BSDF")
+    values = [("String", "Incident", str(folder / "incident.exr")),
+              ("String", "Outgoing", str(folder / "outgoing.exr")),
+              ("Float", "Eta", n), ("Float", "Kappa", k)]
+    for kind, name, value in values:
+        script.inputs.new("NodeSocket" + kind, name).default_value = value
+    end = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(bsdf, end.inputs["Surface"])
+    bpy.ops.mesh.primitive_plane_add(size=1, location=(0.5, 0.5, 0))
+    bpy.ops.object.transform_apply()
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.object.camera_add(location=(0.5, 0.5, 1))
+    scene.camera = bpy.context.object
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(folder / "picture.exr")
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    picture.colorspace_settings.name = "Non-Color"
+    result.append(np.array(picture.pixels[:]).reshape(-1, 4)[:, 0].tolist())
+"""
+
+
+def emitted(folder: Path, given: Pairs, model: Model, indices: Sequence[complex]) -> list[Array]:
+    """N' of pairs, a square number of them, for each index; pixels of a plane that emits it."""
+    side = round(len(given.wi) ** 0.5)
+    source = f"{patch_formulas(model)}\n{_OSL}"
+    (folder / "probe.osl").write_text(source, encoding="utf-8")
+    for name, light, last in (
+        ("incident", given.wi, given.kappa), ("outgoing", given.wo, given.variance),
+    ):  # fmt: skip
+        pixels = np.concatenate([light, last[:, None]], axis=1).astype(np.float32)
+        header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage}
+        channels = {"RGBA": np.ascontiguousarray(pixels.reshape(side, side, 4))}
+        OpenEXR.File(header, channels).write(str(folder / f"{name}.exr"))
+    values = [(index.real, index.imag) for index in indices]
+    pictures = result_of(_CODE, folder, folder=str(folder), side=side, indices=values)
+    return [np.array(picture) for picture in pictures]

@@ -1,0 +1,69 @@
+"""Order 0 has the window of the light, and a scan limits the window of all other orders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from tests.support.directions import lit_pairs
+from tests.support.mirror import FAST, beside_the_mirror
+from tests.support.patches import SMALL_SCAN, relative_error
+
+# small and coarse scans are what is tested
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 5.0, 10.0, 30.0, 65.0])
+def test_beside_the_mirror_of_a_flat_scan_is_no_light(width):
+    noise = 1e-6 * np.random.default_rng(1).standard_normal((16, 16))  # µm: it limits the window
+    scan = md.HeightField(noise, width / 16, cut_out=True)
+    table = md.DiffractionTable.build(scan, **FAST)
+    assert table.window_width == width
+    for degrees in (3.0, 5.0, 10.0, 30.0):
+        # the lobe of sunlight, 0.6° wide in red light, ends there
+        assert beside_the_mirror(table, degrees, (450.0, 600.0, 800.0)).max() < 1e-3
+
+
+def test_the_window_of_the_light_changes_order_0_alone():
+    table = md.DiffractionTable.build(SMALL_SCAN, second_order=False)
+    assert (table.coherence_width, table.window_width) == (65.0, min(SMALL_SCAN.extent))
+    one = md.DiffractionTable.build(
+        md.HeightField(SMALL_SCAN.heights, SMALL_SCAN.pixel_size), second_order=False,
+        coherence_width=table.window_width,
+    )  # fmt: skip
+    assert one.order_0_ratio == 1.0
+    np.testing.assert_array_equal(table.coefficients, one.coefficients)
+    q, kappa = np.array([0.0, 0.03, 0.1, 0.5, 2.0]), 20.0
+    order_0 = one.order_0_at(kappa)[0]
+    expected = one.window_sum(q, 0.0, kappa) - order_0 * np.exp(-((one.sigma * q) ** 2))
+    ratio = (table.sigma_0 / table.sigma) ** 2
+    expected += order_0 * ratio * np.exp(-((table.sigma_0 * q) ** 2))
+    # differences of larger numbers
+    np.testing.assert_allclose(table.window_sum(q, 0.0, kappa), expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])
+def test_tables_of_a_small_scan_meet_their_tolerance(basis):
+    table = md.DiffractionTable.build(SMALL_SCAN, basis=basis)
+    near, far = relative_error(table, SMALL_SCAN)
+    assert max(near, far) < table.tolerance
+    # the lobe of the light, in which no pair above need lie
+    wi, wo, lam, close = lit_pairs(SMALL_SCAN, table.sigma_0, 80, 3)
+    exact = md.reference.brdf(SMALL_SCAN, wi, wo, lam)
+    difference = np.abs(table.brdf(wi, wo, lam) - exact) / kirchhoff_factor(wi, wo, lam, 1.0)
+    scale = exact / kirchhoff_factor(wi, wo, lam, 1.0)
+    assert difference[close].sum() < table.tolerance * scale[close].sum()
+
+
+def test_files_hold_the_window_of_a_scan_and_older_ones_have_one_window(tmp_path):
+    scan = md.DiffractionTable.build(SMALL_SCAN, second_order=False)
+    scan.save(tmp_path / "scan.exr")
+    loaded = md.DiffractionTable.load(tmp_path / "scan.exr")
+    assert (loaded.sigma, loaded.sigma_0) == (scan.sigma, scan.sigma_0)
+    assert loaded.digest() == scan.digest()
+    whole = SMALL_SCAN.treated(periodic="exact")
+    table = md.DiffractionTable.build(whole, coherence_width=4.5, second_order=False)
+    assert "window_width" not in table.settings.as_json()
+    assert table.sigma == table.sigma_0
