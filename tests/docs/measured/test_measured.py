@@ -1,8 +1,7 @@
-"""Measured gratings: their data, grooves and page."""
+"""Measured gratings: their data and grooves."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -59,14 +58,3 @@ def test_roughness_takes_light_out_of_the_orders():
 def test_a_folder_that_is_no_clone_is_refused_in_one_line(tmp_path, capsys):
     assert main(["-o", str(tmp_path), "--kaist", str(tmp_path)]) == 1
     assert "clone https://github.com/KAIST" in capsys.readouterr().err
-
-
-@pytest.mark.thorough
-def test_the_page_is_whole(tmp_path, capsys):
-    assert main(["--quick", "-o", str(tmp_path)]) == 0
-    text = (tmp_path / "validation" / "measured.md").read_text(encoding="utf-8")
-    assert not re.search(r"\bnan\b", text)
-    assert "{" not in text
-    assert text.count("GMOS B1200") == 2
-    assert (tmp_path / "images" / "measured_gratings.png").stat().st_size > 10_000
-    assert "solved orders are within" in capsys.readouterr().out
