@@ -66,8 +66,8 @@ of the cut itself. Deviation of colours on keratin, mean and worst of the cases,
 {table(header, _rows(cases, second_order_factor.MODELS, lit))}
 
 On a CD in oblique light the factor removes most of the error, because all its pits are alike. On
-scales it removes a quarter with each order's own ratios and a tenth with the patch's. The
-factor leaves out evanescent intermediate waves. At normal incidence its coefficients are attenuated:
+scales it removes a quarter with each order's own ratios and a tenth with the patch's. The factor
+leaves out evanescent intermediate waves. At normal incidence its coefficients are attenuated:
 without that four sinusoids were worse than with Kirchhoff. Metals have no factor: surface plasmons
 are a pole that it cannot represent."""
 
