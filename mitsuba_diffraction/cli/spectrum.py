@@ -311,6 +311,7 @@ def _of_heights(
 ) -> Spectra:  # fmt: skip
     """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
     from ..analysis.scans import Scan, read_scan, table_of
+    from ..heights.coherence import blur
     from ..heights.load import notes_line
     from ..heights.spectra import dominant_periods
     from ..optics.colour import LONGEST, SHORTEST
@@ -325,6 +326,8 @@ def _of_heights(
     line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
     if line and not quiet and args.crops is None:
         say(line)
+    if table.settings.window_width is not None and not quiet and args.crops is None:
+        say(f"{file.name}: {blur(table.window_width)}")
     if args.light_azimuth == "auto":
         gratings = dominant_periods(patches[0])
         geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)

@@ -34,6 +34,18 @@ class Filmed:
         """Return the film on a facet whose normal has this cosine to the vertical."""
         return Filmed(self.index, self.film, self.depth * cosine)
 
+    @property
+    def phase(self) -> float:
+        """Largest phase (rad) of light there and back in the film at normal incidence."""
+        _, film, depth = self.parts
+        return float(2.0 * np.max((film * depth).real))
+
+    @property
+    def advance(self) -> float:
+        """Largest phase (rad) by which the fringe advances from the normal to the horizon."""
+        _, film, depth = (np.max(np.real(part)) for part in self.parts)
+        return float(2.0 * depth * (film - np.sqrt(max(film**2 - 1.0, 0.0))))
+
     def __getitem__(self, key: Any) -> Filmed:
         """Select elements of all three parts, which are NumPy's, broadcast to one shape."""
         return Filmed(*(part[key] for part in np.broadcast_arrays(*self.parts)))

@@ -264,10 +264,8 @@ class Diffraction(DiffractingSurface):
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
         self._second_order = read.second_order
-        self._energy = None
-        if read.scales_energy:
-            mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
+        mean, conserving = read.surface.mean_table, read.surface.energy_conserving
+        self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
         if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
         components = nesting.components_of(self.nested)
@@ -363,7 +361,7 @@ class Diffraction(DiffractingSurface):
         value = self.lobe(ctx, si, pair, self.boundary, factor * power, scale, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
-        if self._energy is not None and self._energy.active_factors:
+        if self._energy.active_factors:
             # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
             value *= mi.Spectrum(self._energy.factor(pair, k, scale))
         return value
@@ -371,7 +369,7 @@ class Diffraction(DiffractingSurface):
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """See `Nesting.beneath`."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._energy is not None and self._light_beneath:
+        if self._light_beneath:
             frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
@@ -416,8 +414,7 @@ class Diffraction(DiffractingSurface):
     def derive(self) -> None:
         """Compute what depends on the parameters: indices, scales of energy, the second order."""
         self.fresnel.derive()
-        if self._energy is not None:
-            self._energy.update(self.scale_range(), self._light_beneath)
+        self._energy.update(self.scale_range(), self._light_beneath)
         if self._second_order is not None:
             self._second_order.update()
         material = self.boundary.material
@@ -428,7 +425,7 @@ class Diffraction(DiffractingSurface):
             str(self.boundary),
             self.coat is None,
             self._second_order is None,
-            0 if self._energy is None else self._energy.active_factors,
+            self._energy.active_factors,
             # these choose other kernels
             getattr(material, "reflects_all", False),
             getattr(material, "channels", None),
@@ -453,7 +450,7 @@ class Diffraction(DiffractingSurface):
         energy, nested, second_order = None, None, None
         if self._second_order is not None and (ratios := self.table.slope_ratios) is not None:
             second_order = SecondOrder(self._second_order.index, ratios)
-        if self._energy is not None and self._energy.conserving | self._light_beneath:
+        if self._energy.conserving | self._light_beneath:
             energy = Energy(self._energy_scale, self._reflected_ratio)
         if self.nested is not None:
             blend = self.layering
@@ -470,17 +467,16 @@ class Diffraction(DiffractingSurface):
     @property
     def energy_conserving(self) -> bool:
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
-        return self._energy is not None and self._energy.conserving
+        return self._energy.conserving
 
     def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
-        """See `description.Energy.scale`."""
-        if self._energy is None or not self._energy.conserving or self.coat is not None:
-            return None
-        return self._energy.scale(height_scale)
+        """See `description.Energy.scale`; shaders have none under a coat, where it is near 1."""
+        shown = self._energy.conserving and self.coat is None
+        return self._energy.scale(height_scale) if shown else None
 
     def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """See `description.Energy.reflected`."""
-        if not self._light_beneath or self._energy is None:
+        if not self._light_beneath:
             return None
         return self._energy.ratio(height_scale)
 

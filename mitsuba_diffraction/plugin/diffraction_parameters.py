@@ -44,7 +44,6 @@ class Parameters:
     reflectance : of the flat surface: faces of coat, film and structure together.
     coat : the clear layer over the structure, or None.
     boundary : model of the light that the material reflects.
-    scales_energy : whether the albedo is known, by which energy is conserved.
     vcavity : whether the surface shadows itself like V-shaped grooves.
     layering : how diffraction and the nested BSDF share the light.
     nested : the BSDF beneath, or None.
@@ -55,7 +54,6 @@ class Parameters:
     reflectance: Reflectance | UnderCoat | UnderFilm
     coat: Dielectric | None
     boundary: Boundary
-    scales_energy: bool
     vcavity: bool
     layering: Layering
     nested: BSDF | None
@@ -103,7 +101,6 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         reflectance=flat,
         coat=coat,
         boundary=boundary,
-        scales_energy=supported("energy", choices),
         vcavity=choice(props, "shadowing", SHADOWINGS) == "vcavity",
         layering=_layering(props, layering, flat, nested is not None),
         nested=nested,

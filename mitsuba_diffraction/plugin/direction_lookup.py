@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.directional import SHARE, DirectionalTable
+from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
 from .directions import PatchFrame
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
@@ -128,6 +128,17 @@ class DirectionLookup:
         # no farther, where values might become negative; derivatives at the ends are as inside
         share = dr.clip(share - lower, -0.01, 1.01)
         return [dr.lerp(*both, share) for both in zip(*ends, strict=True)]
+
+
+def at_horizon(cosine: Float) -> Float:
+    """Factor on light within half a degree of the horizon, where tables of directions end.
+
+    An albedo that gains there rises as 1/cosθ, of wide lobes faster.
+
+    cosine : of the angle to the normal, above 0.
+    """
+    near = dr.clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
+    return near * dr.sqrt(near)
 
 
 def scales_of(tables: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:

@@ -19,13 +19,13 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
-from ..tables.directional import FINE, LAST_ANGLE, DirectionalTable
+from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
 from ..tables.film import exponents_at, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary
-from .direction_lookup import DirectionLookup, between, scales_of
+from .direction_lookup import DirectionLookup, at_horizon, between, scales_of
 from .directions import Pair, PatchFrame
 from .energy_factors import ScaleRange
 from .fresnel import Dielectric, Inside, Perfect, Reflectance
@@ -51,8 +51,6 @@ THICKNESS_STEP = 1.0
 #: Step of a height scale over which the slope of g is taken. g bends by less than 1e-3 of its slope
 #: over it, and single precision leaves four digits of the difference.
 SLOPE_STEP = 2.0**-9
-#: Cosine of the last angle of tables of directions.
-LAST_COSINE = math.cos(LAST_ANGLE)
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
@@ -191,10 +189,7 @@ class EnergyModel:
                     [incident * outgoing for incident, outgoing in both]
                 )
         if self._scale.present:
-            # beyond the table's angles an albedo that gains rises as 1/cosθ, of wide lobes faster
-            for cosine in (outer.cos_i, outer.cos_o):
-                near = dr.minimum(cosine * (1.0 / LAST_COSINE), 1.0)
-                product *= near * dr.sqrt(near)
+            product *= at_horizon(outer.cos_i) * at_horizon(outer.cos_o)
         return product
 
     def reflected(

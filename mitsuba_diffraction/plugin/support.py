@@ -21,7 +21,6 @@ class Support:
     choice : name of the choice, for messages.
     index : boundary models that need a refractive index, all but Kirchhoff's.
     second_order : the second order of small slope.
-    energy : scales that conserve energy, which need the albedo of the structure.
     coat, film : layers over the structure.
     nested : a BSDF beneath the structure.
     thesis : the layering of the thesis of 2014.
@@ -31,7 +30,6 @@ class Support:
     choice: str
     index: bool = True
     second_order: bool = True
-    energy: bool = True
     coat: bool = True
     film: bool = True
     nested: bool = True

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -143,3 +145,28 @@ class DirectionalTable:
 
 #: Grid that renderers without wavelengths look scales up on.
 FINE = DirectionGrid(40, 60)
+
+
+class Quadrature(NamedTuple):
+    """Quadrature over the hemisphere: directions (n,), angles in rad, and their solid angles."""
+
+    x: Real
+    y: Real
+    cosine: Real
+    theta: Real
+    azimuth: Real
+    weights: Real
+
+
+@lru_cache(maxsize=4)
+def quadrature(rings: int, widest: int) -> Quadrature:
+    """Place directions on rings, with `widest` azimuths on the widest."""
+    position, share = np.polynomial.legendre.leggauss(rings)
+    angles = 0.25 * np.pi * (position + 1.0)
+    steps = np.maximum(8, np.rint(widest * np.sin(angles)).astype(int))
+    theta, count = np.repeat(angles, steps), np.repeat(steps, steps)
+    turn = np.concatenate([np.arange(n) + 0.381966 * ring for ring, n in enumerate(steps)])
+    azimuth = np.mod(turn * 2.0 * np.pi / count + np.pi, 2.0 * np.pi) - np.pi
+    weights = np.repeat(share * 0.25 * np.pi, steps) * np.sin(theta) * 2.0 * np.pi / count
+    x, y = np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth)
+    return Quadrature(x, y, np.cos(theta), theta, azimuth, weights)

@@ -49,7 +49,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         "model": str(rng.choice(["small_slope", "kirchhoff"])),
         "wavelength": float(rng.uniform(400.0, 700.0)),
     }
-    if rng.random() < 0.5:
+    if rng.random() < 0.3:
         chosen["lateral_scale"] = log_uniform(rng, 0.2, 2.0)
     if rng.random() < 0.3:
         chosen["coherence"] = "patch"
@@ -59,8 +59,8 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
 
 
 def check(rng: np.random.Generator) -> None:
-    """Sample what a surface sends on, and look at values; one in five in a spectral variant."""
-    spectral = rng.random() < 0.2
+    """Sample what a surface sends on, and look at values; one in ten in a spectral variant."""
+    spectral = rng.random() < 0.1
     mi.set_variant("llvm_ad_spectral" if spectral else "llvm_ad_mono")
     try:
         field = surface(rng)

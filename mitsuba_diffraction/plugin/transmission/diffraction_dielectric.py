@@ -177,7 +177,7 @@ class DiffractionDielectric(DiffractingSurface):
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self._energy is not None and self._energy.attenuates:
+        if self._energy is not None:
             # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
             value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), frame, *where))
         return value, density

@@ -11,7 +11,7 @@ import mitsuba as mi
 from ...tables.energy import materials
 from ...tables.energy.conservation import Energy
 from ...tables.table import DiffractionTable
-from ..direction_lookup import DirectionLookup, scales_of
+from ..direction_lookup import DirectionLookup, at_horizon, scales_of
 from ..directions import PatchFrame
 from ..energy_factors import ScaleRange
 from ..fresnel import Dielectric
@@ -89,8 +89,13 @@ class DielectricEnergy:
         wavenumbers: list[Float],
         height_scale: Float,
     ) -> Colour:
-        """s(ωi) s(ωo) per channel, of directions in the shading frame."""
-        return self._product(self._all_light, directions, frame, wavenumbers, height_scale)
+        """s(ωi) s(ωo) per channel, of directions in the shading frame; less at the horizon."""
+        product = mi.UnpolarizedSpectrum(1.0)
+        if self.attenuates:
+            product = self._product(self._all_light, directions, frame, wavenumbers, height_scale)
+        for direction in directions:
+            product *= at_horizon(dr.abs(mi.Frame3f.cos_theta(direction)))
+        return product
 
     def _product(
         self,

@@ -1,29 +1,10 @@
 """Energy conservation: scales of directions by which no more light is sent on than comes in.
 
-A reflector gains energy at some angles. With the albedo a(ω) of the model f at one wavelength, s is
-sought such that
-
-    f'(ωi, ωo) = f(ωi, ωo) s(ωi) s(ωo)   reflects   s(ωi) ∫ f s cosθo dωo = min(a(ωi), 1):
-
-reciprocal, since s s is symmetric, and with nothing taken from directions that gain nothing, since
-their s is a little above 1 where that of their partners is below. That is the scaling of a
-symmetric kernel to given sums (`scaling`). What is left to do:
-
-- Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
-  So the albedo is looked at between them too, and s lowered around where it is above 1.
-- No scaling exists where a direction's partners all gain and it does not: the light between two
-  groups of directions, as a blazed grating has them, is one sum for both. There s ends up between.
-
-A lossless dielectric that lets light through sends all light on. What the first order in the
-heights gains or lacks is order 0's: other orders are right to second order in the heights, and
-order 0, ∝ |a_0|² alone, is not. So c is sought, on the directions of both sides stacked, such that
-with f = f_0 + f_others
-
-    f'(ωi, ωo) = f_others + f_0 c(ωi) c(ωo)   sends on   R + T = 1.
-
-A sheet loses the light beyond its critical angle; c puts that back likewise. Where order 0 has too
-little light to make up for what is missing, that stays missing. Where the other orders of a steep
-surface exceed 1 on their own, all light is scaled by s(ωi) s(ωo) with s at most 1.
+The scales and their equations are those of docs/energy.md: s of all light, and c of order 0 where a
+dielectric lets light through. Between the grid's directions and wavelengths an order may appear or
+vanish (a Rayleigh anomaly), so s and c are lowered where light between them exceeds 1. No scale
+exists where a direction's partners all gain and it does not, as between the two groups of
+directions of a blazed grating: s ends up between.
 """
 
 from __future__ import annotations
@@ -43,6 +24,7 @@ from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
+from .gain import thick
 from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
@@ -86,7 +68,7 @@ class Surface:
         self._settings = settings = energy_settings()
         self._both_sides = isinstance(material, Dielectric)
         if isinstance(material, Reflector):
-            finer += material.thick(table.wavelength_range[0])
+            finer += thick(material.index(np.array(table.wavelength_range[:1])))
         self.orders = Orders(table, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
@@ -97,14 +79,14 @@ class Surface:
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings, grid = self._settings, self._grid
-        albedo = None if self._both_sides else self._albedo(wavelength_range)
-        if albedo is not None and self._conserves(albedo):
+        albedo, largest = None, math.inf
+        if not self._both_sides:
+            albedo, largest = self._albedo(wavelength_range)
+        if largest <= self._limit:
             return Conservation(albedo)
-        count = settings.side_wavelengths
-        if isinstance(self.material, Reflector):
-            fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
-            count = max(settings.wavelengths, min(fringes, settings.fringes))
-        nodes = spread(wavelength_range, count)
+        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+        nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
         solved = parallel(lambda light: self._solved(light()), lights)
         c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
@@ -165,21 +147,18 @@ class Surface:
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
 
-    def _conserves(self, albedo: DirectionalTable) -> bool:
-        """Whether a reflector gains no light, up to the horizon."""
-        if albedo.values.max() > self._limit:
-            return False
-        lights = self._lights(albedo.wavelengths, GRAZING, albedo.grid.phi)
-        largest = max(light().sent(self._ones, self._ones).max() for light in lights)
-        return bool(largest <= self._limit)
+    def _albedo(self, wavelength_range: tuple[float, float]) -> tuple[DirectionalTable, float]:
+        """Return the albedo of a reflector as it is, and its largest value up to the horizon.
 
-    def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
-        """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
+        It has fewer directions and wavelengths than its scale.
+        """
         coarse = self._grid.half
         wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
-        lights = self._lights(wavelengths, coarse.theta, coarse.phi)
-        albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
-        return DirectionalTable(wavelengths, np.stack(albedos))
+        theta = np.concatenate([coarse.theta, GRAZING])
+        lights = self._lights(wavelengths, theta, coarse.phi)
+        albedos = np.stack(parallel(lambda light: light().sent(self._ones, self._ones)[0], lights))
+        table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
+        return table, float(albedos.max())
 
     def _solved(self, light: ScatteredLight) -> tuple[Array, Array]:
         """Find c and s at the grid's directions."""
@@ -226,9 +205,10 @@ class Surface:
         return c, s
 
 
-def spread(wavelength_range: tuple[float, float], count: int) -> Real:
-    """Wavelengths (nm) evenly in their logarithm, or the only one."""
+def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) -> Real:
+    """Wavelengths (nm) evenly in their logarithm, `count` in an octave or more, or the only one."""
     low, high = wavelength_range
+    count = max(math.ceil(count * min(math.log2(high / low), 1.0)), least)
     return np.geomspace(low, high, count if high > low else 1)
 
 

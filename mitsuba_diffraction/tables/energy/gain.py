@@ -86,7 +86,7 @@ class Gain:
     @cached_property
     def _table(self) -> Real:
         """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS); finer of a thick film."""
-        polar = POLAR if advance(self.path.index) < THICK else 2 * POLAR - 1
+        polar = 2 * POLAR - 1 if thick(self.path.index) else POLAR
         return self._ratio(*_nodes(polar))
 
     def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
@@ -109,12 +109,9 @@ class Gain:
         return np.asarray(ratio)
 
 
-def advance(index: complex | Filmed | None) -> float:
-    """Phase (rad) by which a film's fringe advances from the normal to the horizon."""
-    if not isinstance(index, Filmed):
-        return 0.0
-    _, film, depth = (np.max(np.real(part)) for part in index.parts)
-    return float(2.0 * depth * (film - np.sqrt(max(film**2 - 1.0, 0.0))))
+def thick(index: object) -> bool:
+    """Whether fringes of a film vary quickly with the angle."""
+    return isinstance(index, Filmed) and index.advance > THICK
 
 
 def _nodes(polar: int) -> tuple[Real, Real, Real]:

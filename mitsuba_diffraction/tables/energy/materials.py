@@ -12,7 +12,6 @@ from ...optics import boundary, through
 from ...optics.fresnel import Filmed
 from ...optics.paths import ABOVE, Path, Returned, Side
 from ..directional import Real
-from .gain import THICK, advance
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
@@ -52,18 +51,11 @@ class Reflector:
         index = rounded(self.index(np.geomspace(*wavelength_range, PROBES)))
         return [self.model, index, self.coat]
 
-    def thick(self, wavelength: float) -> bool:
-        """Whether fringes of a film vary quickly with the angle at a wavelength (nm)."""
-        index = self.index(np.array([wavelength]))
-        return isinstance(index, Filmed) and advance(index) > THICK
-
     def phase(self, wavelength_range: tuple[float, float]) -> float:
         """Phase (rad) by which a film's fringe advances over a range of wavelengths (nm)."""
-        low, high = wavelength_range
-        film = self.index(np.array([low]))
-        if not isinstance(film, Filmed):
-            return 0.0
-        return 2.0 * float((film.parts[1] * film.parts[2]).real[0]) * (1.0 - low / high)
+        film = self.index(np.array(wavelength_range[:1]))
+        share = 1.0 - wavelength_range[0] / wavelength_range[1]
+        return film.phase * share if isinstance(film, Filmed) else 0.0
 
 
 @dataclass(frozen=True)
@@ -99,6 +91,10 @@ class Dielectric:
         if self.thin:
             paths.insert(0, Returned(None, model, sheet=n))
         return [paths] * len(wavelengths)
+
+    def phase(self, wavelength_range: tuple[float, float]) -> float:
+        """Return 0: no film is on the interface."""
+        return 0.0
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this dielectric from another material."""

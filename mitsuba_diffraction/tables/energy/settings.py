@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 24
+VERSION = 25
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import i0e
 
 from ...optics.geometry import wavenumber
+from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
 from ...optics.paths import Path
-from ..directional import Array, DirectionGrid, LinearMap, Real
+from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
@@ -38,10 +37,8 @@ SMOOTHING = 0.6
 #: Weak orders of less power in all are left out.
 LEAST_WEAK = 2e-3
 
-_LOBE = 3.5  # a lobe ends here, in units of 1/σ: exp(−3.5²) = 5e-6
 _ACROSS = [part[8:] for part in np.polynomial.hermite.hermgauss(16)]  # half a lobe, in azimuth
 _WIDE = 0.04  # width of a lobe, in direction cosines, that is looked at across
-_LOBE_NODES = 96  # in cosθo across a lobe
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
@@ -72,7 +69,7 @@ class Orders:
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.strong = len(self.mixture.frequency)
-        self.nodes = _directions(rings, steps)
+        self.nodes = quadrature(rings, steps)
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
         nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
@@ -153,14 +150,14 @@ class Transport:
         cosθo, since d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon.
         """
         cos_i, sine, width, path = *self._start(theta[:, None]), self._width_0, self._path
-        low = np.clip(sine - _LOBE * width, 0.0, 1.0)
-        high = np.minimum(sine + _LOBE * width, 1.0)
+        low = np.clip(sine - LOBE_END * width, 0.0, 1.0)
+        high = np.minimum(sine + LOBE_END * width, 1.0)
         first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
-        place = (np.arange(_LOBE_NODES) + 0.5) / _LOBE_NODES
+        place = (np.arange(LOBE_NODES) + 0.5) / LOBE_NODES
         # denser towards the horizon. Beyond the critical angle the step is 0, and so are the shares
         cut = high == 1.0
         cos_o = np.maximum(first + (last - first) * np.where(cut, place**2, place), 1e-9)
-        step = (last - first) * np.where(cut, 2.0 * place, 1.0) / _LOBE_NODES
+        step = (last - first) * np.where(cut, 2.0 * place, 1.0) / LOBE_NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= i0e(2.0 * sin_o * sine / width**2)
@@ -206,7 +203,7 @@ class Transport:
         x = places[:, 0] - sine * np.cos(phi)[:, None]
         y = places[:, 1] - sine * np.sin(phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
-        visible, cos_o, pole = _lobe_means(self._width, radius)
+        visible, cos_o, pole = lobe_means(self._width, radius)
         kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
         turn = azimuth - phi[:, None]
         gain = self._gain(cos_i, cos_o, turn)
@@ -261,67 +258,3 @@ class ScatteredLight:
         for path in self.paths:
             sums[path.came] += sent(path)
         return sums
-
-
-class LobeMeans(NamedTuple):
-    """Share of lobes that is above the horizon, and means of cosθo and of 1/cosθo over it."""
-
-    visible: Real
-    cosine: Real
-    pole: Real
-
-
-def _lobe_means(width: float, radius: Real) -> LobeMeans:
-    """Return means over lobes of a width with centres at a distance from the normal.
-
-    width, radius : in direction cosines.
-    """
-    cosine = np.sqrt(np.maximum(1.0 - radius**2, 1e-12))
-    places, at_horizon = _lobes(width)
-    whole = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
-    means = (
-        np.where(radius > places[0], np.interp(radius, places, cut), mean)
-        for mean, cut in zip(whole, at_horizon, strict=True)
-    )
-    return LobeMeans(*means)
-
-
-@lru_cache(maxsize=64)
-def _lobes(width: float) -> tuple[Real, LobeMeans]:
-    """Tabulate the means against the distance, from where part of a lobe is below the horizon."""
-    edge = max(1.0 - 2.0 * _LOBE * width, 0.0)
-    deepest = math.sqrt(1.0 - max(edge - _LOBE * width, 0.0) ** 2)
-    cosines = (np.arange(_LOBE_NODES) + 0.5) * (deepest / _LOBE_NODES)
-    sines = np.sqrt(1.0 - cosines**2)
-    places = np.linspace(edge, 1.0 + _LOBE * width, 96)
-    lobes = np.exp(-(((sines - places[:, None]) / width) ** 2))
-    lobes *= deepest / _LOBE_NODES / (math.sqrt(math.pi) * width) * cosines / sines
-    visible = np.minimum(lobes.sum(axis=1), 1.0)
-    safe = np.maximum(visible, 1e-30)
-    visible[-1] = 0.0
-    return places, LobeMeans(visible, lobes @ cosines / safe, lobes @ (1.0 / cosines) / safe)
-
-
-class Nodes(NamedTuple):
-    """Quadrature over the hemisphere: directions (n,), angles in rad, and their solid angles."""
-
-    x: Real
-    y: Real
-    cosine: Real
-    theta: Real
-    azimuth: Real
-    weights: Real
-
-
-@lru_cache(maxsize=4)
-def _directions(rings: int, widest: int) -> Nodes:
-    """Place directions on rings, with `widest` azimuths on the widest."""
-    position, share = np.polynomial.legendre.leggauss(rings)
-    angles = 0.25 * np.pi * (position + 1.0)
-    steps = np.maximum(8, np.rint(widest * np.sin(angles)).astype(int))
-    theta, count = np.repeat(angles, steps), np.repeat(steps, steps)
-    turn = np.concatenate([np.arange(n) + 0.381966 * ring for ring, n in enumerate(steps)])
-    azimuth = np.mod(turn * 2.0 * np.pi / count + np.pi, 2.0 * np.pi) - np.pi
-    weights = np.repeat(share * 0.25 * np.pi, steps) * np.sin(theta) * 2.0 * np.pi / count
-    x, y = np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth)
-    return Nodes(x, y, np.cos(theta), theta, azimuth, weights)
