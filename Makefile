@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation energy realtime lint clean help
+.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -110,6 +110,10 @@ release: setup  ## check and build a release into out/release; TESTS=1 tests the
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
+
+# KAIST=FOLDER compares a clone of github.com/KAIST-VCLAB/color-brdfs-with-wave-optics too
+measured: setup  ## compare model and solved orders with measured gratings: docs/validation/measured.md
+	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m docs.make.measured -o docs $(if $(KAIST),--kaist $(KAIST))
 
 SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like
 energy: setup  ## measure what energy conservation takes: docs/energy.md

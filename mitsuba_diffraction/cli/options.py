@@ -154,6 +154,15 @@ def add_heights(parser: argparse.ArgumentParser) -> None:
         group.add_argument(_option(name), metavar=metavar, help=text)
 
 
+def add_treatments(parser: argparse.ArgumentParser) -> None:
+    """Add a file of options for reading heights by names of files; `analysis.treatments`."""
+    parser.add_argument(
+        "--treatments", metavar="FILE", type=Path,
+        help='TOML: a table of options for each pattern of names, ["snakes/*.png"]; options on '
+        "the command line override it",
+    )  # fmt: skip
+
+
 def load_options(args: argparse.Namespace) -> LoadOptions:
     """Return the options for reading heights, as `HeightField.load` takes them.
 

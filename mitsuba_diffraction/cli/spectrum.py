@@ -24,6 +24,7 @@ from .spectrometer import add_spectrometer, group
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
+    from ..analysis.treatments import Treatment
     from ..heights.field import HeightField
     from ..tables.orders import OrderTable
 
@@ -75,6 +76,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
     add_spectrometer(parser.add_argument_group("the spectrometer"))
     add_surface(parser.add_argument_group("the surface"))
+    options.add_treatments(parser)
     options.add_heights(parser)
     options.add_json(parser, "the spectra")
 
@@ -246,7 +248,7 @@ def _measured(
         return [_of_table(args, OrderTable.load(file), file, geometry, lam, bar)]
     if kind is FileKind.TABLE:
         return [_of_table(args, loaded_table(file), file, geometry, lam, bar)]
-    how = options.load_options(args)
+    how = _treatment(args, file).options
     if args.crops is not None:
         from ..analysis.crops import crops_of
 
@@ -259,6 +261,14 @@ def _measured(
     patches = read_scan(file, how, {}).patches
     spectra = _of_heights(args, patches, file, how, geometry, lam, bar)
     return [_with_band(args, spectra, patches, file, how, geometry, lam, bar)]
+
+
+def _treatment(args: argparse.Namespace, file: Path) -> Treatment:
+    """Return how a file is read: by its name, and by the command line, which precedes."""
+    from ..analysis.treatments import Treatment, load_treatments, treatment_for
+
+    found = treatment_for(file, load_treatments(args.treatments))
+    return found.updated(Treatment(options.load_options(args)))
 
 
 def _with_band(
@@ -319,7 +329,8 @@ def _of_heights(
 
     # Mitsuba loads no table that begins later than the light that it renders
     span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
-    asked = options.table_options(args) | {"wavelength_range": span}
+    asked = {**_treatment(args, file).settings, **options.table_options(args)}
+    asked["wavelength_range"] = span
     bar(0, 0, f"tabulating {file.name}")
     scan = Scan(list(patches), read_scan(file, how, asked).settings)
     table = table_of(scan, bar)

@@ -32,11 +32,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_files(parser, "scans of any format, or recipes")
     options.add_output(parser, "default: survey", default=Path("survey"))
-    parser.add_argument(
-        "--treatments", metavar="FILE", type=Path,
-        help='TOML: a table of options for each pattern of names, ["snakes/*.png"]; options on '
-        "the command line override it",
-    )  # fmt: skip
+    options.add_treatments(parser)
     parser.add_argument(
         "--theta", metavar="DEG", type=number_between(0, 89), default=30.0,
         help="angle of the light from the normal, across the strongest grating; default: 30",

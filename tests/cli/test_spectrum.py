@@ -93,8 +93,10 @@ def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here
 
 
 def test_groups_have_columns_errors_and_colours_each(run, scans, here):
+    (here / "t.toml").write_text(f'["*.npy"]\npixel_size = {PIXEL[1]}\n')
     ran = run("spectrum", "--group", f"a b={scans / 'scan0.npy'}", "--group", f"both={scans}",
-              *PIXEL, *QUICK, "--detector", "-20:20:20", "-o", "g.csv")  # fmt: skip
+              "--treatments", "t.toml", *QUICK, "--detector", "-20:20:20",
+              "-o", "g.csv")  # fmt: skip
     assert ran.code == 0, ran.err
     names = read("g.csv").dtype.names
     angles = ("m20", "0", "20")

@@ -31,7 +31,6 @@ closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them
 published        solvers beside printed efficiencies
-littrow          a grating that its maker measured
 statistics       checks with random surfaces, and windows at random places
 pages            writers of docs/validation.md and docs/validation/
 """

@@ -9,7 +9,6 @@ from .. import (
     cells,
     coated,
     filmed,
-    littrow,
     models,
     orders,
     published,
@@ -56,11 +55,6 @@ class Measurements:
     def published(self) -> tuple[published.Published, ...]:
         """Efficiencies printed by others."""
         return published.PUBLISHED[1 if self.quick else 0 :][: 1 if self.quick else None]
-
-    @cached_property
-    def littrow(self) -> littrow.Littrow:
-        """Measured efficiencies of a spectrograph's grating."""
-        return littrow.compare(littrow.ANGLES[: 1 if self.quick else None])
 
     @cached_property
     def perfect(self) -> Comparison:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .. import littrow, orders
+from .. import orders
 from ..published import Published
 from .markdown import percent, table
 from .measurements import Measurements
@@ -73,18 +73,7 @@ tolerance is that of the printed numbers: their digits, or the error of the meth
 
 {_published(measured.published)}
 
-## Measured efficiencies
-
-A spectrograph's grating of 600 lines/mm, blazed for the blue: GMOS B600 of the Gemini telescopes,
-measured by its maker, Richardson. The numbers are from the files of the
-[exposure calculator](https://github.com/gemini-hlsw/ocs), `gmos_n_B600_G5303.dat`, at the
-laboratory's wavelengths. Neither mount nor blaze angle is printed there. The light is taken to
-return along itself, and the angle that fits best is {measured.littrow.angle:g}°.
-
-{_littrow(measured.littrow)}
-
-The default model misses {100 * measured.littrow.missed(measured.littrow.model):.1f} % of the light
-on average, and the solutions {100 * measured.littrow.missed(measured.littrow.solved):.1f} %."""
+Measured gratings: [measured.md](measured.md)."""
 
 
 def _deviations(measured: Measurements) -> str:
@@ -125,12 +114,3 @@ def _published(cases: tuple[Published, ...]) -> str:
             f"{case.source}: {case.grating}; tolerance {case.tolerance:g}.\n\n{table(header, rows)}"
         )
     return "\n\n".join(parts)
-
-
-def _littrow(compared: littrow.Littrow) -> str:
-    columns = littrow.WAVELENGTHS, littrow.MEASURED, compared.model, compared.solved
-    rows = [
-        [f"{lam:g} nm", *(f"{value:.3f}" for value in values)]
-        for lam, *values in zip(*columns, strict=True)
-    ]
-    return table(["wavelength", "measured", "default", "solved"], rows)

@@ -14,7 +14,7 @@ void main()
     vec3 wi = texelFetch(directions, column, 0).xyz;
     vec3 wo = texelFetch(directions, column + ivec2(0, 1), 0).xyz;
 #ifndef ORDERS
-    begin_pair(wi, wo, vec2(1.0), vec2(1.0));
+    begin_pair(wi, wo, vec2(wi.z, wo.z));
 #endif
 #ifdef SECOND_ORDER
     begin_second_order(wi, wo);

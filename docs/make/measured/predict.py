@@ -1,0 +1,126 @@
+"""Orders of one mount by the model and by a solver, unpolarised unless said.
+
+Each function takes wavelengths in nm and returns efficiencies of the same shape.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from docs.make.validation.model import efficiencies, in_plane
+from docs.make.validation.published import light_of
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
+from mitsuba_diffraction.solve.chandezon import Chandezon
+from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.profiles import Profile
+from mitsuba_diffraction.solve.stations import Solver, Station
+
+from .grooves import heights_of
+
+Real = NDArray[np.float64]
+
+# y of light in the plane across the grooves; at 0 exactly the two polarisations are the same
+_ALONG = 0.0
+_MODEL = "small_slope"
+
+
+def index_of(material: str | float, wavelength: float) -> complex:
+    """Return n + ik of a named metal or a number."""
+    index = material_of(material, (wavelength, wavelength)).index(wavelength)
+    assert index is not None
+    return complex(index)
+
+
+def mirror_reflectance(material: str, wavelengths: Real) -> Real:
+    """Return the reflectance of a flat face along its normal."""
+    index = np.array([index_of(material, lam) for lam in wavelengths])
+    return np.asarray(np.abs((index - 1) / (index + 1)) ** 2)
+
+
+def littrow_solver(profile: Profile) -> Solver:
+    """Return Chandezon's method with harmonics for the visible."""
+    return Chandezon(profile, 10 + round(1.6 * profile.period))
+
+
+def littrow_solved(solver: Solver, period: float, material: str, wavelengths: Real) -> Real:
+    """Order −1 that returns along its own light, by a solver."""
+    values = []
+    for lam in wavelengths:
+        sine = 0.5e-3 * lam / period
+        light = light_of(period, 1e-3 * lam, index_of(material, lam), sine, _ALONG)
+        powers = np.abs(solver.amplitudes(light.station)[0, light.channel]) ** 2
+        values.append(powers.mean(axis=0).sum(axis=-1)[light.channel + 1])
+    return np.array(values)
+
+
+def littrow_modelled(profile: Profile, material: str, wavelengths: Real) -> Real:
+    """Order −1 that returns along its own light, by the model."""
+    field, values = heights_of(profile), []
+    for lam in wavelengths:
+        wi = in_plane(-0.5e-3 * lam / profile.period)
+        index = index_of(material, lam)
+        powers = efficiencies(field, index, wi, wi[None], lam, _MODEL, sigma=profile.period)
+        values.append(float(powers[0]))
+    return np.array(values)
+
+
+def normal_pair(profile: Profile, material: str, wavelengths: Real) -> tuple[Real, Real]:
+    """Orders ±1 together, p-polarised along the normal: by Chandezon's method and by the model."""
+    solver, field = Chandezon(profile, 20), heights_of(profile)
+    solved, modelled = [], []
+    for lam in wavelengths:
+        index = index_of(material, lam)
+        light = light_of(profile.period, 1e-3 * lam, index, 1e-9, _ALONG)
+        powers = np.abs(solver.amplitudes(light.station)[0, light.channel, 1]) ** 2
+        solved.append(powers[[light.channel - 1, light.channel + 1]].sum())
+        wo = in_plane(1e-3 * lam / profile.period * np.array([-1.0, 1.0]))
+        light_in = in_plane(0.0), wo, lam, _MODEL
+        modelled.append(efficiencies(field, index, *light_in, sigma=profile.period).sum())
+    return np.array(solved), np.array(modelled)
+
+
+def face(index: float) -> float:
+    """Return the transmittance of a flat face along its normal."""
+    return 1.0 - ((index - 1.0) / (index + 1.0)) ** 2
+
+
+def through_solver(profile: Profile) -> Solver:
+    """Return the integral method, which has light from within, as fine as 1e-3 needs."""
+    return IntegralSolver(profile, 120)
+
+
+def through_solved(
+    solver: Solver, period: float, index: float, wavelengths: Real, outwards: bool
+) -> Real:
+    """Order −1 of light along the normal through the grooves; outwards : from glass into air."""
+    values = []
+    for lam in 1e-3 * wavelengths:
+        extent = 2.0 * period / lam
+        fraction = 0.5 * extent % 1.0
+        channels = int(np.floor(extent - fraction)) + 1
+        indices = np.array([lam]), np.array([index + 0j]), np.array([_ALONG])
+        station = Station(extent, fraction, channels, *indices, thin=True)
+        middle = round(0.5 * extent - fraction)
+        within = channels + np.flatnonzero(station.inside == middle)[0]
+        ports = (within, middle - 1) if outwards else (middle, within - 1)
+        powers = np.abs(solver.amplitudes(station)[0, ports[0], :, ports[1]]) ** 2
+        values.append(powers.sum(axis=-1).mean())
+    return np.array(values) * face(index)
+
+
+def through_modelled(profile: Profile, index: float, wavelengths: Real, outwards: bool) -> Real:
+    """Order −1 of light along the normal through the grooves, by the model."""
+    field, values = heights_of(profile), []
+    for lam in wavelengths:
+        sine = 1e-3 * lam / profile.period
+        lit = np.array([0.0, 0.0, -1.0 if outwards else 1.0])
+        leaves = in_plane(sine) if outwards else in_plane(sine / index) * [1, 1, -1]
+        btdf = reference.btdf(
+            field, lit, leaves[None], lam,
+            eta=index, coherence_width=WIDTHS_PER_SIGMA * profile.period, model=_MODEL,
+        )  # fmt: skip
+        values.append(float(btdf[0]) * np.pi / (profile.period * float(wavenumber(lam))) ** 2)
+    return np.array(values) * face(index)

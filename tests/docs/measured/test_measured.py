@@ -1,0 +1,60 @@
+"""Measured gratings: their data and grooves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.make.measured import cases, predict
+from docs.make.measured.__main__ import main
+from docs.make.measured.grooves import Groove, heights_of
+
+pytest.importorskip("gratinglab")
+
+DATA = sorted(set((Path(cases.__file__).parent / "data").glob("*.csv")) - {cases.FITTED})
+
+
+@pytest.mark.parametrize("path", DATA, ids=lambda path: path.stem)
+def test_every_measurement_names_its_source(path):
+    header = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    assert any("Source: " in line for line in header)
+    rows = cases.table(path.stem)
+    efficiencies = [name for name in rows.dtype.names if "G5" in name or name == "efficiency"]
+    assert efficiencies
+    assert all(((rows[name] > 0) & (rows[name] < 1)).all() for name in efficiencies)
+
+
+def test_facets_meet_at_the_apex():
+    profile = Groove(20.0, 100.0).profile(2.0)
+    x, z = profile.closed
+    angles = np.degrees(np.arctan2(np.abs(np.diff(z)), np.diff(x)))
+    assert angles[0] == pytest.approx(20.0)
+    assert 180.0 - angles.sum() == pytest.approx(100.0)
+    assert np.ptp(heights_of(profile).heights) == pytest.approx(profile.depth, rel=0.01)
+
+
+def test_rounding_keeps_the_mean_height():
+    sharp, rounded = (heights_of(Groove(20.0, 100.0, 0.0, r).profile(2.0)) for r in (0.0, 200.0))
+    assert rounded.heights.mean() == pytest.approx(sharp.heights.mean(), abs=2e-3)
+    assert np.ptp(rounded.heights) < np.ptp(sharp.heights)
+
+
+def test_the_model_is_near_solved_orders_through_gentle_grooves():
+    # 5° of glass: the model's slopes are within its range, 0.09 RMS
+    profile, lam = Groove(5.0).profile(3.3), np.array([520.0])
+    solver = predict.through_solver(profile)
+    for outwards in (True, False):
+        solved = predict.through_solved(solver, 3.3, 1.52, lam, outwards)
+        model = predict.through_modelled(profile, 1.52, lam, outwards)
+        assert model == pytest.approx(solved, abs=0.02)
+
+
+def test_roughness_takes_light_out_of_the_orders():
+    assert Groove(5.0, roughness=20.0).specular(500.0, 2.0) == pytest.approx(0.777, abs=1e-3)
+
+
+def test_a_folder_that_is_no_clone_is_refused_in_one_line(tmp_path, capsys):
+    assert main(["-o", str(tmp_path), "--kaist", str(tmp_path)]) == 1
+    assert "clone https://github.com/KAIST" in capsys.readouterr().err
