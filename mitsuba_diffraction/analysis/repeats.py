@@ -1,4 +1,4 @@
-"""Files of a survey, and which of them are repeated scans of one sample."""
+"""Files of a survey, grouped into repeated scans of one sample."""
 
 from __future__ import annotations
 

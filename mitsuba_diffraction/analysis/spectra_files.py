@@ -39,7 +39,7 @@ Groups = Mapping[str, Spectra]
 
 
 def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
-    """Return the spectra at the wavelengths that all of them have."""
+    """Return the spectra at their common wavelengths."""
     every = [each for members in groups.values() for each in members]
     common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
     if not common.size:

@@ -57,7 +57,7 @@ def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _iridescence(row: Mapping[str, Any]) -> str:
-    """Text of an index, and what of it is chance."""
+    """Text of an iridescence index and of its value expected by chance."""
     index, chance = row["iridescence"], row["iridescence_by_chance"]
     beyond = "" if row["iridescent_light"] != "" else ": none"
     return f"iridescence {index:.2g}, by chance {chance:.2g}{beyond}"

@@ -209,7 +209,7 @@ class Bar:
 
 
 def _size() -> tuple[int, int] | tuple[None, None]:
-    """Return the columns and rows to draw in; None for those of the terminal, which may change."""
+    """Return the columns and rows to draw in; None follows the terminal's size."""
     with contextlib.suppress(OSError, ValueError):
         if 0 in os.get_terminal_size(sys.stderr.fileno()):
             return _SIZE

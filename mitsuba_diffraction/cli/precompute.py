@@ -59,7 +59,7 @@ class _Job(NamedTuple):
 
 
 def run(args: argparse.Namespace) -> int:
-    """Build one table, or those of several recipes, and return the exit code."""
+    """Build the table of each recipe, and return the exit code."""
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
     if recipes and len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")

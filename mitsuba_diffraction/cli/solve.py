@@ -206,7 +206,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
-    """Solve a recipe on the requested processes; what is done lies beside the output until then."""
+    """Solve a recipe on the requested processes; partial solutions are stored beside the output."""
     from ..solve.accuracy import WORST
     from ..solve.beam import solve_beam
     from ..solve.jobs import Jobs

@@ -61,7 +61,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure what is new, and return the exit code."""
+    """Measure new scans, and return the exit code."""
     start = time.perf_counter()
     try:
         rows = _measured(args)
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
-    """Measure what is new, here or on workers, and return the rows of all scans."""
+    """Measure new scans, here or on workers, and return the rows of all scans."""
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 

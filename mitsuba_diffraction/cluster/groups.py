@@ -87,7 +87,7 @@ def group_size(passes: int, frames: int) -> int:
 
 
 def task_size(passes: int, frames: int, workers: int) -> int:
-    """Return the passes of a task, a power of two, for a job on so many workers."""
+    """Return the number of passes of a task, a power of two, for a job on these workers."""
     size = max(1, passes // (TASKS_A_WORKER * workers))
     return min(group_size(passes, frames), 1 << size.bit_length() - 1)
 

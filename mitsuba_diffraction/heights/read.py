@@ -222,7 +222,7 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
-    """Combine the lengths of the file with those of the options; warn of overrides."""
+    """Combine lengths of the file with lengths from options; warn of overrides."""
     pixel_size = options.pixel_size or raw.pixel_size
     scale, lines = _height_scale(raw, shown, options, pixel_size is None)
     if pixel_size is None:

@@ -191,7 +191,7 @@ class Recipe:
 
 
 def _toml(value: Any) -> str:
-    """A TOML value: a string, a boolean, a number or a list of them."""
+    """A TOML value: a string, a boolean, a number or a list of these."""
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_toml, value))}]"
     # JSON's strings, booleans and finite numbers are TOML's

@@ -146,7 +146,7 @@ def wavenumber_step(u: Number, v: Number, period: Number) -> Number:
 
 @formula
 def lobe_falloff(u: Number, v: Number, sigma: Number, period: Number) -> Number:
-    """Return σ² q_1² v²/(u² + v²): exp(−m² of it) is the largest lobe of order m in a direction."""
+    """Return c = σ² q_1² v²/(u² + v²); the lobe of order m is at most exp(−c m²) in a direction."""
     xp = of(u, v)
     away = sigma * (2.0 * math.pi) / period * v
     return away * away * xp.reciprocal(xp.maximum(u * u + v * v, 1e-8))

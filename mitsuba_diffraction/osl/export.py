@@ -279,7 +279,7 @@ def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
 
 
 def _literal(value: float | int) -> str:
-    """Return a number as OSL reads it: with a point if it is no whole number's type."""
+    """Format a number for OSL: floats have a decimal point, integers none."""
     return str(value) if isinstance(value, int) else repr(float(value))
 
 

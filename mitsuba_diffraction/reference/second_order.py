@@ -55,7 +55,7 @@ def resolved(
 
 @lru_cache(maxsize=16)
 def measured_change(field: HeightField) -> float:
-    """Relative change of the colours of these heights, as a table of them measures it."""
+    """Relative change of colours by the second order, as a table of these heights has it."""
     q_limit = 2.0 * float(wavenumber(SHORTEST))
     grid = CellGrid.for_patches(field.extent, field.rms_height, q_limit)
     sums = CellSums.of_patches([(field, np.ones((1, 1)))], grid)

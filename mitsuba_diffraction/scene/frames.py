@@ -193,7 +193,7 @@ def digest_of(scene: Path, values: Mapping[str, str]) -> str:
 
 
 def _settings_in(png: Path) -> dict[str, Any] | None:
-    """Read the settings that a frame was written with; None if the file is no frame."""
+    """Read the settings that a frame was written with; None for files of another kind."""
     from PIL import Image
 
     try:

@@ -244,7 +244,7 @@ def _enlarged(values: NDArray[np.float64], texels: int) -> Floats:
 
 
 def _texture(values: Floats) -> dict[str, Any]:
-    """Return a bitmap whose texels are not interpolated: between two gratings there is no third."""
+    """Return a bitmap without interpolation: a mean of two gratings would be a wrong grating."""
     import mitsuba as mi
 
     data = mi.TensorXf(np.ascontiguousarray(values))

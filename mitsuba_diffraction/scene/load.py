@@ -134,7 +134,7 @@ def _instantiated(
     file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool,
     bands: Bands | None,
 ) -> Any:  # fmt: skip
-    """Parse a scene, put meshes, materials and filters in, and make Mitsuba's objects of it."""
+    """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects."""
     import mitsuba as mi
 
     from .additions import fit_meshes, put_box_filters, put_materials

@@ -35,7 +35,7 @@ class Measured(NamedTuple):
     polarised: float | None
 
     def within(self, tolerance: float) -> bool:
-        """Whether the table keeps a tolerance on average, and `WORST` of it in 95 %."""
+        """Whether mean error and 95 % quantile are within a tolerance and `WORST` times it."""
         mean = max(self.mean, self.polarised or 0.0)
         return mean <= tolerance and self.most <= WORST * tolerance
 

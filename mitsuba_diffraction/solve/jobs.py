@@ -220,7 +220,7 @@ class Jobs:
 
     @property
     def processor_seconds(self) -> float:
-        """Processor seconds of all solutions so far, those of the folder included."""
+        """Processor seconds of all solutions so far, including solutions read from the folder."""
         return sum(self._seconds.values())
 
     def seconds(self, problem: Problem, place: Place) -> float:

@@ -316,7 +316,7 @@ def _mean_sum(samples: _Samples, band: int) -> Real:
 
 
 def _interpolated(points: Real, values: Real, places: Real) -> Real:
-    """Interpolate values (n, …) at points (n, axes) linearly; outside of them, the nearest."""
+    """Interpolate values (n, …) at points (n, axes) linearly; use the nearest value outside."""
     flat = values.reshape(len(values), -1)
     result = NearestNDInterpolator(points, flat)(places)
     with contextlib.suppress(QhullError):  # too few points, or all on a line

@@ -316,7 +316,7 @@ def _places(band: int, counts: Counts) -> list[Place]:
 def _band(
     band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool, sides: int
 ) -> Band:
-    """Return the efficiencies, and Mueller matrices, of a band from those of its stations."""
+    """Assemble the efficiencies, and Mueller matrices, of a band from its stations."""
     kinds, matrices = [], []
     for kind in (cells.A, cells.B) if band else (cells.A,):
         at_nodes = functools.partial(_at_nodes, band, kind, counts, solved, sides)

@@ -47,7 +47,7 @@ class DirectionGrid:
 
     @property
     def half(self) -> DirectionGrid:
-        """Grid of half as many cells, for what is smooth."""
+        """Grid of half as many cells, for smooth quantities."""
         return DirectionGrid(min(self.polar // 2, 24), min(self.azimuthal // 2, 30))
 
     def angles(self, row: ArrayLike) -> Real:

@@ -110,7 +110,7 @@ def _cells(table: DiffractionTable, axis: int) -> _Cells:
 
 
 def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Levels of the cells' powers, 255 for the largest, down to 2⁻³⁰ of it."""
+    """Levels of the cells' powers: 255 for the largest, 0 below 2⁻³⁰ of the largest."""
     most = power.max(initial=0.0)
     if most == 0.0:
         return np.zeros(power.shape, np.uint8)

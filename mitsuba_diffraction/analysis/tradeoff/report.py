@@ -24,7 +24,7 @@ _MARKS = "osD^vP*Xp<>h"
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of error, memory and time; None is no limit."""
+    """Limits of error, memory and time; None means unlimited."""
 
     tolerance: float | None = None  # largest error
     megabytes: float | None = None  # largest table

@@ -121,7 +121,7 @@ def _disc(
     track_pitch: float,
     irregularity: float,
 ) -> HeightField:
-    """Check the parameters, which are those of `cd`, and draw a patch of a disc."""
+    """Check the parameters (see `cd`), and draw a patch of a disc."""
     name = disc.name
     size = length_pair(extent, f"{name}: extent", 4.0, 500.0)
     nx, ny = count_pair(pixels, f"{name}: pixels", 8, 4096)

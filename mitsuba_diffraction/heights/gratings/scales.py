@@ -169,7 +169,7 @@ def _patch(
     depth: float,
     amounts: tuple[float, float, float, float],
 ) -> HeightField:
-    """Check the parameters, which are those of `elaphe_like`, and draw a patch of a species."""
+    """Check the parameters (see `elaphe_like`), and draw a patch of a species."""
     generator = species.name
     size = length_pair(extent, f"{generator}: extent", 2.0, 500.0)
     nx, ny = count_pair(pixels, f"{generator}: pixels", 8, 8192)

@@ -175,7 +175,7 @@ class Material:
 
 
 def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> list[Material]:
-    """Read the material of a shape, or those of a mix.
+    """Read the material of a shape, or the materials of a mix.
 
     Unsupported features are appended to `omissions`.
 

@@ -97,7 +97,7 @@ class Viewer(moderngl_window.WindowConfig):
         self._start()
 
     def _start(self) -> None:
-        """Set camera, surfaces and lights to those of the scene."""
+        """Reset camera, surfaces and lights to the scene's own."""
         renderer = self._ready
         scene = renderer.scene
         self.orbit = Orbit.start(scene.camera, 0.5 * (scene.low + scene.high))

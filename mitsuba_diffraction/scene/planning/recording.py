@@ -82,7 +82,7 @@ class Session:
         _one_at_a_time.release()
 
     def load(self, load: Callable[[], Any]) -> Any:
-        """Load a scene, and let go of it."""
+        """Load a scene and release it."""
         try:
             with self:
                 return load()

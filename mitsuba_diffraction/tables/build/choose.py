@@ -58,7 +58,7 @@ def chebyshev_expansion(
 def svd_expansion(
     heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
 ) -> tuple[Expansion, int | None]:
-    """The Chebyshev series to start from, and how many functions to make of it, if any.
+    """Return the initial Chebyshev series, and the number of `svd` functions, if any.
 
     Their error on a cut-out of the patch is at most `budget`. Unless the user says how many
     functions, there are as many as make the smallest table, the fewer if that makes no difference.

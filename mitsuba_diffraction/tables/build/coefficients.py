@@ -159,7 +159,7 @@ def _amplitudes_at(
 
 
 def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:
-    """Where a spectrum, which has a margin for the error's sake, has the grid's bins."""
+    """Slices of the grid's bins within a spectrum, whose margin serves the error estimate."""
     rows, columns = (
         slice(outer - last, outer + last + 1)
         for outer, last in zip(spectrum.last[::-1], grid.last[::-1], strict=True)

@@ -143,7 +143,7 @@ def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:
 
 
 def _add(total: list[Power], more: Iterable[Power]) -> None:
-    """Add one power for every κ to those of the same κ; to none yet, append them."""
+    """Add a power for every κ to the sums; append it to empty sums."""
     started = bool(total)
     for n, power in enumerate(more):
         if started:

@@ -122,7 +122,7 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
 
 
 def _advice(path: Path) -> str:
-    """Return what to do with a file that is no table of orders."""
+    """Return the remedy for a file of another kind than a table of orders."""
     if kind_of(path) is FileKind.RECIPE:
         return (
             f"run the command 'solve {shlex.quote(str(path))}', and give the table (.nc) that it "

@@ -210,7 +210,7 @@ class OrderTable:
 
     @cached_property
     def reciprocity(self) -> float:
-        """Largest difference between efficiencies and those of the reversed light, unpolarised.
+        """Largest unpolarised difference between efficiencies for forward and for reversed light.
 
         Share of the incident light: η_m(ωi) = η_m(−ωo) (reciprocity theorem; Petit 1980).
         """

@@ -106,7 +106,6 @@ def test_a_narrow_patch_is_no_scan_to_be_cut():
     [
         ({"windows": "some"}, "must be auto, none, or a positive number"),
         ({"windows": -1}, "must be auto"),
-        ({"windows": 3}, "narrower than coherence_width=6"),
         ({"windows": "auto", "coherence": "patch"}, "coherence='patch'"),
     ],
 )

@@ -37,7 +37,7 @@ def _closed_forms(measured: Measurements) -> str:
 
 Largest absolute error of an order's power |a_m|²; all orders together have the power 1. Light and
 orders up to {ANGLES[-1]:g}° from the normal, 410 to 760 nm, period and depth {sizes} µm, 512 pixels
-a period. The errors of lamellar and blazed gratings are those of their sampling.
+a period. The errors of lamellar and blazed gratings come from sampling.
 
 {table(["profile", "orders", "`reference.brdf`", "table"], rows)}"""
 

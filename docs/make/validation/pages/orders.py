@@ -59,8 +59,6 @@ absorbed share, as a share of the incident light.
 {table(header, diffuse)}
 
 The largest deviations lie beside surface plasmons, which are narrower than the distance of nodes.
-Light from outside reaches a grating under a layer only at angles within the critical one. Orders
-beyond it are trapped: the face returns them to the grating, where they meet the second row.
 
 The tables' own figures, of colours in all light within the layer:
 
@@ -69,7 +67,7 @@ The tables' own figures, of colours in all light within the layer:
 ## Published efficiencies
 
 The solvers beside numbers that others printed: s and p across the grooves, u unpolarised. The
-tolerance is that of the printed numbers: their digits, or the error of the method behind them.
+tolerance is the rounding of the printed digits, or the error of the printed method.
 
 {_published(measured.published)}
 

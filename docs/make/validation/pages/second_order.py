@@ -45,10 +45,9 @@ second order over Gaussian heights of the same spectrum. Gratings have a depth/p
 
 {table(header, _rows(cases, MODELS, MODELS))}
 
-Most of the first order's error on scales and on a CD is the second order. Light that is diffracted
-twice interferes with light that is diffracted once, and this interference changes its sign when
-hills become pits. A power spectrum does not tell hills from pits, so the mean corrects the total
-light on gentle walls but not the colours. The exact sum depends on every pair of directions, which
+Most of the first order's error on scales and on a CD is the second order. A power spectrum does not
+tell hills from pits, so the mean corrects the total light on gentle walls but not the colours. The
+exact sum depends on every pair of directions, which
 no table of powers holds. On vertical walls the sums depend on where they are truncated."""
 
 
@@ -60,19 +59,15 @@ def _factor(measured: Measurements) -> str:
     return f"""## The factor of `second_order=true`
 
 The factor has two coefficients of directions and index, and two ratios of spectra of the heights.
-The ratios of gratings are those of each order. The ratios of cuts are those of the patch around
+Gratings have the ratios of each order. Cuts have the ratios of the patch around
 them, 20 to 65 µm wide, in cells of many orders, as in tables of scans; *own orders* uses each order
 of the cut itself. Deviation of colours on keratin, mean and worst of the cases, blend included.
 
 {table(header, _rows(cases, second_order_factor.MODELS, lit))}
 
 On a CD in oblique light the factor removes most of the error, because all its pits are alike. On
-scales it removes a quarter with each order's own ratios and a tenth with those of the patch: the
-ratios of a window's speckle differ from those of cells of many orders. The remaining error beyond
-that of the exact second order comes from evanescent intermediate waves, which the factor leaves
-out.
-
-At normal incidence the factor has nothing to gain, and its coefficients are attenuated there;
+scales it removes a quarter with each order's own ratios and a tenth with the patch's. The factor
+leaves out evanescent intermediate waves. At normal incidence its coefficients are attenuated:
 without that four sinusoids were worse than with Kirchhoff. Metals have no factor: surface plasmons
 are a pole that it cannot represent."""
 

@@ -40,7 +40,7 @@ and on cuts from the whole patch, 20 to 65 µm wide. Metals have no second order
 ## Polarised light
 
 Light from 60°, mean over the planes of incidence, as Kirchhoff / `second_order=false` /
-`second_order=true`. The second order is one factor for both polarisations, that of their mean.
+`second_order=true`. The second order is one factor for both polarisations, computed for their mean.
 {_nearer(cells)}.
 
 {table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
