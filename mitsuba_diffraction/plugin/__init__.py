@@ -5,10 +5,11 @@ Contents
 diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
 transmission    the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
-surface         `DiffractingSurface`, the part that both plugins share
+surface         `DiffractingSurface`, a table with factors, orientation and power
 description     what a surface is: the record that shaders, OSL, maps and plans read
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
-nesting         methods of a BSDF over a nested one
+lifecycle       `PluginBSDF`, the base of all: answers, parameters and their changes, text
+nesting         `NestingBSDF`, a BSDF over a nested one
 arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
