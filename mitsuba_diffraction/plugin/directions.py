@@ -59,7 +59,7 @@ class PatchFrame:
 
 @dataclass(frozen=True)
 class Site:
-    """What one evaluation shares at points of a surface, looked up once.
+    """Points of a surface: all that one evaluation shares there, looked up once.
 
     Attributes
     ----------

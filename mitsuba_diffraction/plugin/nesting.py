@@ -58,7 +58,7 @@ class NestingBSDF(PluginBSDF):
     # ------------------------------------------------------------------ the diffraction
 
     def site_at(self, si: Interaction, active: Mask) -> Site:
-        """Return what one evaluation shares at points of the surface."""
+        """Return points of the surface, with frame, scale and wavenumbers."""
         raise NotImplementedError
 
     def diffracted(

@@ -25,6 +25,8 @@ from ..types import Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
 _MIN_DIVISOR = 1e-7
+#: Distance of a coordinate from its ends, 0 and 1, from which on it has derivatives.
+_LEAST_T = 1e-6
 #: Half floats round: sums are raised so that no order is left out where one is drawn.
 _RAISED = 1.0 + 2.0**-10
 
@@ -120,7 +122,7 @@ class OrderLookup:
         place = order_cell(x, y, inverse, self._last, _MIN_DIVISOR)
         band, channel, is_a = place.band, place.channel, place.kind_a
         places = [
-            smooth_coordinate(place.t), smooth_coordinate(place.r),
+            _smooth(place.t), _smooth(place.r),
             self._w(wavelength, place.k_continuous),
         ]  # fmt: skip
         kind = mi.UInt32(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
@@ -247,3 +249,9 @@ def order_lookup(table: OrderTable, kind: type[OrderLookup]) -> OrderLookup:
     if mi.variant() not in variants:
         variants[mi.variant()] = kind(table)
     return variants[mi.variant()]
+
+
+def _smooth(t: Float) -> Float:
+    """Return `smooth_coordinate`, whose slope at its ends, infinite, is taken as 0."""
+    within = (t > _LEAST_T) & (t < 1.0 - _LEAST_T)
+    return smooth_coordinate(dr.select(within, t, dr.detach(t)))
