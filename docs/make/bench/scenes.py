@@ -243,7 +243,7 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
 def draws_by_cosine(bsdf: Any) -> Any:
     """Have the plugin draw directions from the cosine lobe instead of the orders."""
 
-    def draw(si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+    def draw(site: Any, sample1: Any, sample2: Any) -> Any:
         even = mi.warp.square_to_uniform_hemisphere(sample2)
         return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
 
