@@ -34,7 +34,7 @@ def test_solved_orders_have_the_derivatives_of_differences(mitsuba_variant, thin
     mi.set_variant(mitsuba_variant)
     own = {} if thin else {"beneath": PIGMENT}
     at = {"orientation": 20.0} | ({} if thin else {"nested.reflectance.value": 0.4})
-    check(md.bsdf_dict(thin_grating(thin=thin), coherence_width=6.0, **own), at, spp=256)
+    check(md.bsdf_dict(thin_grating(thin=thin), coherence_width=6.0, **own), at, spp=1024)
 
 
 @pytest.mark.parametrize("mitsuba_variant", VARIANTS)
