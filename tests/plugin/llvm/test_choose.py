@@ -145,8 +145,6 @@ def test_scalar_variants_need_no_llvm():
     code = """
 import mitsuba_diffraction.plugin.llvm as llvm
 import mitsuba as mi
-
-pytestmark = pytest.mark.thorough
 mi.set_variant("scalar_spectral")
 llvm.require_loaded_llvm()
 print("fine")
