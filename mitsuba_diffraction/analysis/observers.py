@@ -24,8 +24,8 @@ E. R. Loew, L. J. Fleishman, R. G. Foster and I. Provencio, Visual pigments and 
 diurnal lizards, J. Exp. Biol. 205, 927-938 (2002): `lizard`, anoles; pigments without droplets.
 J. Neitz, T. Geist and G. H. Jacobs, Color vision in the dog, Visual Neuroscience 3, 119-125 (1989):
 `dog`.
-D. Peitsch, A. Fietz, H. Hertel, J. de Souza, D. F. Ventura and R. Menzel, The spectral input systems
-of hymenopteran insects, J. Comp. Physiol. A 170, 23-40 (1992): `bee`, the honeybee's worker.
+D. Peitsch, A. Fietz, H. Hertel, J. de Souza, D. F. Ventura and R. Menzel, The spectral input
+systems of hymenopteran insects, J. Comp. Physiol. A 170, 23-40 (1992): `bee`, the honeybee.
 A. Stockman and L. T. Sharpe, Vision Research 40, 1711-1737 (2000): `human`, the cone fundamentals
 of CIE 2006 (170-1), for 2 degrees.
 """

@@ -29,8 +29,8 @@ SPECTRA = np.stack(
     + [0.05 + np.exp(-(((LAM - c) / 40.0) ** 2)) for c in (350.0, 450.0, 550.0)],
     axis=1,
 )
-# λmax, and λcut with the line that gives a droplet's λmid (Hart and Vorobyev 2005), of pavo's example
-# of `sensmodel` (the blue tit) and as docs/seen.md has them; whether the media are a bird's
+# λmax, and λcut with the line that gives a droplet's λmid (Hart and Vorobyev 2005), of pavo's
+# example of `sensmodel` (the blue tit) and as docs/seen.md has them; whether the media are a bird's
 CLEAR, C, Y, R = None, (0.99, 24.38), (0.9, 70.03), (0.99, 28.65)
 MODELS = {
     "avian_uv": (

@@ -7,7 +7,6 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction.analysis.observers import EYES, GRID, eye_of, illuminant_of, responses
-
 from tests.support.room import SCENE
 
 pytestmark = pytest.mark.thorough
