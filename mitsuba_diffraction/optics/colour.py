@@ -88,7 +88,8 @@ def leaf_green(wavelength: ArrayLike) -> NDArray[np.float64]:
     from colour.quality import SDS_TCS
 
     sample = SDS_TCS["CIE 1995"]["TCS14"]
-    return np.asarray(np.interp(wavelength, sample.wavelengths, sample.values))
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(np.interp(lam, sample.wavelengths, sample.values))
 
 
 def cone_fundamentals(wavelength: ArrayLike) -> NDArray[np.float64]:
