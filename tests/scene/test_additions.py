@@ -113,6 +113,8 @@ def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surf
     </bsdf><shape type="disk"><ref id="skin"/></shape></scene>"""
     (surface / "scene.xml").write_text(xml)
     text = bsdfs(surface, {"skin": SETTINGS + ",int_ior=1.6"}).popitem()[1]
-    assert text.count("Diffraction[") == text.count("brdf[")  # a metal beneath would look like chrome
+    assert text.count("Diffraction[") == text.count(
+        "brdf["
+    )  # a metal beneath would look like chrome
     assert ("SmoothDiffuse" in text) == (name == "pigment")
     assert "material = Al" not in text
