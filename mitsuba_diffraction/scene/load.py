@@ -102,7 +102,7 @@ def load_scene(
     import mitsuba as mi
 
     from .additions import split_materials
-    from .bands import WiderTables
+    from .bands import WiderTables, warn_of_dark_bands
 
     readable_file(file)
     parameters, materials = split_materials(parameters)
@@ -127,6 +127,8 @@ def load_scene(
     for number, shape in surfaces.items():
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
+    named = {name_of(shape, number): shape.bsdf() for number, shape in surfaces.items()}
+    warn_of_dark_bands(scene.sensors(), named)
     return scene
 
 
