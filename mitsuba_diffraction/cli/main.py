@@ -59,13 +59,15 @@ COMMANDS = (
 )  # fmt: skip
 
 FAILED = 1
+USAGE = 2
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose errors shorten the values that they quote."""
+    """Argument parser whose errors are one line, with the values that they quote shortened."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(shortened(printable(message)))
+        line = shortened(printable(message))
+        self.exit(USAGE, f"{self.prog}: error: {line}; options: '{self.prog} --help'\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
