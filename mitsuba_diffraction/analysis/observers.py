@@ -55,6 +55,8 @@ GRID = np.arange(300.0, 701.0)
 ILLUMINANTS = ("ideal", "d55", "d65", "d75", "leaves")
 #: Weber fraction of the receptor of the longest waves, measured of birds.
 WEBER = 0.1
+# Names that a film's channel cannot have, since the film has such parameters.
+_TAKEN = ("width", "height", "component_format", "rfilter", "sample_border", "compensate")
 # Share of the quanta under leaves that come through gaps.
 _GAPS = 0.5
 
@@ -156,8 +158,8 @@ def eye_of(name: str) -> Eye:
     DiffractionError
         If there is no such animal, or the file has no sensitivities from 400 to 700 nm.
     """
-    if name in EYES:
-        return EYES[name]()
+    if name.lower() in EYES:
+        return EYES[name.lower()]()
     if Path(name).suffix.lower() != ".csv":
         raise DiffractionError(
             f"observer={quoted(name)} is unknown{_nearest(name, EYES)}; choose one of "
@@ -166,21 +168,28 @@ def eye_of(name: str) -> Eye:
     names, table = _columns(name)
     if len(names) < 2:
         raise DiffractionError(
-            f"'{name}' is no eye: give a header, wl and a name for each receptor, and rows of "
-            "wavelengths in nm, increasing, and sensitivities"
+            f"'{name}' is no eye: give a header, wl and a name for each of two receptors or more, "
+            "and rows of wavelengths in nm, increasing, and sensitivities"
+        )
+    if wrong := [n for n in names if names.count(n) > 1 or not n.isidentifier() or n in _TAKEN]:
+        raise DiffractionError(
+            f"'{name}': {quoted(wrong[0])} cannot name a receptor; give each a name of its own, of "
+            "letters and digits, such as u, s, m, l"
         )
     if table[0, 0] > 400.0 or table[-1, 0] < 700.0 or table[:, 1:].min() < 0.0:
         raise DiffractionError(
             f"'{name}': sensitivities must be 0 or more, from 400 to 700 nm at least"
         )
     curves = np.stack([np.interp(GRID, table[:, 0], c, 0.0, 0.0) for c in table[:, 1:].T])
+    if blind := [n for n, curve in zip(names, curves, strict=True) if not curve.any()]:
+        raise DiffractionError(f"'{name}': receptor {blind[0]} is 0 at all wavelengths; drop it")
     return Eye(names, curves / curves.sum(axis=1, keepdims=True), (1.0,) * len(names))
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:
     """Return a question for the names nearest to `name`, or nothing."""
-    close = difflib.get_close_matches(name.lower(), known)
-    return f": did you mean {' or '.join(close)}?" if close else ""
+    close = difflib.get_close_matches(name.lower(), known, cutoff=0.65)
+    return f" (did you mean {' or '.join(close)}?)" if close else ""
 
 
 def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
@@ -192,7 +201,7 @@ def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
     except ValueError:
         return (), np.empty((0, 0))
     right = table.ndim == 2 and len(table) > 1 and table.shape[1] == 1 + len(names)
-    if not (right and (np.diff(table[:, 0]) > 0.0).all()):
+    if not (right and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()):
         return (), np.empty((0, 0))
     return names, table
 
@@ -207,10 +216,11 @@ def illuminant_of(name: str) -> Reals:
     DiffractionError
         If there is no such light, or the file does not cover 300 to 700 nm.
     """
-    if name == "leaves":
+    light = name.lower()
+    if light == "leaves":
         return _under_leaves()
-    if name in ILLUMINANTS:
-        power = 1.0 / GRID if name == "ideal" else illuminant_power(name.upper(), GRID)
+    if light in ILLUMINANTS:
+        power = 1.0 / GRID if light == "ideal" else illuminant_power(light.upper(), GRID)
         return _of_mean_1(power * GRID)
     if Path(name).suffix.lower() != ".csv":
         raise DiffractionError(
