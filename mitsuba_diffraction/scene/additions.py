@@ -17,6 +17,7 @@ from ..errors import DiffractionError
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
+from ..plugin.presets import find_preset
 from ..tables.orders import OrderTable
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
@@ -25,6 +26,8 @@ from .orientation.files import write_ply
 FITTED = "fitted_mesh"
 #: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
 MATERIAL = "material:"
+#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+PRESET = "preset:"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
@@ -84,7 +87,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     a table of orders, or a dielectric that light goes through (`thin`) replaces it.
 
     state : `mi.parser.ParserState`.
-    materials : `FILE[,parameter=value…]` by id.
+    materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
 
     Raises a DiffractionError if an id is unknown; the text names those of the scene.
     """
@@ -181,29 +184,44 @@ def _targets(node: Any) -> list[int]:
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
-    """Return the properties of a BSDF for `FILE[,parameter=value…]`.
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
 
-    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders, or
-    `diffraction_dielectric` if the parameter `thin` is set. In place of another diffracting surface
-    it keeps the orientation of that one.
+    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
+    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    another diffracting surface it keeps that surface's orientation and what lies beneath that one.
     """
     file, *parameters = _COMMA.split(text)
     pairs = [parameter.partition("=")[::2] for parameter in parameters]
-    values = {name.strip(): _value(value.strip()) for name, value in pairs}
-    names, solved = list(values), kind_of(file) is FileKind.ORDERS
-    plugin = TRANSMITTING if "thin" in names else REFLECTING
-    props = mi.Properties(ORDERS if solved else plugin)
-    props["table" if solved else "heightfield"] = str(Path(file).absolute())
+    values: dict[str, Any] = {name.strip(): _value(value.strip()) for name, value in pairs}
+    named = file.startswith(PRESET)
+    if named:
+        values = find_preset(file.removeprefix(PRESET)).changed(values)
+        plugin = values.pop("type")
+    else:
+        solved = kind_of(file) is FileKind.ORDERS
+        plugin = ORDERS if solved else TRANSMITTING if "thin" in values else REFLECTING
+        values["table" if solved else "heightfield"] = str(Path(file).absolute())
+    names = list(values)
+    props = mi.Properties(plugin)
     for name, value in values.items():
         props[name] = value
-    if beneath is not None and "orientation" not in names:
-        old = state.nodes[beneath].props
-        if old.plugin_name().startswith("diffraction") and "orientation" in old:
-            props["orientation"] = old["orientation"]
-    opaque = solved or plugin == TRANSMITTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = named or plugin != REFLECTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
     opaque = opaque or not lets_light_through(values.get("material", "keratin"))
-    if beneath is not None and not opaque:
-        props["beneath"] = mi.Properties.ResolvedReference(beneath)
+    if beneath is None:
+        return props
+    old = state.nodes[beneath].props
+    if not old.plugin_name().startswith("diffraction"):
+        if not opaque:
+            props["beneath"] = mi.Properties.ResolvedReference(beneath)
+        return props
+    if "orientation" in old and "orientation" not in names:
+        props["orientation"] = old["orientation"]
+    if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
+        if "pigment" in old:
+            props["pigment"] = old["pigment"]
+        for target in _targets(state.nodes[beneath]):
+            if state.nodes[target].type == mi.ObjectType.BSDF:
+                props["beneath"] = mi.Properties.ResolvedReference(target)
     return props
 
 
