@@ -132,9 +132,9 @@ Kirchhoff / blend:
 {table(header, rows)}
 
 The package warns beyond {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Up to {gentle:.3f} and {steep:.3f}
-no sinusoid of either material deviates by more than {percent(GENTLE_ERROR)} and {percent(STEEP_ERROR)}, in light
-up to {STEEPEST_LIGHT:g}° from the normal. The RMS slope of steps depends on the pixel, so it says
-little about blazed and lamellar gratings."""
+no sinusoid of either material exceeds {percent(GENTLE_ERROR)} and {percent(STEEP_ERROR)}
+in light up to {STEEPEST_LIGHT:g}° from the normal. The RMS slope of steps depends on the pixel, so
+it says little about blazed and lamellar gratings."""
 
 
 def _edges(measured: Measurements) -> str:

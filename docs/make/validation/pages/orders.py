@@ -49,7 +49,8 @@ Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpo
 ## Interpolation
 
 The tables beside their own solver, at {measured.diffuse_samples}
-random directions of diffuse light and wavelengths. *Absorbed* is the share of light that no order has, and *bias* the relative deviation
+random directions of diffuse light and wavelengths.
+*Absorbed* is the share of light that no order has, and *bias* the relative deviation
 of its mean; then the deviation of the absorbed share, as a share of the incident light.
 
 {table(header, diffuse)}

@@ -18,8 +18,8 @@ def write(measured: Measurements) -> str:
     return f"""# The second order of small slope
 
 `second_order=true` multiplies each order of a dielectric by the part of the second order
-(Voronovich 1994) that a table of powers can hold. Below, the factor and the exact second order beside rigorous
-solutions; [theory.md](../theory.md#the-second-order) has the equations.
+(Voronovich 1994) that a table of powers can hold. Below, the factor and the exact second order
+beside rigorous solutions; [theory.md](../theory.md#the-second-order) has the equations.
 
 {_exact(measured)}
 

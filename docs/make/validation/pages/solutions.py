@@ -68,7 +68,8 @@ Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} 
 
 Each grating was solved on two meshes, the second twice as fine (1.4 times where light in the metal
 is short), with a third where an order changed by more than {CONVERGED:g}.
-*Change* is the last change of an efficiency. *Energy missed* is the deviation of orders and absorption from 1. Solutions with an
+*Change* is the last change of an efficiency.
+*Energy missed* is the deviation of orders and absorption from 1. Solutions with an
 order that still changed by more than {CONVERGED:g} are left out.
 
 {table(header, rows)}
