@@ -25,8 +25,8 @@ _BROUGHT, _CLONE = Path(__file__).with_name("patches"), Path(__file__).parents[2
 PATCHES = _BROUGHT if _BROUGHT.is_dir() else _CLONE
 #: Name of the plugin, and of its only parameter of its own.
 PLUGIN, PARAMETER = "diffraction_preset", "preset"
-# Either of them states the whole boundary, so a change of one drops the record's other.
-_MATERIALS = ("material", "int_ior", "eta", "k")
+#: Parameters of which one states the whole boundary: a change of one drops the others.
+MATERIALS = ("material", "int_ior", "eta", "k")
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class Preset:
     def changed(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Return the dictionary of the BSDF, with these parameters instead of the record's."""
         own = dict(self.parameters)
-        if any(name in changes for name in _MATERIALS):
-            own = {name: value for name, value in own.items() if name not in _MATERIALS}
+        if any(name in changes for name in MATERIALS):
+            own = {name: value for name, value in own.items() if name not in MATERIALS}
         source = "table" if self.plugin == ORDERS else "heightfield"
         return {"type": self.plugin, source: str(self.patch), **own, **changes}
 
