@@ -8,6 +8,7 @@ info                   what is in a file
 tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
 orders                 efficiencies of solved orders as a CSV
+presets                the named looks of --preset
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 observed               `render --observer`: what the receptors of an animal catch

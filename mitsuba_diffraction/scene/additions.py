@@ -7,7 +7,7 @@ command line puts on an id replaces the BSDF of that id, or that of the shape of
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,9 @@ from ..errors import DiffractionError
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
+from ..plugin.presets import MATERIALS, find_preset
+from ..plugin.presets import PLUGIN as PRESET_PLUGIN
+from ..plugin.surface_parameters import NAMES
 from ..tables.orders import OrderTable
 from .fitted_mesh import fitted_mesh
 from .orientation.files import write_ply
@@ -25,6 +28,8 @@ from .orientation.files import write_ply
 FITTED = "fitted_mesh"
 #: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
 MATERIAL = "material:"
+#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+PRESET = "preset:"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
@@ -33,17 +38,29 @@ _CONDUCTORS = ("eta", "k")
 
 
 class SceneValues(NamedTuple):
-    """Values of a scene's parameters, and surfaces by the id that they are put on."""
+    """Values for a scene.
+
+    Attributes
+    ----------
+    parameters : of the scene's own parameters.
+    materials : surfaces by the id that they are put on.
+    surface : parameters of the BSDF, for all diffracting surfaces of the scene.
+    """
 
     parameters: dict[str, Any]
     materials: dict[str, str]
+    surface: dict[str, Any]
 
 
-def split_materials(values: Mapping[str, Any]) -> SceneValues:
-    """Separate parameters of a scene from surfaces for its ids."""
+def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
+    """Separate values of a scene's parameters from surfaces for its ids and their parameters.
+
+    known : names of the scene's parameters, which go before those of the BSDF.
+    """
     materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    parameters = {k: v for k, v in values.items() if not k.startswith(MATERIAL)}
-    return SceneValues(parameters, materials)
+    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL)}
+    surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
+    return SceneValues({k: v for k, v in rest.items() if k not in surface}, materials, surface)
 
 
 def fit_meshes(state: Any, folder: Path) -> None:
@@ -84,7 +101,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     a table of orders, or a dielectric that light goes through (`thin`) replaces it.
 
     state : `mi.parser.ParserState`.
-    materials : `FILE[,parameter=value…]` by id.
+    materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
 
     Raises a DiffractionError if an id is unknown; the text names those of the scene.
     """
@@ -94,6 +111,57 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
             _put_on_shape(state, number, text)
         else:
             _put_on_bsdf(state, number, text)
+
+
+def put_surface_parameters(state: Any, values: Mapping[str, Any]) -> None:
+    """Set parameters of the BSDF on all diffracting surfaces that have them.
+
+    state : `mi.parser.ParserState`.
+
+    Raises a DiffractionError if no surface has one of them.
+    """
+    for name, text in values.items():
+        value = _value(str(text))
+        surfaces = [node.props for node in state.nodes if name in _parameters_of(node)]
+        if not surfaces:
+            raise DiffractionError(
+                f"{name}={text} is a parameter of a diffracting surface, and the scene has none "
+                "that takes it; put one on an id with --material or --preset"
+            )
+        for props in surfaces:
+            for other in MATERIALS if name in MATERIALS else (name,):
+                if other in props:
+                    del props[other]
+            props[name] = value
+
+
+def _parameters_of(node: Any) -> tuple[str, ...]:
+    """Return the names of a surface's parameters; none of other nodes."""
+    plugin = node.props.plugin_name() if node.type == mi.ObjectType.BSDF else ""
+    if plugin == PRESET_PLUGIN:
+        plugin = find_preset(str(node.props["preset"])).plugin
+    return NAMES.get(plugin, ())
+
+
+def remove_dark_lights(state: Any) -> None:
+    """Remove emitters of daylight's spectrum at scale 0, which Mitsuba refuses.
+
+    state : `mi.parser.ParserState`, its references resolved.
+    """
+
+    def is_dark(number: int) -> bool:
+        props = state.nodes[number].props
+        return props.plugin_name() == "d65" and float(props.get("scale", 1.0)) == 0.0
+
+    dark = {
+        number for number, node in enumerate(state.nodes)
+        if node.type == mi.ObjectType.Emitter and any(map(is_dark, _targets(node)))
+    }  # fmt: skip
+    for node in state.nodes:
+        for name in list(node.props.keys()):
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference) and value.index() in dark:
+                del node.props[name]
 
 
 def put_box_filters(state: Any) -> None:
@@ -181,29 +249,44 @@ def _targets(node: Any) -> list[int]:
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
-    """Return the properties of a BSDF for `FILE[,parameter=value…]`.
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
 
-    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders, or
-    `diffraction_dielectric` if the parameter `thin` is set. In place of another diffracting surface
-    it keeps the orientation of that one.
+    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
+    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    another diffracting surface it keeps that surface's orientation and what lies beneath that one.
     """
     file, *parameters = _COMMA.split(text)
     pairs = [parameter.partition("=")[::2] for parameter in parameters]
-    values = {name.strip(): _value(value.strip()) for name, value in pairs}
-    names, solved = list(values), kind_of(file) is FileKind.ORDERS
-    plugin = TRANSMITTING if "thin" in names else REFLECTING
-    props = mi.Properties(ORDERS if solved else plugin)
-    props["table" if solved else "heightfield"] = str(Path(file).absolute())
+    values: dict[str, Any] = {name.strip(): _value(value.strip()) for name, value in pairs}
+    named = file.startswith(PRESET)
+    if named:
+        values = find_preset(file.removeprefix(PRESET)).changed(values)
+        plugin = values.pop("type")
+    else:
+        solved = kind_of(file) is FileKind.ORDERS
+        plugin = ORDERS if solved else TRANSMITTING if "thin" in values else REFLECTING
+        values["table" if solved else "heightfield"] = str(Path(file).absolute())
+    names = list(values)
+    props = mi.Properties(plugin)
     for name, value in values.items():
         props[name] = value
-    if beneath is not None and "orientation" not in names:
-        old = state.nodes[beneath].props
-        if old.plugin_name().startswith("diffraction") and "orientation" in old:
-            props["orientation"] = old["orientation"]
-    opaque = solved or plugin == TRANSMITTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = named or plugin != REFLECTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
     opaque = opaque or not lets_light_through(values.get("material", "keratin"))
-    if beneath is not None and not opaque:
-        props["beneath"] = mi.Properties.ResolvedReference(beneath)
+    if beneath is None:
+        return props
+    old = state.nodes[beneath].props
+    if not old.plugin_name().startswith("diffraction"):
+        if not opaque:
+            props["beneath"] = mi.Properties.ResolvedReference(beneath)
+        return props
+    if "orientation" in old and "orientation" not in names:
+        props["orientation"] = old["orientation"]
+    if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
+        if "pigment" in old:
+            props["pigment"] = old["pigment"]
+        for target in _targets(state.nodes[beneath]):
+            if state.nodes[target].type == mi.ObjectType.BSDF:
+                props["beneath"] = mi.Properties.ResolvedReference(target)
     return props
 
 
