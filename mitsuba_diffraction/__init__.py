@@ -22,6 +22,7 @@ spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
 hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
+preset             a dictionary for `mi.load_dict` of a named look, e.g. preset("cd")
 DiffractionError   error of every bad input, in one line
 
 Importing the package registers the BSDF plugin `diffraction` in the current variant of Mitsuba and
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from . import cluster, osl
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
+    from .plugin.presets import preset
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
     from .solve import profiles
@@ -82,6 +84,7 @@ __all__ = [
     "maps",
     "osl",
     "period_fit",
+    "preset",
     "profiles",
     "read_orders",
     "reference",
@@ -107,6 +110,7 @@ _ON_DEMAND = {
 }
 _FUNCTIONS = {
     "hologram": "scene.hologram",
+    "preset": "plugin.presets",
     "read_orders": "solve.measured",
     "solve_orders": "solve.orders",
     "spectrum": "analysis.spectra",

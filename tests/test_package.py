@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.plugin.presets import presets
 from tests.support import ROOT
 
 backend = pytest.importorskip("hatchling.builders.wheel", reason="the build backend is missing")
@@ -78,9 +79,14 @@ def test_the_wheel_holds_nothing_else(in_wheel):
     info = f"mitsuba_diffraction-{md.__version__}.dist-info/"
     others = {name for name in in_wheel if not name.startswith(info)}
     # `render MESH` works without a clone
-    studio = {f"mitsuba_diffraction/scene/studio/{n}.xml" for n in ("own_mesh", "studio", "lamp")}
-    assert studio <= others
-    assert others <= tracked("mitsuba_diffraction") | studio | {"_mitsuba_diffraction.py"}
+    scenes = ("own_mesh", "studio", "lamp", "outdoors", "daylight", "environment")
+    studio = {f"mitsuba_diffraction/scene/studio/{n}.xml" for n in scenes}
+    brought = studio | {
+        f"mitsuba_diffraction/plugin/patches/{look.patch.relative_to(ROOT / 'precompute')}"
+        for look in presets().values()
+    }
+    assert brought <= others
+    assert others <= tracked("mitsuba_diffraction") | brought | {"_mitsuba_diffraction.py"}
 
 
 def test_the_wheel_declares_command_and_plugin(wheel):

@@ -15,23 +15,26 @@ N. S. Hart, J. C. Partridge, I. C. Cuthill and A. T. D. Bennett, Visual pigments
 ocular media and cone photoreceptor distribution in two species of passerine bird, J. Comp. Physiol.
 A 186, 375-387 (2000): blue tit, `avian_uv`.
 A. J. Sillman, V. I. Govardovskii, P. Röhlich, J. A. Southard and E. R. Loew, The photoreceptors and
-visual pigments of the garter snake, J. Comp. Physiol. A 181, 89-101 (1997): `snake`.
+visual pigments of the garter snake, J. Comp. Physiol. A 181, 89-101 (1997): `snake`; the small
+single cones, 14.5 %, are taken as equally many of each kind.
 N. S. Hart, Vision in the peafowl (Aves: Pavo cristatus), J. Exp. Biol. 205, 3925-3935 (2002):
 `avian_v`; pigments, numbers of cones, and the peaks that media and droplets give them, 432, 477,
-537 and 605 nm. The cut-offs here are those that give these peaks; the first has the media in it.
+537 and 605 nm. The cut-offs here give the last three under a blue tit's ocular media.
 E. R. Loew, L. J. Fleishman, R. G. Foster and I. Provencio, Visual pigments and oil droplets in
 diurnal lizards, J. Exp. Biol. 205, 927-938 (2002): `lizard`, anoles; pigments without droplets.
 J. Neitz, T. Geist and G. H. Jacobs, Color vision in the dog, Visual Neuroscience 3, 119-125 (1989):
 `dog`.
-R. Menzel, in Photoreceptor Optics (Springer 1975), 372-387: `bee`, the honeybee.
+D. Peitsch, A. Fietz, H. Hertel, J. de Souza, D. F. Ventura and R. Menzel, The spectral input
+systems of hymenopteran insects, J. Comp. Physiol. A 170, 23-40 (1992): `bee`, the honeybee.
 A. Stockman and L. T. Sharpe, Vision Research 40, 1711-1737 (2000): `human`, the cone fundamentals
 of CIE 2006 (170-1), for 2 degrees.
 """
 
 from __future__ import annotations
 
+import difflib
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,17 +43,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
 from ..files import read_text
-from ..optics.colour import cone_fundamentals, illuminant_power
+from ..optics.colour import cone_fundamentals, illuminant_power, leaf_green
 
 Reals = NDArray[np.float64]
 
 #: Wavelengths of sensitivities, nm: the range in which animals see.
 GRID = np.arange(300.0, 701.0)
 #: Lights of catches: as many quanta everywhere; CIE's daylight of direct sun, of sun and sky, and
-#: of the northern sky, in open shade (G. Wyszecki and W. S. Stiles, Color Science, Wiley 1982).
-ILLUMINANTS = ("ideal", "d55", "d65", "d75")
-#: Weber fraction of the most frequent receptor, of birds' long-wave cones.
+#: of the northern sky, in open shade (G. Wyszecki and W. S. Stiles, Color Science, Wiley 1982);
+#: shade under leaves, a model (`_under_leaves`).
+ILLUMINANTS = ("ideal", "d55", "d65", "d75", "leaves")
+#: Weber fraction of the receptor of the longest waves, measured of birds.
 WEBER = 0.1
+# Names that a film's channel cannot have, since the film has such parameters.
+_TAKEN = ("width", "height", "component_format", "rfilter", "sample_border", "compensate")
+# Share of the quanta under leaves that come through gaps.
+_GAPS = 0.5
 
 # Of oil droplets, the wavelength of half transmittance from that of the cut: slope, intercept (nm).
 _DROPLETS = {"C": (0.99, 24.38), "Y": (0.9, 70.03), "R": (0.99, 28.65), "P": (0.96, 33.57)}
@@ -119,26 +127,26 @@ def _modelled(
 
 
 def _human() -> Eye:
-    """Model the human eye: cone fundamentals per quantum."""
+    """Model the human eye: cone fundamentals per quantum, and 2, 33 and 65 % of the cones."""
     curves = cone_fundamentals(GRID) / GRID
-    return Eye(("s", "m", "l"), curves / curves.sum(axis=1, keepdims=True), (1.0, 1.0, 1.0))
+    return Eye(("s", "m", "l"), curves / curves.sum(axis=1, keepdims=True), (1.0, 16.0, 32.0))
 
 
 #: Animals by name: λmax, relative numbers of receptors (1 if unknown), oil droplets, their λcut.
 EYES: dict[str, Callable[[], Eye]] = {
     "avian_uv": lambda: _modelled(
-        (371.0, 448.0, 502.0, 563.0), (1.0, 2.0, 2.0, 4.0), "TCYR", (300.0, 413.0, 507.0, 572.0),
+        (371.0, 448.0, 502.0, 563.0), (1.0, 1.92, 2.68, 2.7), "TCYR", (300.0, 413.0, 507.0, 572.0),
         bird_media(),
     ),
     "avian_v": lambda: _modelled(
-        (424.0, 458.0, 505.0, 567.0), (1.0, 1.9, 2.2, 2.1), "CCYR", (383.5, 440.0, 505.5, 569.5),
-        names="vsml",
+        (424.0, 458.0, 505.0, 567.0), (1.0, 1.9, 2.2, 2.1), "TCYR", (300.0, 440.0, 505.5, 569.5),
+        bird_media(), names="vsml",
     ),
     "lizard": lambda: _modelled((365.0, 455.0, 495.0, 564.0), (1.0, 1.0, 1.0, 1.0)),
     "dog": lambda: _modelled((429.0, 555.0), (1.0, 1.0), names="sl"),
-    "bee": lambda: _modelled((350.0, 440.0, 540.0), (1.0, 1.0, 1.0), names="usm"),
+    "bee": lambda: _modelled((344.0, 436.0, 544.0), (1.0, 1.0, 1.0), names="usm"),
     "human": _human,
-    "snake": lambda: _modelled((360.0, 482.0, 554.0), (1.0, 1.0, 12.0), names="uml"),
+    "snake": lambda: _modelled((360.0, 482.0, 554.0), (1.0, 1.0, 11.8), names="uml"),
 }  # fmt: skip
 
 
@@ -150,25 +158,38 @@ def eye_of(name: str) -> Eye:
     DiffractionError
         If there is no such animal, or the file has no sensitivities from 400 to 700 nm.
     """
-    if name in EYES:
-        return EYES[name]()
+    if name.lower() in EYES:
+        return EYES[name.lower()]()
     if Path(name).suffix.lower() != ".csv":
         raise DiffractionError(
-            f"observer={quoted(name)} is unknown; choose one of {', '.join(EYES)}, or a CSV of "
-            "wavelengths (nm) and a column for each receptor"
+            f"observer={quoted(name)} is unknown{_nearest(name, EYES)}; choose one of "
+            f"{', '.join(EYES)}, or a CSV of wavelengths (nm) and a column for each receptor"
         )
     names, table = _columns(name)
     if len(names) < 2:
         raise DiffractionError(
-            f"'{name}' is no eye: give a header, wl and a name for each receptor, and rows of "
-            "wavelengths in nm, increasing, and sensitivities"
+            f"'{name}' is no eye: give a header, wl and a name for each of two receptors or more, "
+            "and rows of wavelengths in nm, increasing, and sensitivities"
+        )
+    if wrong := [n for n in names if names.count(n) > 1 or not n.isidentifier() or n in _TAKEN]:
+        raise DiffractionError(
+            f"'{name}': {quoted(wrong[0])} cannot name a receptor; give each a name of its own, of "
+            "letters and digits, such as u, s, m, l"
         )
     if table[0, 0] > 400.0 or table[-1, 0] < 700.0 or table[:, 1:].min() < 0.0:
         raise DiffractionError(
             f"'{name}': sensitivities must be 0 or more, from 400 to 700 nm at least"
         )
     curves = np.stack([np.interp(GRID, table[:, 0], c, 0.0, 0.0) for c in table[:, 1:].T])
+    if blind := [n for n, curve in zip(names, curves, strict=True) if not curve.any()]:
+        raise DiffractionError(f"'{name}': receptor {blind[0]} is 0 at all wavelengths; drop it")
     return Eye(names, curves / curves.sum(axis=1, keepdims=True), (1.0,) * len(names))
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """Return a question for the names nearest to `name`, or nothing."""
+    close = difflib.get_close_matches(name.lower(), known, cutoff=0.65)
+    return f" (did you mean {' or '.join(close)}?)" if close else ""
 
 
 def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
@@ -180,7 +201,7 @@ def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
     except ValueError:
         return (), np.empty((0, 0))
     right = table.ndim == 2 and len(table) > 1 and table.shape[1] == 1 + len(names)
-    if not (right and (np.diff(table[:, 0]) > 0.0).all()):
+    if not (right and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()):
         return (), np.empty((0, 0))
     return names, table
 
@@ -195,15 +216,16 @@ def illuminant_of(name: str) -> Reals:
     DiffractionError
         If there is no such light, or the file does not cover 300 to 700 nm.
     """
-    if name in ILLUMINANTS:
-        quanta = (
-            np.ones_like(GRID) if name == "ideal" else illuminant_power(name.upper(), GRID) * GRID
-        )
-        return np.asarray(quanta / quanta.mean())
+    light = name.lower()
+    if light == "leaves":
+        return _under_leaves()
+    if light in ILLUMINANTS:
+        power = 1.0 / GRID if light == "ideal" else illuminant_power(light.upper(), GRID)
+        return _of_mean_1(power * GRID)
     if Path(name).suffix.lower() != ".csv":
         raise DiffractionError(
-            f"illuminant={quoted(name)} is unknown; choose one of {', '.join(ILLUMINANTS)}, or a "
-            "CSV of wavelengths (nm) and photons"
+            f"illuminant={quoted(name)} is unknown{_nearest(name, ILLUMINANTS)}; choose one of "
+            f"{', '.join(ILLUMINANTS)}, or a CSV of wavelengths (nm) and photons"
         )
     names, table = _columns(name)
     covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
@@ -212,8 +234,32 @@ def illuminant_of(name: str) -> Reals:
             f"'{name}' is no light: give a header, wl and a name, and rows of wavelengths from 300 "
             "to 700 nm, increasing, and photons"
         )
-    quanta = np.interp(GRID, table[:, 0], table[:, 1])
+    return _of_mean_1(np.interp(GRID, table[:, 0], table[:, 1]))
+
+
+def _of_mean_1(quanta: Reals) -> Reals:
+    """Scale a light."""
     return np.asarray(quanta / quanta.mean())
+
+
+def _under_leaves() -> Reals:
+    """Return a model of forest shade: daylight through gaps, and sunlight through green leaves.
+
+    The transmittance of leaves is taken to have the shape of their colour in reflection, CIE's test
+    colour "leaf green" (CIE 13.3-1995, sample 14). 97 % of these quanta coincide with the forest
+    shade of J. A. Endler, The color of light in forests and its implications, Ecol. Monographs 63,
+    1-27 (1993).
+    """
+    through = illuminant_of("d55") * leaf_green(GRID)
+    return _GAPS * illuminant_of("d65") + (1.0 - _GAPS) * _of_mean_1(through)
+
+
+def relit(light: str) -> Reals:
+    """Return factors (GRID,) that turn daylight, D65, into another light of as many quanta.
+
+    light : as in `illuminant_of`.
+    """
+    return np.asarray(illuminant_of(light) / illuminant_of("d65"))
 
 
 def responses(eye: Eye) -> Reals:
@@ -247,16 +293,16 @@ def quantum_catches(
     if lam[0] > seen[0] or lam[-1] < seen[-1]:
         raise DiffractionError(
             f"the spectra are from {lam[0]:g} to {lam[-1]:g} nm, and this eye sees from "
-            f"{seen[0]:g} to {seen[-1]:g} nm; give wavelength_range=(300, 700)"
+            f"{seen[0]:g} to {seen[-1]:g} nm; the wavelength range must cover that"
         )
     fine = np.stack([np.interp(GRID, lam, curve) for curve in spectra.T])
     return np.asarray(fine * illuminant @ eye.sensitivity.T)
 
 
 def noises(eye: Eye, weber: float = WEBER) -> Reals:
-    """Return the noise e of each receptor's channel: `weber` that of the most frequent one."""
+    """Return the noise e of each receptor's channel: `weber` that of the longest waves."""
     density = np.array(eye.density)
-    return np.asarray(weber * np.sqrt(density.max() / density))
+    return np.asarray(weber * np.sqrt(density[-1] / density))
 
 
 def contrasts(catches: ArrayLike, noise: ArrayLike) -> Reals:

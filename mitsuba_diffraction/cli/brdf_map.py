@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
@@ -32,7 +31,7 @@ _SURFACE = (
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
     "mode", "material", "ext_ior", "coat_ior", "pigment", "model", "orientation", "height_scale",
-    "basis", "second_order",
+    "basis", "second_order", "preset",
 )  # fmt: skip
 
 
@@ -43,7 +42,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
     )  # fmt: skip
-    options.add_source(parser, tables=True)
+    add_surface_source(parser)
     options.add_output(
         parser, "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr "
         "in the current folder", ".exr", ".png",
@@ -86,6 +85,34 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--spectral", action="store_true", help="also write every band as a channel of the EXR"
     )
+
+
+def add_surface_source(parser: argparse.ArgumentParser) -> None:
+    """Declare SOURCE or --preset; see `take_source`."""
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, nargs="?",
+        help="table, recipe (.toml), or heights of any format",
+    )  # fmt: skip
+    parser.add_argument(
+        "--preset", metavar="NAME",
+        help="instead of SOURCE: a named look, which 'mitsuba-diffraction presets' lists; options "
+        "of the surface change it",
+    )  # fmt: skip
+
+
+def take_source(args: argparse.Namespace) -> None:
+    """Set `args.source` to the patch of --preset, and refuse contradictory materials.
+
+    Raises a DiffractionError if there is no such look.
+    """
+    if (args.source is None) == (args.preset is None):
+        args.parser.error("name either SOURCE or --preset NAME")
+    if args.preset is not None:
+        from ..plugin.presets import find_preset
+
+        args.source = find_preset(args.preset).patch
+    if args.material is not None and args.int_ior is not None:
+        args.parser.error("argument --int-ior: not allowed with argument --material")
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
@@ -164,6 +191,7 @@ def gain_of(args: argparse.Namespace) -> Any:
 def run(args: argparse.Namespace) -> int:
     """Make the map, and return the exit code."""
     start = time.perf_counter()
+    take_source(args)
     _refuse_contradictions(args)
     output = args.output or Path(f"{args.source.stem}-map.exr")
     only_png = output.suffix.lower() == ".png"
@@ -264,8 +292,6 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
             for name in ("wavelength_range", "step", "exposure", "spectral")
             if getattr(args, name) not in (None, False)
         ]
-    if args.material is not None and args.int_ior is not None:
-        refused.append("argument --int-ior: not allowed with argument --material")
     if args.method is None:
         refused += [
             f"argument --{name}: only with argument --method"
@@ -290,20 +316,25 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
+    from ..plugin.dictionary import ORDERS, bsdf_dict
     from ..plugin.diffraction import Diffraction
     from ..plugin.orders.orders_sheet import diffraction_orders
+    from ..plugin.presets import preset
 
-    parameters = surface_parameters(args)
-    settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
+    parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
+    parameters |= surface_parameters(args)
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)
-    solved = kind_of(args.source) is FileKind.ORDERS
-    props = mi.Properties("diffraction_orders" if solved else "diffraction")
-    source = "table" if solved else "heightfield"
-    for name, value in {source: str(args.source), **settings, **parameters}.items():
+    if args.preset is not None:
+        values = preset(args.preset, **parameters)
+    else:
+        values = bsdf_dict(str(args.source), **parameters)
+    kind = values.pop("type")
+    props = mi.Properties(kind)
+    for name, value in values.items():
         props[name] = value
-    return diffraction_orders(props) if solved else Diffraction(props)
+    return diffraction_orders(props) if kind == ORDERS else Diffraction(props)
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:

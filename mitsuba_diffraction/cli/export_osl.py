@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 from . import options
-from .brdf_map import add_surface, surface_bsdf
+from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings
 from .report import check_outputs, save_report
 
@@ -21,7 +21,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
         "the material to a .blend file: docs/blender.md.",
     )  # fmt: skip
-    options.add_source(parser, tables=True)
+    add_surface_source(parser)
     options.add_output(
         parser, "to write into, made if it is missing; default: SOURCE's name with -osl in the "
         "current folder",
@@ -38,8 +38,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
-    if args.material is not None and args.int_ior is not None:
-        args.parser.error("argument --int-ior: not allowed with argument --material")
+    take_source(args)
     folder = args.output or Path(f"{args.source.stem}-osl")
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")

@@ -26,6 +26,7 @@ from . import (
     orders,
     plan,
     precompute,
+    presets,
     realtime,
     render,
     solve,
@@ -51,7 +52,7 @@ from .wording import speak_for
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
     precompute.add_parser, solve.add_parser, orders.add_parser, info.add_parser,
-    tangents.add_parser, plan.add_parser, render.add_parser, tonemap.add_parser,
+    tangents.add_parser, presets.add_parser, plan.add_parser, render.add_parser, tonemap.add_parser,
     brdf_map.add_parser, spectrum.add_parser,
     evaluate.add_parser, survey.add_parser, sweep.add_parser, tradeoff.add_parser,
     realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,
@@ -59,13 +60,15 @@ COMMANDS = (
 )  # fmt: skip
 
 FAILED = 1
+USAGE = 2
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose errors shorten the values that they quote."""
+    """Argument parser whose errors are one line, with the values that they quote shortened."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(shortened(printable(message)))
+        line = shortened(printable(message))
+        self.exit(USAGE, f"{self.prog}: error: {line}; options: '{self.prog} --help'\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -25,15 +25,21 @@ def add_observer(parser: argparse.ArgumentParser) -> None:
         help="an eye, as in `spectrum`: the EXR has a channel for each receptor, the PNG is in "
         "false colour with a legend; tables of heights then serve ultraviolet",
     )  # fmt: skip
+    parser.add_argument(
+        "--illuminant", metavar="LIGHT|CSV",
+        help="with --observer: light of the scene in place of daylight, D65, e.g. leaves, shade "
+        "under leaves; as in `spectrum`",
+    )  # fmt: skip
 
 
 def run_observed(args: argparse.Namespace) -> int:
     """Render with a band for each receptor, and return the exit code."""
-    from ..analysis.observers import GRID, eye_of, responses
+    from ..analysis.observers import GRID, eye_of, relit, responses
 
     if args.frames is not None or args.plan is not None or args.denoise or args.workers:
         args.parser.error("argument --observer: is for one picture in one process, without a plan")
     eye = eye_of(args.observer)
+    seen = responses(eye) * relit(args.illuminant or "d65")
     parameters = scene_options.scene_parameters(args)
     output = args.output or Path(default_output(args.name, ".exr").name)
     if output.suffix.lower() != ".exr":
@@ -47,7 +53,7 @@ def run_observed(args: argparse.Namespace) -> int:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
     from ..scene.bands import Bands
 
-    bands = Bands(GRID.tolist(), dict(zip(eye.names, responses(eye).tolist(), strict=True)))
+    bands = Bands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
     with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
         bar(0, args.spp or 0, "loading")
         scene = load_scene(args.scene, parameters, bands=bands)
@@ -71,11 +77,12 @@ def run_observed(args: argparse.Namespace) -> int:
     write_exr(
         result.bitmap, output,
         {"scene": str(args.scene), "variant": variant, "seed": args.seed, "spp": result.spp,
-         "observer": args.observer},
+         "observer": args.observer, "illuminant": args.illuminant or "of the scene"},
     )  # fmt: skip
     from ..analysis.false_colour import false_colour_figure
 
-    title = f"{args.name.name} as {Path(args.observer).stem}"
+    light = f", light: {Path(args.illuminant).stem}" if args.illuminant else ""
+    title = f"{args.name.name} as {Path(args.observer).stem}{light}"
     with atomic_path(png) as temporary:
         figure = false_colour_figure(channels, eye, args.exposure, title)
         figure.savefig(temporary, format="png")

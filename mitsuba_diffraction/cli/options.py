@@ -178,13 +178,11 @@ def used_heights_options(args: argparse.Namespace) -> list[str]:
     return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
 
 
-def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None:
-    """Add the argument SOURCE, which `load_patch` reads. tables: whether it may be a table."""
-    accepted = "table, recipe (.toml), or heights of any format"
+def add_source(parser: argparse.ArgumentParser) -> None:
+    """Add the argument SOURCE, which `load_patch` reads."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path,
-        help=accepted if tables else "heights of any format, or a recipe (.toml)",
-    )  # fmt: skip
+        "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
+    )
 
 
 def add_files(parser: argparse.ArgumentParser, kinds: str, *, needed: bool = True) -> None:

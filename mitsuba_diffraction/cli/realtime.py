@@ -14,7 +14,7 @@ from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
-from .brdf_map import add_surface, surface_bsdf
+from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
 from .report import check_outputs, check_writable, plain, save_json, save_report
@@ -201,7 +201,7 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
         "constants (JSON), and a material of three.js that uses them. How to bring it into "
         "another engine: docs/realtime.md.",
     )  # fmt: skip
-    options.add_source(parser, tables=True)
+    add_surface_source(parser)
     options.add_output(
         parser, "to write into, made if it is missing; default: SOURCE's name with -shader in the "
         "current folder",
@@ -219,8 +219,7 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
 
 def export_shader(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
-    if args.material is not None and args.int_ior is not None:
-        args.parser.error("argument --int-ior: not allowed with argument --material")
+    take_source(args)
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded

@@ -14,6 +14,9 @@ from ..files import MESHES, OTHER_MESHES, readable_file
 from ..scene.parameters import Change, change_of
 from .options import add_mode, whole_number
 
+#: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
+SURFACE = "surface"
+
 
 def definition(text: str) -> tuple[str, str]:
     """Parse KEY=VALUE."""
@@ -43,6 +46,13 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
         "turn and the lamp are set by -D",
     )  # fmt: skip
     parser.add_argument(
+        "--preset", metavar="[ID=]NAME[,NAME=VALUE...]", action="append", default=[],
+        dest="presets",
+        help="instead of --patch: a named look, e.g. cd or snake,height_scale=0.7, which "
+        "'mitsuba-diffraction presets' lists; of a scene, the look of the BSDF or shape of this "
+        f"id; default of ID: {SURFACE}",
+    )  # fmt: skip
+    parser.add_argument(
         "--material", metavar="ID=FILE[,NAME=VALUE...]", type=definition, action="append",
         default=[], dest="materials",
         help="put a surface on the BSDF or shape of this id, e.g. mat-Skin=scale.exr,int_ior=1.56; "
@@ -61,18 +71,23 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 
 
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
-    """Return the values of -D and --material, as `load_scene` takes them.
+    """Return the values of -D, --material and --preset, as `load_scene` takes them.
 
     A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
     """
-    from ..scene.additions import MATERIAL
+    from ..scene.additions import MATERIAL, PRESET
 
     parameters = _definitions(args)
-    ids = [name for name, _ in args.materials]
+    surfaces = list(args.materials)
+    for text in args.presets:
+        head, comma, changes = text.partition(",")
+        name, _, look = head.rpartition("=")
+        surfaces.append((name or SURFACE, f"{PRESET}{look}{comma}{changes}"))
+    ids = [name for name, _ in surfaces]
     for name in ids:
         if ids.count(name) > 1:
-            args.parser.error(f"argument --material: {name!r} is given more than once")
-    return parameters | {MATERIAL + name: value for name, value in args.materials}
+            args.parser.error(f"argument --material, --preset: {name!r} is given more than once")
+    return parameters | {MATERIAL + name: value for name, value in surfaces}
 
 
 def put_on_stage(args: argparse.Namespace) -> None:
@@ -95,14 +110,26 @@ def put_on_stage(args: argparse.Namespace) -> None:
                 "--material ID=FILE"
             )
         return
-    if args.patch is None:
+    if (args.patch is None) == (not args.presets):
         args.parser.error(
             f"'{args.scene}' is a mesh: say which surface it has, --patch FILE (heights, recipe "
-            "or table)"
+            "or table) or --preset NAME"
         )
-    mesh, patch = readable_file(args.scene), readable_file(args.patch)
-    args.parameters += [("mesh", str(mesh.absolute())), ("patch", str(patch.absolute()))]
+    args.parameters.append(("mesh", str(readable_file(args.scene).absolute())))
+    if args.patch is not None:
+        args.parameters.append(("patch", str(readable_file(args.patch).absolute())))
+    else:
+        _change_look(args)
     args.scene = STUDIO
+
+
+def _change_look(args: argparse.Namespace) -> None:
+    """Put parameters of the surface behind the look that replaces the studio's surface."""
+    from ..plugin.surface_parameters import NAMES, REFLECTING
+
+    changes = [f",{name}={value}" for name, value in args.parameters if name in NAMES[REFLECTING]]
+    args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
+    args.presets = [args.presets[0] + "".join(changes), *args.presets[1:]]
 
 
 def _definitions(args: argparse.Namespace) -> dict[str, str]:

@@ -65,8 +65,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "--illuminant", metavar="LIGHT|CSV",
         help="light of --observer: ideal, the same number of quanta at all wavelengths; d55, sun; "
-        "d65, sun and sky; d75, sky in open shade; or a file of wavelengths (nm) and photons, e.g. "
-        "measured under leaves; default: ideal",
+        "d65, sun and sky; d75, sky in open shade; leaves, a model of shade under leaves; or a "
+        "file of wavelengths (nm) and photons; default: ideal",
     )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "

@@ -13,6 +13,7 @@ from .field import HeightField
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, read_heights, treat
 from .recipes import Recipe
+from .validity import UNRELIABLE
 
 
 def load(
@@ -92,7 +93,9 @@ def notes_line(
     options: LoadOptions,
     settings: TableSettings,
 ) -> str:
-    """Return a line on how many notes there are on a file, and the command that prints them.
+    """Return the number of notes on a file, and the command that prints them, in one line.
+
+    A warning that the colours are not reliable stands there in full.
 
     Parameters
     ----------
@@ -112,7 +115,8 @@ def notes_line(
         text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)
         words += [f"--{name.replace('_', '-')}", text]
     number = "1 note" if len(lines) == 1 else f"{len(lines)} notes"
-    return f"{number} on '{Path(path).name}': {shlex.join(words)}"
+    grave = "".join(f"{line}; " for line in lines if UNRELIABLE in line)
+    return f"{grave}{number} on '{Path(path).name}': {shlex.join(words)}"
 
 
 def treated(

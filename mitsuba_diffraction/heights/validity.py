@@ -24,6 +24,8 @@ SMALLEST_RANGE = 1e-5
 
 #: RMS slope of 84°, steeper than any surface that is a height field: nanometres taken for µm.
 IMPOSSIBLE_SLOPE = 10.0
+#: Words of the warning that no command shortens.
+UNRELIABLE = "do not rely on its colours"
 #: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
 #: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
@@ -67,7 +69,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
         )
     elif slope > STEEP_SLOPE:
         lines.append(
-            f"{field.name}: do not rely on its colours: RMS slope {slope:.2g} is above "
+            f"{field.name}: {UNRELIABLE}: RMS slope {slope:.2g} is above "
             f"{STEEP_SLOPE:g}, where they differ from rigorous solutions by more than 20 %, on "
             "steeper surfaces completely"
         )

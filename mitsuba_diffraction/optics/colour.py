@@ -83,6 +83,15 @@ def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(np.interp(lam, light.wavelengths, light.values))
 
 
+def leaf_green(wavelength: ArrayLike) -> NDArray[np.float64]:
+    """Reflectance of CIE 13.3's sample 14, leaf green, shape of λ; constant below 360 nm."""
+    from colour.quality import SDS_TCS
+
+    sample = SDS_TCS["CIE 1995"]["TCS14"]
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(np.interp(lam, sample.wavelengths, sample.values))
+
+
 def cone_fundamentals(wavelength: ArrayLike) -> NDArray[np.float64]:
     """Stockman and Sharpe's sensitivities of S, M and L to power, 2 degrees, (3, n) of λ (n,)."""
     import colour

@@ -11,6 +11,7 @@ diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weigh
 lifecycle       `PluginBSDF`, the base of all: answers, parameters and their changes, text
 nesting         `NestingBSDF`, a BSDF over a nested one
 arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
+presets         named looks: a patch with its material and layers, by name
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives

@@ -16,7 +16,7 @@ from . import arithmetic
 # Base classes first
 _MODULES = (
     "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric",
-    "orders.diffraction_orders", "orders.orders_sheet", "diffraction_mix",
+    "orders.diffraction_orders", "orders.orders_sheet", "diffraction_mix", "presets",
 )  # fmt: skip
 
 

@@ -217,6 +217,7 @@ class DiffractingSurface(NestingBSDF):
             placed["coherence"] = f"surface, {self.window_positions}"  # see textures.PLACED
         return {
             "table": self.table,
+            "wavelengths": "{:g} to {:g} nm".format(*self.table.wavelength_range),
             "coherence_width": self.table.width_text,
             **placed,
             "tolerance": f"{self.table.tolerance:g}",

@@ -7,24 +7,33 @@ command line puts on an id replaces the BSDF of that id, or that of the shape of
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
+from ..plugin.presets import MATERIALS, find_preset
+from ..plugin.presets import PLUGIN as PRESET_PLUGIN
+from ..plugin.surface_parameters import NAMES
 from ..tables.orders import OrderTable
-from .fitted_mesh import fitted_mesh
+from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .orientation.files import write_ply
 
 #: Shape that is put on the stage.
 FITTED = "fitted_mesh"
 #: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
 MATERIAL = "material:"
+#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+PRESET = "preset:"
+#: Scene parameter that limits samples, in units of white.
+CLAMP = "render:clamp"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
@@ -33,17 +42,33 @@ _CONDUCTORS = ("eta", "k")
 
 
 class SceneValues(NamedTuple):
-    """Values of a scene's parameters, and surfaces by the id that they are put on."""
+    """Values for a scene.
+
+    Attributes
+    ----------
+    parameters : of the scene's own parameters.
+    materials : surfaces by the id that they are put on.
+    surface : parameters of the BSDF, for all diffracting surfaces of the scene.
+    clamp : limit of samples in units of white, or None.
+    """
 
     parameters: dict[str, Any]
     materials: dict[str, str]
+    surface: dict[str, Any]
+    clamp: float | None
 
 
-def split_materials(values: Mapping[str, Any]) -> SceneValues:
-    """Separate parameters of a scene from surfaces for its ids."""
+def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
+    """Separate values of a scene's parameters from surfaces for its ids and their parameters.
+
+    known : names of the scene's parameters, which go before those of the BSDF.
+    """
     materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    parameters = {k: v for k, v in values.items() if not k.startswith(MATERIAL)}
-    return SceneValues(parameters, materials)
+    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k != CLAMP}
+    surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
+    clamp = float(values[CLAMP]) if CLAMP in values else None
+    own = {k: v for k, v in rest.items() if k not in surface}
+    return SceneValues(own, materials, surface, clamp)
 
 
 def fit_meshes(state: Any, folder: Path) -> None:
@@ -64,9 +89,32 @@ def fit_meshes(state: Any, folder: Path) -> None:
         mesh = fitted_mesh(file, fit=_boolean(props, "fit"), up=props.get("up", "auto"))
         written = folder / f"{number}.ply"
         write_ply(written, mesh)
-        ply = _copy(props, "ply", leave=("filename", "fit", "up"))
+        _frame(state, mesh.positions, props)
+        ply = _copy(props, "ply", leave=("filename", "fit", "up", "frame"))
         ply["filename"] = str(written)
         node.props = ply
+
+
+def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
+    """Move the scene's first camera until the mesh of a shape fills its picture."""
+    frame = str(shape.get("frame", FRAMES[0]))
+    if frame not in FRAMES:
+        raise DiffractionError(f"frame={frame!r} is unknown; choose one of {', '.join(FRAMES)}")
+    sensor = next((n for n in state.nodes if n.type == mi.ObjectType.Sensor), None)
+    if frame == FRAMES[0] or sensor is None:
+        return
+    matrix = np.array(shape["to_world"].matrix) if "to_world" in shape else np.eye(4)
+    placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
+    props = sensor.props
+    pose = np.array(props["to_world"].matrix)
+    film = next(state.nodes[n].props for n in _targets(sensor)
+                if state.nodes[n].type == mi.ObjectType.Film)  # fmt: skip
+    size = np.array([film.get("width", 768), film.get("height", 576)], float)
+    tangents = size / size.min() * np.tan(np.radians(float(props["fov"]) / 2))
+    seen = turned_around(placed) if frame == "turning" else placed
+    pose[:3, 3] = framing(seen, pose[:3, :3], (tangents[0], tangents[1]))
+    del props["to_world"]
+    props["to_world"] = mi.ScalarTransform4f(pose)
 
 
 def _boolean(props: Any, name: str) -> bool:
@@ -84,7 +132,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     a table of orders, or a dielectric that light goes through (`thin`) replaces it.
 
     state : `mi.parser.ParserState`.
-    materials : `FILE[,parameter=value…]` by id.
+    materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
 
     Raises a DiffractionError if an id is unknown; the text names those of the scene.
     """
@@ -94,6 +142,57 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
             _put_on_shape(state, number, text)
         else:
             _put_on_bsdf(state, number, text)
+
+
+def put_surface_parameters(state: Any, values: Mapping[str, Any]) -> None:
+    """Set parameters of the BSDF on all diffracting surfaces that have them.
+
+    state : `mi.parser.ParserState`.
+
+    Raises a DiffractionError if no surface has one of them.
+    """
+    for name, text in values.items():
+        value = _value(str(text))
+        surfaces = [node.props for node in state.nodes if name in _parameters_of(node)]
+        if not surfaces:
+            raise DiffractionError(
+                f"{name}={text} is a parameter of a diffracting surface, and the scene has none "
+                "that takes it; put one on an id with --material or --preset"
+            )
+        for props in surfaces:
+            for other in MATERIALS if name in MATERIALS else (name,):
+                if other in props:
+                    del props[other]
+            props[name] = value
+
+
+def _parameters_of(node: Any) -> tuple[str, ...]:
+    """Return the names of a surface's parameters; none of other nodes."""
+    plugin = node.props.plugin_name() if node.type == mi.ObjectType.BSDF else ""
+    if plugin == PRESET_PLUGIN:
+        plugin = find_preset(str(node.props["preset"])).plugin
+    return NAMES.get(plugin, ())
+
+
+def remove_dark_lights(state: Any) -> None:
+    """Remove emitters of daylight's spectrum at scale 0, which Mitsuba refuses.
+
+    state : `mi.parser.ParserState`, its references resolved.
+    """
+
+    def is_dark(number: int) -> bool:
+        props = state.nodes[number].props
+        return props.plugin_name() == "d65" and float(props.get("scale", 1.0)) == 0.0
+
+    dark = {
+        number for number, node in enumerate(state.nodes)
+        if node.type == mi.ObjectType.Emitter and any(map(is_dark, _targets(node)))
+    }  # fmt: skip
+    for node in state.nodes:
+        for name in list(node.props.keys()):
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference) and value.index() in dark:
+                del node.props[name]
 
 
 def put_box_filters(state: Any) -> None:
@@ -181,29 +280,44 @@ def _targets(node: Any) -> list[int]:
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
-    """Return the properties of a BSDF for `FILE[,parameter=value…]`.
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
 
-    The BSDF is `diffraction`, or `diffraction_orders` of a table of orders, or
-    `diffraction_dielectric` if the parameter `thin` is set. In place of another diffracting surface
-    it keeps the orientation of that one.
+    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
+    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    another diffracting surface it keeps that surface's orientation and what lies beneath that one.
     """
     file, *parameters = _COMMA.split(text)
     pairs = [parameter.partition("=")[::2] for parameter in parameters]
-    values = {name.strip(): _value(value.strip()) for name, value in pairs}
-    names, solved = list(values), kind_of(file) is FileKind.ORDERS
-    plugin = TRANSMITTING if "thin" in names else REFLECTING
-    props = mi.Properties(ORDERS if solved else plugin)
-    props["table" if solved else "heightfield"] = str(Path(file).absolute())
+    values: dict[str, Any] = {name.strip(): _value(value.strip()) for name, value in pairs}
+    named = file.startswith(PRESET)
+    if named:
+        values = find_preset(file.removeprefix(PRESET)).changed(values)
+        plugin = values.pop("type")
+    else:
+        solved = kind_of(file) is FileKind.ORDERS
+        plugin = ORDERS if solved else TRANSMITTING if "thin" in values else REFLECTING
+        values["table" if solved else "heightfield"] = str(Path(file).absolute())
+    names = list(values)
+    props = mi.Properties(plugin)
     for name, value in values.items():
         props[name] = value
-    if beneath is not None and "orientation" not in names:
-        old = state.nodes[beneath].props
-        if old.plugin_name().startswith("diffraction") and "orientation" in old:
-            props["orientation"] = old["orientation"]
-    opaque = solved or plugin == TRANSMITTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = named or plugin != REFLECTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
     opaque = opaque or not lets_light_through(values.get("material", "keratin"))
-    if beneath is not None and not opaque:
-        props["beneath"] = mi.Properties.ResolvedReference(beneath)
+    if beneath is None:
+        return props
+    old = state.nodes[beneath].props
+    if not old.plugin_name().startswith("diffraction"):
+        if not opaque:
+            props["beneath"] = mi.Properties.ResolvedReference(beneath)
+        return props
+    if "orientation" in old and "orientation" not in names:
+        props["orientation"] = old["orientation"]
+    if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
+        if "pigment" in old:
+            props["pigment"] = old["pigment"]
+        for target in _targets(state.nodes[beneath]):
+            if state.nodes[target].type == mi.ObjectType.BSDF:
+                props["beneath"] = mi.Properties.ResolvedReference(target)
     return props
 
 

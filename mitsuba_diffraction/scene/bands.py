@@ -1,16 +1,20 @@
-"""Scenes in the light of an eye: a film with a band for each receptor, and tables that cover it."""
+"""Films with a band for each receptor of an eye; tables that cover them, or a warning."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, warn
 from ..plugin.description import describe
 from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest
+from ..tables.orders import OrderTable
 from ..tables.table import DiffractionTable
 
 # Parameters of a film that its size and format follow from.
@@ -18,6 +22,11 @@ _KEPT = (
     "width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y",
     "sample_border",
 )  # fmt: skip
+
+#: Kind and wavelengths of a table, as `to_string` of the plugins shows them.
+_SERVED = re.compile(r"\btable = (\w+).*\s+wavelengths = (\S+) to (\S+) nm")
+#: Wavelengths, nm, by which a film may exceed a table without a warning: rounding of both.
+_MARGIN = 0.5
 
 
 class Bands(NamedTuple):
@@ -106,3 +115,40 @@ def _plugins() -> dict[str, Callable[..., Any]]:
     from ..plugin.transmission.diffraction_dielectric import DiffractionDielectric
 
     return {"diffraction": Diffraction, "diffraction_dielectric": DiffractionDielectric}
+
+
+def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> None:
+    """Warn of each surface that is black at wavelengths that a camera records.
+
+    Colours need no warning: tables that miss visible light are refused or named when they load.
+
+    sensors : cameras of the scene; surfaces : BSDFs that diffract, by the names of their shapes.
+    """
+    ranges = [_recorded(sensor) for sensor in sensors if _has_bands(sensor)]
+    if not ranges:
+        return
+    first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
+    for name, bsdf in surfaces.items():
+        for kind, low, high in dict.fromkeys(_SERVED.findall(str(bsdf))):
+            least, most = min(first, float(low)), max(last, float(high))
+            if least < float(low) - _MARGIN or most > float(high) + _MARGIN:
+                wider = f"DiffractionTable.build(wavelength_range=({least:.4g}, {most:.4g}))"
+                if kind == OrderTable.__name__:
+                    wider = "a wider range of wavelengths"
+                warn(
+                    f"{name} is black outside {low} to {high} nm, the range of its table, and the "
+                    f"camera records {first:.4g} to {last:.4g} nm; make the table with {wider}"
+                )
+
+
+def _has_bands(sensor: Any) -> bool:
+    """Whether a sensor's film has responses of its own, which spectral variants alone use."""
+    return mi.is_spectral and sensor.film().sensor_response_function() is not None
+
+
+def _recorded(sensor: Any) -> tuple[float, float]:
+    """Return the shortest and the longest wavelength that a sensor records, nm."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    # the ends of the unit interval are the ends of the response
+    ends = [np.array(sensor.sample_wavelengths(si, at)[0]) for at in (0.0, 1.0 - 1e-6)]
+    return float(np.min(ends)), float(np.max(ends))

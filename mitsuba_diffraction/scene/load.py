@@ -23,9 +23,10 @@ from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from ..system import memory
-from .parameters import check_parameters, refuse_pipes
+from .parameters import check_parameters, parameters_of, refuse_pipes
 
 if TYPE_CHECKING:
+    from .additions import SceneValues
     from .bands import Bands
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
@@ -101,19 +102,19 @@ def load_scene(
     """
     import mitsuba as mi
 
-    from .additions import split_materials
-    from .bands import WiderTables
+    from .additions import split_values
+    from .bands import WiderTables, warn_of_dark_bands
 
     readable_file(file)
-    parameters, materials = split_materials(parameters)
-    refuse_pipes(file, parameters)
-    check_parameters(file, parameters)
+    values = split_values(parameters, parameters_of(file, parameters) or ())
+    refuse_pipes(file, values.parameters)
+    check_parameters(file, values.parameters)
     for name in _TAKEN:
-        if name in parameters:
+        if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         with contextlib.nullcontext() if bands is None else WiderTables(bands.first):
-            scene = _instantiated(file, parameters, materials, box_filter, bands)
+            scene = _instantiated(file, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -127,18 +128,24 @@ def load_scene(
     for number, shape in surfaces.items():
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
+    named = {name_of(shape, number): shape.bsdf() for number, shape in surfaces.items()}
+    warn_of_dark_bands(scene.sensors(), named)
     return scene
 
 
-def _instantiated(
-    file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool,
-    bands: Bands | None,
-) -> Any:  # fmt: skip
+def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Bands | None) -> Any:
     """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects."""
     import mitsuba as mi
 
-    from .additions import fit_meshes, put_box_filters, put_materials
+    from .additions import (
+        fit_meshes,
+        put_box_filters,
+        put_materials,
+        put_surface_parameters,
+        remove_dark_lights,
+    )
     from .bands import put_bands
+    from .clamping import put_clamp
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -150,11 +157,15 @@ def _instantiated(
     mi.set_file_resolver(resolver)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            state = mi.parser.parse_file(config, str(file), **parameters)
+            state = mi.parser.parse_file(config, str(file), **values.parameters)
             _check_films(state)
             fit_meshes(state, Path(folder))
-            put_materials(state, materials)
+            put_materials(state, values.materials)
+            put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
+            remove_dark_lights(state)
+            if values.clamp is not None:
+                put_clamp(state, values.clamp)
             if box_filter:
                 put_box_filters(state)
             if bands is not None:

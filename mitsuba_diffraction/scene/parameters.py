@@ -14,8 +14,6 @@ from pathlib import Path
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
-from ..heights.recipes import LOAD_KEYS
-from ..settings import RECIPE_SETTINGS
 
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
@@ -45,10 +43,7 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
         )
         close = difflib.get_close_matches(name, known, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
-        if name in (*LOAD_KEYS, *RECIPE_SETTINGS) and "patch" in known:
-            hint = f"; or build a table with DiffractionTable.build({name}={values[name]}) first, "
-            hint += "and give patch=TABLE.exr"
-        elif name == "patch":
+        if name == "patch":
             hint = "; put heights on the id of a BSDF or shape: material:ID=FILE,material=Al"
         raise DiffractionError(
             f"'{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"

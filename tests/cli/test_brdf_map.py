@@ -170,3 +170,15 @@ def test_the_source_is_not_overwritten(run, heights):
 
 def test_a_missing_source_is_named(run):
     assert "nothing.png" in run("brdf-map", "nothing.png").failed_in_one_line()
+
+
+def test_a_preset_stands_in_for_the_source(run, heights, here):
+    ran = run(
+        "brdf-map", "--preset", "dvd", "--resolution", "32", "--step", "47", "--json", "a.json"
+    )
+    assert ran.code == 0, ran.err
+    assert sorted(os.listdir(here)) == ["a.json", "dvd-map.exr", "dvd-map.png"]
+    both = run("brdf-map", heights, "--preset", "dvd")
+    assert both.code == 2
+    assert "SOURCE or --preset" in both.err
+    assert "did you mean dvd" in run("brdf-map", "--preset", "dvdd").failed_in_one_line()

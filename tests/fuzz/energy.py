@@ -18,7 +18,8 @@ _SAMPLES, _DIRECTIONS, _VALUES = 1 << 13, 3, 256
 #: Least angle (degrees) beyond which R + T may exceed 1 by the second share, not the first; and the
 #: standard errors of its mean that are added.
 _GRAZING, _EXCESS, _ERRORS = 85.0, (0.01, 0.05), 5.0
-_HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0)
+#: Reflectances of the BSDF beneath, which Mitsuba accepts.
+_HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
 
 
 def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any]:
@@ -80,9 +81,15 @@ def check(rng: np.random.Generator) -> None:
         mean, error = _sent_on(bsdf, wi, rng)
         where = f"{asked}: from {theta:.2f}°"
         assert np.isfinite(mean).all(), f"{where} {mean}"
-        most = 1.0 + _EXCESS[int(grazing)] + _ERRORS * error
+        most = _albedo_beneath(asked) * (1.0 + _EXCESS[int(grazing)]) + _ERRORS * error
         assert np.all(mean <= most), f"{where} {np.max(mean - _ERRORS * error):.4f} at least"
         _check_values(bsdf, wi, rng, where)
+
+
+def _albedo_beneath(asked: dict[str, Any]) -> float:
+    """Return the albedo of the BSDF beneath, at least 1."""
+    value = asked["beneath"]["reflectance"]["value"] if "beneath" in asked else 1.0
+    return max(1.0, value)  # 1 for NaN
 
 
 def _sent_on(bsdf: Any, wi: Any, rng: np.random.Generator) -> tuple[Any, Any]:

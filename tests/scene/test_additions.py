@@ -91,3 +91,30 @@ def test_light_goes_through_a_sheet_that_replaces_a_material(surface, thin):
     flags = loaded.shapes()[0].bsdf().flags()
     assert mi.has_flag(flags, mi.BSDFFlags.Transmission)
     assert not mi.has_flag(flags, mi.BSDFFlags.Diffuse)
+
+
+def test_a_look_is_put_on_an_id(surface):
+    scene = load_scene(surface / "scene.xml", {"material:mat-Skin": "preset:dvd,orientation=20"})
+    text = str(scene.shapes()[0].bsdf())
+    assert text.startswith("TwoSided[")
+    assert "DiffractionOrders[" in text
+    assert "orientation = 20" in text
+    with pytest.raises(DiffractionError, match="did you mean dvd"):
+        load_scene(surface / "scene.xml", {"material:mat-Skin": "preset:dvdd"})
+
+
+@pytest.mark.parametrize("old", ["material=Al", "pigment=0.25"])
+def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surface, old):
+    name, value = old.split("=")
+    xml = f"""<scene version="3.0.0"><bsdf type="diffraction" id="skin">
+        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
+        <boolean name="energy_conserving" value="false"/><string name="{name}" value="{value}"/>
+    </bsdf><shape type="disk"><ref id="skin"/></shape></scene>"""
+    (surface / "scene.xml").write_text(xml)
+    text = bsdfs(surface, {"skin": SETTINGS + ",int_ior=1.6"}).popitem()[1]
+    assert text.count("Diffraction[") == text.count(
+        "brdf["
+    )  # a metal beneath would look like chrome
+    assert ("SmoothDiffuse" in text) == (name == "pigment")
+    assert "material = Al" not in text

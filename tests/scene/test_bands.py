@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import mitsuba as mi
 import numpy as np
@@ -12,6 +13,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.scene.bands import Bands
 from mitsuba_diffraction.scene.load import load_scene
 from tests.support.directions import polar, rough_patch
+from tests.support.orders import thin_grating
 
 pytestmark = pytest.mark.thorough
 
@@ -97,3 +99,71 @@ def test_tables_that_begin_at_longer_wavelengths_are_refused(scene, tmp_path):
     with pytest.raises(md.DiffractionError, match="begins at 360 nm"):
         load_scene(file, {}, bands=Bands([300.0, 350.0, 400.0], {"u": [0.0, 1.0, 0.0]}))
     load_scene(file, {}, bands=Bands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
+
+
+#: A film's bands, nm, and whether each lies within the table's 360 to 830 nm.
+RANGES = {
+    "ultraviolet": {(200.0, 350.0): False},
+    "infrared": {(850.0, 1500.0): False},
+    "both and blue": {(200.0, 350.0): False, (400.0, 500.0): True, (850.0, 1500.0): False},
+    "visible": {(360.0, 500.0): True, (500.0, 830.0): True},
+}
+
+
+def _banded(file, spans, second=""):
+    """Put a film of bands into the scene, light at all wavelengths, and a second surface."""
+    bands = "".join(
+        f'<spectrum name="b{n}" value="{a}:1, {b}:1"/>' for n, (a, b) in enumerate(spans)
+    )
+    text = file.read_text().replace('type="hdrfilm">', f'type="specfilm">{bands}')
+    text = text.replace("300:1, 830:1", "200:1, 1500:1")
+    file.write_text(text.replace("<emitter", f"{second}<emitter"))
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
+@pytest.mark.parametrize("spans", RANGES.values(), ids=RANGES)
+def test_bands_outside_the_table_are_black_with_a_warning_for_each_surface(scene, variant, spans):
+    mi.set_variant(variant)
+    _, file = scene
+    text = file.read_text()
+    shape = text[text.index("<shape") : text.index("</shape>")]
+    # equal surfaces would be merged
+    turned = '<float name="orientation" value="30"/></bsdf>'
+    far = '<transform name="to_world"><translate z="-9"/></transform></shape>'
+    _banded(file, spans, shape.replace("</bsdf>", turned) + far)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", md.DiffractionWarning)
+        loaded = load_scene(file, {})
+    lines = [str(w.message) for w in caught if "is black outside" in str(w.message)]
+    assert len(lines) == (0 if all(spans.values()) else 2)
+    first, last = min(a for a, _ in spans), max(b for _, b in spans)
+    for number, line in enumerate(lines, start=1):
+        assert line.startswith(f"shape {number} (a rectangle without id) is black outside 360 to")
+        assert f"records {first:g} to {last:g} nm; make the table with Diffr" in line
+    picture = np.array(mi.render(loaded, spp=64)).reshape(16, len(spans))
+    assert np.isfinite(picture).all()
+    assert ((picture > 0.0).any(axis=0) == list(spans.values())).all()
+
+
+def test_solved_orders_are_named_with_their_own_range(scene, tmp_path):
+    mi.set_variant("llvm_ad_spectral")
+    _, file = scene
+    thin_grating().save(tmp_path / "orders.nc")
+    text = file.read_text()
+    first, last = text.index("<bsdf"), text.index("</bsdf>")
+    orders = '<bsdf type="diffraction_orders"><string name="table" value="orders.nc"/>'
+    file.write_text(text[:first] + orders + text[last:])
+    _banded(file, [(200.0, 600.0)])
+    line = r"black outside [\d.]+ to [\d.]+ nm, .* make the table with a wider range of wave"
+    with pytest.warns(md.DiffractionWarning, match=line):
+        load_scene(file, {})
+
+
+@pytest.mark.parametrize("wavelength", [200.0, 1500.0])
+def test_mono_variants_refuse_wavelengths_outside_the_table(scene, wavelength):
+    mi.set_variant("llvm_ad_mono")
+    _, file = scene
+    lit = f'<float name="wavelength" value="{wavelength}"/></bsdf>'
+    file.write_text(file.read_text().replace("</bsdf>", lit))
+    with pytest.raises(md.DiffractionError, match="outside the table's 360 to 830 nm"):
+        load_scene(file, {})

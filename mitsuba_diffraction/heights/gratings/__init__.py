@@ -7,12 +7,23 @@ scales   look-alikes of snake scales
 fingers  positions and shape of a scale's fingers
 noise    periodic random fields
 discs    tracks of CDs and DVDs
+brushed  random lines of brushed and ground metal
 """
 
 from __future__ import annotations
 
+from .brushed import brushed
 from .discs import cd, dvd
 from .ideal import blazed, lamellar, sinusoidal
 from .scales import elaphe_like, xenopeltis_like
 
-__all__ = ["blazed", "cd", "dvd", "elaphe_like", "lamellar", "sinusoidal", "xenopeltis_like"]
+__all__ = [
+    "blazed",
+    "brushed",
+    "cd",
+    "dvd",
+    "elaphe_like",
+    "lamellar",
+    "sinusoidal",
+    "xenopeltis_like",
+]

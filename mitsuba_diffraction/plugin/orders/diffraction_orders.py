@@ -178,6 +178,7 @@ class DiffractionOrders(NestingBSDF):
         """See `PluginBSDF.shown`."""
         shown: dict[str, Any] = {
             "table": self.table,
+            "wavelengths": "{:.1f} to {:.1f} nm".format(*self.table.reach),
             "coherence_width": f"{self.coherence_width:g} µm",
             "orientation": self.orientation,
         }

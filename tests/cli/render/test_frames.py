@@ -219,7 +219,7 @@ def test_a_preview_is_half_as_wide_and_quick(render):
 def test_unusable_options_are_usage_errors(render, options, said):
     ran = render(*options)
     assert ran.code == 2
-    assert ran.err.startswith("usage: ")
+    assert ran.err.startswith("mitsuba-diffraction render: error: ")
     assert said in ran.err
 
 

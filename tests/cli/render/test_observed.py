@@ -36,6 +36,9 @@ def test_the_exr_has_a_channel_for_each_receptor_and_the_png_a_legend(run, scene
         (["--observer", "dog", "--denoise"], 2, "one picture in one process"),
         (["--observer", "dog", "-o", "a.png"], 2, "writes an EXR"),
         (["--observer", "dog", "-m", "llvm_ad_rgb"], 1, "spectral"),
+        (["--observer", "avian"], 1, "did you mean avian_v or avian_uv?)"),
+        (["--observer", "dog", "--illuminant", "leafs"], 1, "did you mean leaves?)"),
+        (["--illuminant", "leaves"], 2, "--observer; name one"),
     ],
 )
 def test_eyes_that_cannot_be_rendered_are_one_line(run, scene, arguments, code, named):

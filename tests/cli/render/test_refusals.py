@@ -93,7 +93,7 @@ def test_a_folder_is_no_scene(run, scene):
 def test_unusable_options_are_usage_errors(run, scene, arguments):
     ran = run("render", scene, *QUICK, *arguments)
     assert ran.code == 2
-    assert ran.err.startswith("usage: ")
+    assert ran.err.startswith("mitsuba-diffraction render: error: ")
 
 
 def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatch):

@@ -40,19 +40,19 @@ def _surfaces(measured: Measurements) -> str:
     header = ["surface", "cases", *(f"{name}, 60°" for name in names), "0°", "30°"]
     return f"""# How far the model holds
 
-This page compares the model with rigorous solutions of Maxwell's equations, closed forms and
-statistics. `make validation` computes every number on it.
+This page compares the model with rigorous solutions, closed forms and statistics. `make validation`
+computes every number on it.
 
-- Gentle surfaces are accurate: up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than
+- Gentle surfaces: up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than
   {percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in light up to
   {STEEPEST_LIGHT:g}° from the normal. The package warns beyond both slopes.
-- Vertical walls are less accurate at any depth, most of all on metals and in oblique light.
+- Vertical walls deviate more at any depth, most of all on metals and in oblique light.
   [Solved orders](validation/orders.md) have no such error, on grooves that repeat along a line.
-- The default, `model="small_slope"`, is better than `model="kirchhoff"`, most of all in oblique
+- `model="small_slope"`, the default, is better than `model="kirchhoff"`, most of all in oblique
   light and in polarised light.
 - `second_order=true` removes most of the error of dielectric discs in oblique light, and a tenth of
-  that of scales. By default a table applies it if its colours change by 5 % or more, as those of
-  discs do and those of scales do not ([theory.md](theory.md#the-second-order)).
+  that of scales. `auto`, the default, applies it where it changes colours by 5 % or more
+  ([theory.md](theory.md#the-second-order)).
 
 ## Deviation by surface
 
@@ -202,10 +202,10 @@ has transmitted orders, and the sum of reflected and transmitted light of severa
 def _numerics() -> str:
     return """## Numerical errors
 
-They are far below the errors above. Order powers of ideal gratings agree with closed forms to 5e-6
-in `md.reference.brdf` and to 1e-5 in tables ([numerics.md](validation/numerics.md)). The rigorous
-solutions change by less than 5e-3 of the incident light in their last refinement, most of them by
-1e-5, and two independent solvers agree ([solutions.md](validation/solutions.md))."""
+Order powers of ideal gratings agree with closed forms to 5e-6 in `md.reference.brdf` and to 1e-5 in
+tables ([numerics.md](validation/numerics.md)). The rigorous solutions change by less than 5e-3 of
+the incident light in their last refinement, most by 1e-5, and two independent solvers agree
+([solutions.md](validation/solutions.md))."""
 
 
 def _tables() -> str:

@@ -39,15 +39,13 @@ Light falls across the grooves. Keratin has the index 1.56. Angles are measured 
 def _bands(measured: Measurements) -> str:
     return f"""## By depth and profile
 
-Mean over the gratings of each range of depth/period, as Kirchhoff / small slope / blend. The blend
-equals small slope on gentle gratings and Kirchhoff on deep ones; in between it is close to the
-better of the two.
+Mean over the gratings, as Kirchhoff / small slope / blend. The blend equals small slope on gentle
+gratings and Kirchhoff on deep ones.
 
 {_groups(measured.by_model)}
 
-In unpolarised light the errors of the two polarisations have opposite signs, most of all on metals,
-and partly cancel. For one polarisation at a time, as Kirchhoff / blend (TE: the electric field
-along the grooves; the second order multiplies both polarisations by the same factor):
+In unpolarised light the errors of the two polarisations partly cancel, most of all on metals. For
+one polarisation, as Kirchhoff / blend (TE: the electric field along the grooves):
 
 {_polarised_groups(measured.by_model)}"""
 
@@ -128,17 +126,15 @@ def _slopes(measured: Measurements) -> str:
     gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
     return f"""## Sinusoids by slope
 
-The deviation of sinusoids grows with the RMS slope. At equal slope it is larger for narrow periods
-and in oblique light. Period/depth, Kirchhoff / blend:
+The deviation grows with the RMS slope, for narrow periods and in oblique light. Period/depth,
+Kirchhoff / blend:
 
 {table(header, rows)}
 
-The package's warnings follow from this table. A limit is the largest slope below that of the first
-sinusoid, of either material, whose colours deviate by more than {percent(GENTLE_ERROR)} or
-{percent(STEEP_ERROR)} in light up to {STEEPEST_LIGHT:g}° from the normal. The limits are
-{gentle:.3f} and {steep:.3f}; the warnings begin at {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Beyond
-{STEEPEST_LIGHT:g}° the deviation is larger at any slope. The RMS slope of steps that are a pixel
-wide depends on the pixel, so it says little about blazed and lamellar gratings."""
+The package warns beyond {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Up to {gentle:.3f} and {steep:.3f}
+no sinusoid of either material exceeds {percent(GENTLE_ERROR)} and {percent(STEEP_ERROR)}
+in light up to {STEEPEST_LIGHT:g}° from the normal. The RMS slope of steps depends on the pixel, so
+it says little about blazed and lamellar gratings."""
 
 
 def _edges(measured: Measurements) -> str:
@@ -178,15 +174,14 @@ def _aluminium(measured: Measurements) -> str:
 
 Of {len(against.every)} gratings and angles the blend is better in {len(against.better)}, at best by
 {max(gains):.1f} points, and worse in {len(against.worse)}, at most by {-min(gains):.2f} points.
-Differences that are smaller than the last refinement of the solver (*change*) count as neither. The
-table lists the ranges of depth/period that are worse on average, then the gratings that are worse.
+Differences below the last refinement of the solver (*change*) do not count. Ranges of depth/period
+that are worse on average, then gratings:
 
 {table(header, rows)}
 
-*Best share* is the share of small slope, equal for all orders, with the least deviation. *Bound* is
-the deviation if every order had its own best share; no blend is below it. Where the best share is
-0, Kirchhoff's errors cancel: both matrices lack light that is
-[diffracted twice](second_order.md), and Kirchhoff's is the brighter one."""
+*Best share* is the share of small slope, equal for all orders, with the least deviation; *bound* is
+the deviation if every order had its own. Where the best share is 0, Kirchhoff's errors cancel: both
+matrices lack light that is [diffracted twice](second_order.md), and Kirchhoff's is brighter."""
 
 
 def _side_by_side(

@@ -58,17 +58,17 @@ def _random_surfaces(measured: Measurements) -> str:
     lobes.append(["mean of patches", *_distances(offsets.patches.distance(offsets.ensemble))])
     return f"""## Random surfaces
 
-Seeded Gaussian heights with the autocorrelation rms²·exp(−r²/T²). Left: mean power of order 0; the
-closed form is exp(−(κ·rms)²) plus the light that is scattered into the same bin. Middle: scattered
-lobe of `md.reference.brdf`, beside Beckmann and Spizzichino's series (lines). Right: `patch`,
-averaged over windows at {offsets.count} random places of one surface, over `ensemble`.
+Gaussian heights with the autocorrelation rms²·exp(−r²/T²). Left: mean power of order 0; the closed
+form is exp(−(κ·rms)²) plus scattered light in the same bin. Middle: scattered lobe of
+`md.reference.brdf` and Beckmann and Spizzichino's series (lines). Right: `patch`, averaged over
+windows at {offsets.count} random places of one surface, over `ensemble`.
 
 ![Specular loss, scattered lobes, and the mean of patches](../images/validation_statistics.png)
 
 {table(["κ·rms", f"mean of {specular.surfaces} surfaces", "exact", "in standard errors"], rows)}
 
-Distances in standard errors over the directions of the picture: of scattered lobes from the closed
-form, and of the mean of patches from the ensemble. The expected root-mean-square is 1.
+Distances of scattered lobes from the closed form, and of the mean of patches from the ensemble, in
+standard errors; the expected root-mean-square is 1.
 
 {table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
 

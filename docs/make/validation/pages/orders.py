@@ -28,20 +28,17 @@ def write(measured: Measurements) -> str:
     header = ["table", "light", "colours", "absorbed", "bias", "mean", "95 %", "largest"]
     return f"""# Solved orders
 
-The shipped tables of `diffraction_orders` and the default model, beside solutions that did not make
-the tables ([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` are lamellar, and lie
-under polycarbonate.
+The shipped tables of `diffraction_orders` and the default model, beside independent solutions
+([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` are lamellar, under polycarbonate.
 
 {_deviations(measured)}
 
 θ and φ are the light's in air, φ from the direction across the grooves. Wavelengths are
-{", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. The deviation of *colours* is that of all
-orders but 0 that leave within 75°, as a share of their light ([validation.md](../validation.md)).
-*Sum* is the largest deviation of the sum over all orders, which is 1 less the absorption.
+{", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. [Colours](../validation.md) are all orders
+but 0 within 75°; *sum* is the largest deviation of the sum over all orders.
 
-The tables come from a boundary integral method. The solver beside `cd` and `dvd` is coupled waves
-in layers, and beside `blazed` and `sinusoidal` Chandezon's method, which uses coordinates that
-follow the grooves. Neither shares code or equations with the integral method.
+The tables come from a boundary integral method. The other solvers, which share no code or equations
+with it, are coupled waves (`cd`, `dvd`) and Chandezon's method (`blazed`, `sinusoidal`).
 
 ## Side by side
 
@@ -51,23 +48,22 @@ Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpo
 
 ## Interpolation
 
-The tables beside their own solver, at random directions of diffuse light and wavelengths
-({measured.diffuse_samples} of them). *Absorbed* is the share of light that no order has, and *bias*
-the deviation of that mean, as a share of it. The last three columns are the deviation of the
-absorbed share, as a share of the incident light.
+The tables beside their own solver, at {measured.diffuse_samples}
+random directions of diffuse light and wavelengths.
+*Absorbed* is the share of light that no order has, and *bias* the relative deviation
+of its mean; then the deviation of the absorbed share, as a share of the incident light.
 
 {table(header, diffuse)}
 
 The largest deviations lie beside surface plasmons, which are narrower than the distance of nodes.
-
-The tables' own figures, of colours in all light within the layer:
+Errors that the tables state, of colours in all light within the layer:
 
 {table(["table", "profile", "error, mean", "error, 95 %", "reciprocity"], facts)}
 
 ## Published efficiencies
 
-The solvers beside numbers that others printed: s and p across the grooves, u unpolarised. The
-tolerance is the rounding of the printed digits, or the error of the printed method.
+Numbers in print: s and p across the grooves, u unpolarised. The tolerance is the rounding of the
+printed digits, or the error of the printed method.
 
 {_published(measured.published)}
 

@@ -17,9 +17,9 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# The second order of small slope
 
-`second_order=true` multiplies each order of a dielectric by a factor: the part of the second order
-(Voronovich 1994) that a table of powers can hold. This page compares the factor with the exact
-second order, and both with rigorous solutions. [theory.md](../theory.md) has the equations.
+`second_order=true` multiplies each order of a dielectric by the part of the second order
+(Voronovich 1994) that a table of powers can hold. Below, the factor and the exact second order
+beside rigorous solutions; [theory.md](../theory.md#the-second-order) has the equations.
 
 {_exact(measured)}
 
@@ -37,18 +37,16 @@ def _exact(measured: Measurements) -> str:
     header = ["surface", "cases", *names, *(f"light, {name}" for name in names)]
     return f"""## The exact second order
 
-Small slope alone, without the blend, and the sum over all intermediate waves by brute force
-(docs/make/validation/second_order.py). Deviation of colours, mean and worst of the cases; *light*
-is all reflected light over the rigorous. *Times the mean* is the first order times the mean of the
-second order over Gaussian heights of the same spectrum. Gratings have a depth/period up to
-{DEEPEST:g}.
+Small slope without the blend, summed over all intermediate waves
+(docs/make/validation/second_order.py). Deviation of colours, mean and worst; *light* is all
+reflected light over the rigorous. *Times the mean* is the first order times the mean second order
+of Gaussian heights of the same spectrum. Gratings have a depth/period up to {DEEPEST:g}.
 
 {table(header, _rows(cases, MODELS, MODELS))}
 
-Most of the first order's error on scales and on a CD is the second order. A power spectrum does not
-tell hills from pits, so the mean corrects the total light on gentle walls but not the colours. The
-exact sum depends on every pair of directions, which
-no table of powers holds. On vertical walls the sums depend on where they are truncated."""
+Most of the first order's error on scales and on a CD is the second order. The mean corrects the
+total light on gentle walls but not the colours. The exact sum depends on every pair of directions,
+which no table of powers holds; on vertical walls it depends on where it is truncated."""
 
 
 def _factor(measured: Measurements) -> str:
@@ -58,18 +56,15 @@ def _factor(measured: Measurements) -> str:
     header = ["surface", "cases", *second_order_factor.MODELS, *(f"light, {name}" for name in lit)]
     return f"""## The factor of `second_order=true`
 
-The factor has two coefficients of directions and index, and two ratios of spectra of the heights.
-Gratings have the ratios of each order. Cuts have the ratios of the patch around
-them, 20 to 65 µm wide, in cells of many orders, as in tables of scans; *own orders* uses each order
-of the cut itself. Deviation of colours on keratin, mean and worst of the cases, blend included.
+The factor has two coefficients of directions and index, and two ratios of spectra of the heights,
+of each order on gratings. Cuts use the ratios of the patch around them, 20 to 65 µm wide; *own
+orders* uses each order of the cut. Deviation of colours on keratin, mean and worst, blend included.
 
 {table(header, _rows(cases, second_order_factor.MODELS, lit))}
 
 On a CD in oblique light the factor removes most of the error, because all its pits are alike. On
-scales it removes a quarter with each order's own ratios and a tenth with the patch's. The factor
-leaves out evanescent intermediate waves. At normal incidence its coefficients are attenuated:
-without that four sinusoids were worse than with Kirchhoff. Metals have no factor: surface plasmons
-are a pole that it cannot represent."""
+scales it removes a quarter with each order's own ratios and a tenth with the patch's. It leaves out
+evanescent intermediate waves. Metals have no factor: it cannot represent surface plasmons."""
 
 
 def _gratings(measured: Measurements) -> str:
@@ -113,8 +108,7 @@ by more than the solver's last refinement changed and a tenth of a point:
 
 {table(["", "light from", *names], harmed)}
 
-An order of a sinusoid has only two intermediate waves. The factor is fitted to all travelling waves
-of a plane and misses those two. On steep sinusoids the second order itself is not enough."""
+The factor is fitted to all travelling waves of a plane; an order of a sinusoid has two."""
 
 
 def _rows(cases: Sequence[Case], names: Sequence[str], lit: Sequence[str]) -> list[list[str]]:

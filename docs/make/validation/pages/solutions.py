@@ -34,13 +34,11 @@ $$
 
 because $d\omega_o = d\alpha \, d\beta / (k^2 \cos\theta_o)$ and
 $\iint e^{-\sigma^2 |q - q_m|^2} d\alpha \, d\beta = \pi/\sigma^2$. N is the mean power of the Jones
-matrix ([theory.md](../theory.md)). In the comparisons $\eta_m$ is the value of
-`md.reference.brdf` at the centre of the lobe times $\pi/(\sigma k)^2$: the model before energy is
-conserved.
+matrix ([theory.md](../theory.md)). Comparisons have $\eta_m$ from `md.reference.brdf` at the
+centre of the lobe, before energy is conserved.
 
-The solutions are stored in docs/make/validation/data, with the solver and the settings that made
-them. `python -m docs.make.validation solve`, `patches`, `coated` and `films` compute them again;
-this requires the extra `validation`."""
+`python -m docs.make.validation solve`, `patches`, `coated` and `films` (extra `validation`) compute
+the solutions, stored in docs/make/validation/data with solver and settings."""
 
 
 def _gratings() -> str:
@@ -69,10 +67,10 @@ Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} 
 {shipped("perfect").about["solver"]}.
 
 Each grating was solved on two meshes, the second twice as fine (1.4 times where light in the metal
-is short). Where the second changed an order by more than {CONVERGED:g}, a third mesh was twice as
-fine again. *Change* is the last change of an efficiency (absolute). *Energy missed* is how far the
-orders and the absorption are from adding up to 1. Solutions with an order that still changed by
-more than {CONVERGED:g} are left out.
+is short), with a third where an order changed by more than {CONVERGED:g}.
+*Change* is the last change of an efficiency.
+*Energy missed* is the deviation of orders and absorption from 1. Solutions with an
+order that still changed by more than {CONVERGED:g} are left out.
 
 {table(header, rows)}
 

@@ -28,12 +28,11 @@ are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's
 
 ## Unpolarised light
 
-Mean over the planes of incidence (along x, along y, between), as Kirchhoff / small slope alone /
-`second_order=false` / `second_order=true`. *Change* is the largest change of the solution by more
-harmonics, in the same measure.
+Mean over the planes of incidence, as Kirchhoff / small slope alone / `second_order=false` /
+`second_order=true`. *Change* is the largest change of the solution by more harmonics.
 
-The second order takes its slope ratios from what a table would hold: from each order on gratings,
-and on cuts from the whole patch, 20 to 65 µm wide. Metals have no second order.
+Slope ratios are those of a table: of each order on gratings, of the whole patch, 20 to 65 µm wide,
+on cuts. Metals have no second order.
 
 {table(header, list(_unpolarised(cells)))}
 

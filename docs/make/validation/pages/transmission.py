@@ -54,8 +54,7 @@ within {GRAZING:g}° of the normal, as Kirchhoff / `small_slope`:
 {table(header, rows)}
 
 At slopes up to 0.1 `small_slope` is within {percent(normal)} in light along the normal, and within
-{percent(worst)} up to 75°. Energy is conserved by order 0 alone, so `energy_conserving` does not
-change colours. The other side of a thin sheet is flat and follows Fresnel."""
+{percent(worst)} up to 75°. `energy_conserving` does not change colours."""
 
 
 def _surfaces(measured: Measurements) -> str:
@@ -75,9 +74,8 @@ as `info --energy` prints them: model → `energy_conserving`, the default.
 
 {table(["surface", "light", *map(angle, PASSED)], rows)}
 
-Only order 0 is scaled. Where it has too little light, the missing part stays missing. Where the
-other orders exceed 1 on their own, all light is attenuated. Both happen on blazed gratings, whose
-order 0 has little light. `energy_conserving=false` keeps the model's."""
+Only order 0 is scaled: missing light stays missing where it is weak, as on blazed gratings. Where
+the other orders exceed 1, all light is attenuated."""
 
 
 def _recipes(measured: Measurements) -> str:

@@ -1,0 +1,73 @@
+"""Balls of all named looks: docs/presets.md.
+
+python -m docs.make.figures.presets -o docs
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image, ImageDraw
+
+from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.plugin.presets import presets
+
+from . import pages
+from .pages import exit_code, write_jpeg
+
+PICTURE = Path("images", "presets.jpg")
+_COLUMNS, _SIZE, _LABEL = 5, (160, 147), 16
+_MOST = 160_000  # bytes of the picture
+
+
+def table() -> str:
+    """Return the table of the looks for the page."""
+    rows = [(f"`{look.name}`", look.about) for look in presets().values()]
+    return pages.table(("name", "surface"), rows)
+
+
+def draw(folder: Path, samples: int) -> Path:
+    """Render a ball of each look into a folder; return the picture of all."""
+    width, height = _SIZE
+    names = list(presets())
+    rows = -(-len(names) // _COLUMNS)
+    sheet = Image.new("RGB", (_COLUMNS * width, rows * (height + _LABEL)), "white")
+    pen = ImageDraw.Draw(sheet)
+    for number, name in enumerate(names):
+        ball = folder / f"{name}.png"
+        command = ["render", "scenes/material_ball.xml", "--preset", name, "-s", str(samples),
+                   "-D", f"resx={width}", "-D", f"resy={height}", "-o", str(ball)]  # fmt: skip
+        if program(command):
+            raise DiffractionError(f"the ball of {name} failed; its message stands above")
+        x, y = number % _COLUMNS * width, number // _COLUMNS * (height + _LABEL)
+        with Image.open(ball) as picture:
+            sheet.paste(picture.convert("RGB"), (x, y))
+        pen.text((x + width / 2, y + height + 2), name, fill="black", anchor="ma")
+    written = folder / "presets.png"
+    sheet.save(written)
+    return written
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Render the balls and write the page; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.presets")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
+    parser.add_argument("-s", "--samples", type=int, default=32, help="per pixel; default: 32")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            picture = draw(Path(folder), args.samples)
+            write_jpeg(picture, args.output / PICTURE, most=_MOST)
+        pages.update(args.output / "presets.md", {"presets": table()})
+
+    return exit_code("presets", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,60 @@
+"""Named looks: records that become BSDFs of the plugin."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.files import FileKind, kind_of
+from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.plugin.presets import find_preset, presets
+from mitsuba_diffraction.plugin.surface_parameters import NAMES
+
+PRESETS = presets()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_record_has_a_patch_and_parameters_of_its_plugin(name):
+    look = PRESETS[name]
+    assert look.about
+    assert set(look.parameters) <= set(NAMES[look.plugin])
+    if kind_of(look.patch) is not FileKind.ORDERS:
+        assert Recipe.load(look.patch).generator
+
+
+@pytest.mark.parametrize(
+    ("wrong", "near"),
+    [("cdd", "did you mean cd"), ("snak", "snake"), ("FOIL", "-foil"), ("", "cd, dvd")],
+)
+def test_an_unknown_name_is_answered_with_the_nearest(wrong, near):
+    with pytest.raises(DiffractionError, match=near):
+        find_preset(wrong)
+
+
+def test_changes_replace_the_whole_material_of_a_look():
+    changed = md.preset("snake", int_ior=1.6, orientation=None)
+    assert changed["int_ior"] == 1.6
+    assert "material" not in changed
+    assert "orientation" not in changed
+    assert changed["pigment"] == md.preset("snake")["pigment"]
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_rgb"])
+def test_the_plugin_is_the_bsdf_of_the_dictionary(variant):
+    mi.set_variant(variant)
+    xml = """<bsdf version="3.0.0" type="diffraction_preset" id="disc">
+        <string name="preset" value="dvd"/><float name="orientation" value="90"/></bsdf>"""
+    bsdf = mi.load_string(xml)
+    assert bsdf.id() == "disc"
+    assert str(bsdf) == str(mi.load_dict(md.preset("dvd", orientation=90)))
+    assert "orientation = 90" in str(bsdf)
+
+
+def test_the_plugin_names_what_is_wrong():
+    mi.set_variant("llvm_ad_spectral")
+    with pytest.raises(RuntimeError, match="did you mean dvd"):
+        mi.load_dict({"type": "diffraction_preset", "preset": "dvdd"})
+    with pytest.raises(RuntimeError, match="preset is missing"):
+        mi.load_dict({"type": "diffraction_preset"})
