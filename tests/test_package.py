@@ -79,7 +79,8 @@ def test_the_wheel_holds_nothing_else(in_wheel):
     info = f"mitsuba_diffraction-{md.__version__}.dist-info/"
     others = {name for name in in_wheel if not name.startswith(info)}
     # `render MESH` works without a clone
-    studio = {f"mitsuba_diffraction/scene/studio/{n}.xml" for n in ("own_mesh", "studio", "lamp")}
+    scenes = ("own_mesh", "studio", "lamp", "outdoors", "daylight", "environment")
+    studio = {f"mitsuba_diffraction/scene/studio/{n}.xml" for n in scenes}
     brought = studio | {
         f"mitsuba_diffraction/plugin/patches/{look.patch.relative_to(ROOT / 'precompute')}"
         for look in presets().values()

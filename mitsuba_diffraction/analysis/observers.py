@@ -293,7 +293,7 @@ def quantum_catches(
     if lam[0] > seen[0] or lam[-1] < seen[-1]:
         raise DiffractionError(
             f"the spectra are from {lam[0]:g} to {lam[-1]:g} nm, and this eye sees from "
-            f"{seen[0]:g} to {seen[-1]:g} nm; give wavelength_range=(300, 700)"
+            f"{seen[0]:g} to {seen[-1]:g} nm; the wavelength range must cover that"
         )
     fine = np.stack([np.interp(GRID, lam, curve) for curve in spectra.T])
     return np.asarray(fine * illuminant @ eye.sensitivity.T)

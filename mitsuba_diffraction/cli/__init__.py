@@ -11,6 +11,8 @@ orders                 efficiencies of solved orders as a CSV
 presets                the named looks of --preset
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
+animation              options of `render --frames`, and reasons to render frames again
+studio                 light, material and camera of a mesh in a few words: `render --env`, …
 observed               `render --observer`: what the receptors of an animal catch
 tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method

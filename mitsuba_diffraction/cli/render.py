@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +17,6 @@ from ..extras import optional
 from ..scene.denoise import denoised
 from ..scene.frames import (
     FILMS,
-    MISSING,
     Frame,
     check_film,
     digest_of,
@@ -31,11 +29,12 @@ from ..scene.parameters import values_of_frames
 from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
+from .animation import add_animation, say_why
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .observed import add_observer, run_observed
-from .options import number_between, whole_number
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, default_output, save_report
+from .studio import add_studio, take_studio
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
 
@@ -73,22 +72,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     add_plan_options(parser)
     add_observer(parser)
     options.add_json(parser, "what was rendered")
-    film = parser.add_argument_group("animation")
-    count = whole_number(1)
-    film.add_argument("--frames", metavar="N", type=count, help="render N pictures, frame_0000.png")
-    film.add_argument(
-        "--animate", metavar="KEY=FROM:TO", type=scene_options.change, action="append", default=[],
-        help="change a parameter of the scene from the first frame to the last, e.g. "
-        "sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
-    )  # fmt: skip
-    film.add_argument(
-        "--turn", metavar="KEY", action="append", default=[],
-        help="turn an angle of the scene, in degrees, once around from its value on, e.g. "
-        "sun_azimuth for the light or turn for the snake; may be given several times",
-    )  # fmt: skip
-    film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
-    fps = number_between(1, 100)
-    film.add_argument("--fps", metavar="N", type=fps, help="frames a second; default: 24")
+    add_animation(parser)
+    add_studio(parser)
     add_workers(parser)
     add_threads(parser)
 
@@ -96,6 +81,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
     check_plan_options(args)
+    take_studio(args)
     scene_options.put_on_stage(args)
     if args.observer is not None:
         return run_observed(args)
@@ -284,7 +270,7 @@ def _run_frames(args: argparse.Namespace) -> int:
     frames = _frames(args, folder)
     reasons = {frame.png: frame.outdated(args.exr) for frame in frames}
     to_do = [frame for frame in frames if reasons[frame.png]]
-    _say_why(reasons)
+    say_why(reasons)
 
     start = time.perf_counter()
     done, workers = 0, None
@@ -332,25 +318,6 @@ def _frames_on_workers(
                 film.forget(done)
                 done += 1
         return done, say_report(film)
-
-
-def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
-    """Print how many frames are kept, and why others are rendered again."""
-    examples: dict[str, tuple[Path, str]] = {}
-    again: Counter[str] = Counter()
-    for path, reason in reasons.items():
-        if reason is not None and reason != MISSING:
-            again[reason[0]] += 1
-            examples.setdefault(reason[0], (path, reason[1]))
-    for name, number in again.items():
-        path, example = examples[name]
-        say(
-            f"{number} of {len(reasons)} frames are rendered again because of their {name}: of "
-            f"{path.name} {example}"
-        )
-    kept = sum(reason is None for reason in reasons.values())
-    if kept:
-        say(f"{kept} of {len(reasons)} frames are up to date")
 
 
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:

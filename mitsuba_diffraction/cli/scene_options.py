@@ -118,7 +118,18 @@ def put_on_stage(args: argparse.Namespace) -> None:
     args.parameters.append(("mesh", str(readable_file(args.scene).absolute())))
     if args.patch is not None:
         args.parameters.append(("patch", str(readable_file(args.patch).absolute())))
+    else:
+        _change_look(args)
     args.scene = STUDIO
+
+
+def _change_look(args: argparse.Namespace) -> None:
+    """Put parameters of the surface behind the look that replaces the studio's surface."""
+    from ..plugin.surface_parameters import NAMES, REFLECTING
+
+    changes = [f",{name}={value}" for name, value in args.parameters if name in NAMES[REFLECTING]]
+    args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
+    args.presets = [args.presets[0] + "".join(changes), *args.presets[1:]]
 
 
 def _definitions(args: argparse.Namespace) -> dict[str, str]:

@@ -20,6 +20,9 @@ from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 Array = NDArray[np.float32]
 
+#: First wavelength, end and step of integrals over daylight, nm.
+_DAYLIGHT = (360.0, 830.0, 2.0)
+
 
 class DirectionLookup:
     """A function of direction and channel in the variant's memory, bilinear in (θ, φ)."""
@@ -191,6 +194,12 @@ def _cells(table: DirectionalTable, stretch: float) -> Array:
 
 
 def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights of the wavelengths in red, green and blue, (3, n)."""
-    weights = np.maximum(linear_srgb(response(wavelengths)).T, 0.0) * wavelengths
+    """Weights of the wavelengths (n,), nm, in red, green and blue, (3, n).
+
+    Weights are integrals over daylight of a function that is linear in log λ between wavelengths.
+    """
+    light = np.arange(*_DAYLIGHT)
+    power = np.maximum(linear_srgb(response(light)).T, 0.0)
+    hats = [np.interp(np.log(light), np.log(wavelengths), row) for row in np.eye(len(wavelengths))]
+    weights = power @ np.stack(hats, axis=1)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

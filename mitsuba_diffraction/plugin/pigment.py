@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError, quoted
-from ..files import read_text
+from ..files import read_text, readable_file
 from ..optics.colour import decode_srgb
 from .types import BSDF
 
@@ -20,6 +20,8 @@ from .types import BSDF
 REQUIRED = (400.0, 700.0)
 #: Suffixes of measured spectra.
 SPECTRA = (".csv", ".txt", ".tsv")
+#: Suffixes of pictures, which texture coordinates lay over the surface.
+PICTURES = (".png", ".jpg", ".jpeg", ".exr")
 
 # Wavelengths, nm, to which a spectrum is continued at either end.
 _ENDS = (100.0, 10000.0)
@@ -29,8 +31,8 @@ def pigment_bsdf(text: str | float) -> BSDF:
     """Return a diffuse BSDF of a pigment.
 
     text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
-        "sienna", or a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
-        cent.
+        "sienna", a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
+        cent, or a picture.
 
     Raises
     ------
@@ -101,6 +103,8 @@ def _reflectance(text: str) -> dict[str, Any]:
             return {"type": "uniform", "value": 0.0}
         pairs = list(zip(lam.tolist(), value.tolist(), strict=True))
         return {"type": "spectrum", "value": pairs}
+    if Path(text).suffix.lower() in PICTURES:
+        return {"type": "bitmap", "filename": str(readable_file(text).absolute())}
     colour = _colour(text)
     if len(set(colour)) == 1:
         return {"type": "uniform", "value": colour[0]}
@@ -118,7 +122,8 @@ def _colour(text: str) -> list[float]:
     if len(numbers) != 3 or not all(0.0 <= number <= 1.0 for number in numbers):
         raise DiffractionError(
             f"pigment={quoted(text)} is no colour: give a grey from 0 to 1, 'r,g,b', '#804020', a "
-            f"name of CSS such as sienna, or a spectrum ({', '.join(SPECTRA)})"
+            f"name of CSS such as sienna, a spectrum ({', '.join(SPECTRA)}) or a picture "
+            f"({', '.join(PICTURES)})"
         )
     return numbers
 

@@ -9,6 +9,7 @@ pictures     EXR and PNG of pictures
 denoise      pictures without noise, by Open Image Denoise
 frames       frames of an animation, and a film of them
 additions    meshes and materials put into a scene before Mitsuba makes its objects
+clamping     integrator that limits the light of single samples
 bands        films with a band for each receptor of an eye, and tables that cover it
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor
 hologram     textures of dot-matrix holograms from pictures

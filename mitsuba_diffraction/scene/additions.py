@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..files import FileKind, kind_of
@@ -21,7 +23,7 @@ from ..plugin.presets import MATERIALS, find_preset
 from ..plugin.presets import PLUGIN as PRESET_PLUGIN
 from ..plugin.surface_parameters import NAMES
 from ..tables.orders import OrderTable
-from .fitted_mesh import fitted_mesh
+from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .orientation.files import write_ply
 
 #: Shape that is put on the stage.
@@ -30,6 +32,8 @@ FITTED = "fitted_mesh"
 MATERIAL = "material:"
 #: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
 PRESET = "preset:"
+#: Scene parameter that limits samples, in units of white.
+CLAMP = "render:clamp"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
 REFLECTING, TRANSMITTING = PLUGINS
@@ -45,11 +49,13 @@ class SceneValues(NamedTuple):
     parameters : of the scene's own parameters.
     materials : surfaces by the id that they are put on.
     surface : parameters of the BSDF, for all diffracting surfaces of the scene.
+    clamp : limit of samples in units of white, or None.
     """
 
     parameters: dict[str, Any]
     materials: dict[str, str]
     surface: dict[str, Any]
+    clamp: float | None
 
 
 def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
@@ -58,9 +64,11 @@ def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValu
     known : names of the scene's parameters, which go before those of the BSDF.
     """
     materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL)}
+    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k != CLAMP}
     surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
-    return SceneValues({k: v for k, v in rest.items() if k not in surface}, materials, surface)
+    clamp = float(values[CLAMP]) if CLAMP in values else None
+    own = {k: v for k, v in rest.items() if k not in surface}
+    return SceneValues(own, materials, surface, clamp)
 
 
 def fit_meshes(state: Any, folder: Path) -> None:
@@ -81,9 +89,32 @@ def fit_meshes(state: Any, folder: Path) -> None:
         mesh = fitted_mesh(file, fit=_boolean(props, "fit"), up=props.get("up", "auto"))
         written = folder / f"{number}.ply"
         write_ply(written, mesh)
-        ply = _copy(props, "ply", leave=("filename", "fit", "up"))
+        _frame(state, mesh.positions, props)
+        ply = _copy(props, "ply", leave=("filename", "fit", "up", "frame"))
         ply["filename"] = str(written)
         node.props = ply
+
+
+def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
+    """Move the scene's first camera until the mesh of a shape fills its picture."""
+    frame = str(shape.get("frame", FRAMES[0]))
+    if frame not in FRAMES:
+        raise DiffractionError(f"frame={frame!r} is unknown; choose one of {', '.join(FRAMES)}")
+    sensor = next((n for n in state.nodes if n.type == mi.ObjectType.Sensor), None)
+    if frame == FRAMES[0] or sensor is None:
+        return
+    matrix = np.array(shape["to_world"].matrix) if "to_world" in shape else np.eye(4)
+    placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
+    props = sensor.props
+    pose = np.array(props["to_world"].matrix)
+    film = next(state.nodes[n].props for n in _targets(sensor)
+                if state.nodes[n].type == mi.ObjectType.Film)  # fmt: skip
+    size = np.array([film.get("width", 768), film.get("height", 576)], float)
+    tangents = size / size.min() * np.tan(np.radians(float(props["fov"]) / 2))
+    seen = turned_around(placed) if frame == "turning" else placed
+    pose[:3, 3] = framing(seen, pose[:3, :3], (tangents[0], tangents[1]))
+    del props["to_world"]
+    props["to_world"] = mi.ScalarTransform4f(pose)
 
 
 def _boolean(props: Any, name: str) -> bool:
@@ -149,19 +180,24 @@ def remove_dark_lights(state: Any) -> None:
     state : `mi.parser.ParserState`, its references resolved.
     """
 
-    def is_dark(number: int) -> bool:
-        props = state.nodes[number].props
-        return props.plugin_name() == "d65" and float(props.get("scale", 1.0)) == 0.0
-
+    nodes = state.nodes
+    black = {
+        number
+        for number, node in enumerate(nodes)
+        if node.props.plugin_name() == "d65" and float(node.props.get("scale", 1.0)) == 0.0
+    }
+    if not black:  # reading a property hides from Mitsuba that no plugin reads it
+        return
     dark = {
-        number for number, node in enumerate(state.nodes)
-        if node.type == mi.ObjectType.Emitter and any(map(is_dark, _targets(node)))
-    }  # fmt: skip
-    for node in state.nodes:
-        for name in list(node.props.keys()):
-            value = node.props[name]
-            if isinstance(value, mi.Properties.ResolvedReference) and value.index() in dark:
-                del node.props[name]
+        number
+        for number, node in enumerate(nodes)
+        if node.type == mi.ObjectType.Emitter and black.intersection(_targets(node))
+    }
+    resolved = mi.Properties.Type.ResolvedReference
+    for props in (node.props for node in nodes):
+        for name in list(props.keys()):
+            if props.type(name) == resolved and props[name].index() in dark:
+                del props[name]
 
 
 def put_box_filters(state: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,10 @@ Floats = NDArray[np.float64]
 UPS = ("auto", "x", "y", "z", "-x", "-y", "-z")
 #: Radius and height of the cylinder around the z axis that the camera of the stage sees whole.
 STAGE_RADIUS, STAGE_HEIGHT = 4.2, 6.0
+#: Values of `frame`: the camera moves until it sees the mesh, the mesh at all turns, or not at all.
+FRAMES = ("none", "still", "turning")
+# Part of the picture's width or height that the mesh fills, and azimuths of a mesh that turns.
+_FILLED, _AZIMUTHS = 0.86, 48
 # Vertices of the lowest 2 % count as feet: soles and bases are rarely flatter.
 _FEET = 0.02
 # A resting area that is twice as large overrules the convention of the file format.
@@ -120,6 +125,47 @@ def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMe
         return TriangleMesh(positions, normals, uv, faces, orientation)
     field = direction_field(positions, normals, faces)
     return oriented_mesh(positions, normals, faces, field.directions, uv)
+
+
+def framing(positions: Floats, camera: Floats, tangents: tuple[float, float]) -> Floats:
+    """Return where a camera sees all vertices as large as possible, its direction unchanged.
+
+    Parameters
+    ----------
+    positions : (n, 3) vertices.
+    camera : (3, 3), columns are the camera's axes; the third points forwards.
+    tangents : of half the angles of view along the first two axes.
+
+    Each edge of the picture is a plane through the camera, which the outermost vertex touches: in
+    the camera's axes |x − c_x| ≤ t (z − c_z) for all vertices.
+    """
+    local = positions @ camera
+    depth, place = np.inf, np.zeros(3)
+    for axis, tangent in enumerate(tangents):
+        t = _FILLED * tangent
+        upper = (local[:, axis] - t * local[:, 2]).max()
+        lower = (-local[:, axis] - t * local[:, 2]).max()
+        depth = min(depth, -(upper + lower) / (2.0 * t))
+        place[axis] = (upper - lower) / 2.0
+    place[2] = depth
+    return np.asarray(camera @ place)
+
+
+def turned_around(positions: Floats) -> Floats:
+    """Return vertices (m, 3) of the solid that a mesh sweeps when it turns around the z axis."""
+    radius, z = np.hypot(positions[:, 0], positions[:, 1]), positions[:, 2]
+    layer = np.floor(63.999 * (z - z.min()) / max(float(np.ptp(z)), 1e-12)).astype(np.intp)
+    widest = np.zeros(64)
+    np.maximum.at(widest, layer, radius)
+    heights = z.min() + np.ptp(z) * np.arange(65) / 64
+    around = 2 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
+    circle = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    rings = [
+        np.column_stack([r * circle, np.full(_AZIMUTHS, h)])
+        for r, ends in zip(widest, pairwise(heights), strict=True)
+        for h in ends
+    ]
+    return np.concatenate(rings)
 
 
 def _upright(up: str) -> Floats:

@@ -145,6 +145,7 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
         remove_dark_lights,
     )
     from .bands import put_bands
+    from .clamping import put_clamp
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -163,6 +164,8 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
             put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
             remove_dark_lights(state)
+            if values.clamp is not None:
+                put_clamp(state, values.clamp)
             if box_filter:
                 put_box_filters(state)
             if bands is not None:

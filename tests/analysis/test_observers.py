@@ -187,7 +187,7 @@ def test_eyes_are_names_or_files_and_see_what_spectra_cover(tmp_path):
     assert eye_of(str(file)).names == ("a", "b")
     with pytest.raises(DiffractionError, match="avian_uv"):
         eye_of("dragon")
-    with pytest.raises(DiffractionError, match="wavelength_range"):
+    with pytest.raises(DiffractionError, match="wavelength range must cover"):
         quantum_catches(eye_of("avian_uv"), [400.0, 700.0], [[1.0], [1.0]])
 
 

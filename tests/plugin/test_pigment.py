@@ -84,3 +84,13 @@ def test_colours_are_greys_numbers_and_names(some_variant):
     assert "0.25" in str(pigment_bsdf(0.25))
     for text in ("0.3,0.2,0.1", "#804020", "sienna"):
         assert pigment_bsdf(text) is not None
+
+
+def test_a_picture_is_a_pigment_by_texture_coordinates(spectral, tmp_path):
+    file = tmp_path / "skin.png"
+    mi.util.write_bitmap(
+        str(file), mi.Bitmap(np.full((4, 4, 3), 0.5, np.float32)), write_async=False
+    )
+    assert "BitmapTexture" in str(pigment_bsdf(str(file)))
+    with pytest.raises(md.DiffractionError, match="does not exist"):
+        pigment_bsdf(str(tmp_path / "missing.png"))

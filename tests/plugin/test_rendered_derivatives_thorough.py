@@ -7,17 +7,22 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.orders import thin_grating
-from tests.support.rendered import PIGMENT, SURFACES, check, plate
+from tests.support.rendered import PIGMENT, SURFACES, TEXELS, check, plate, with_bitmaps
 from tests.support.variants import runs
 
 pytestmark = pytest.mark.thorough
 
 WIDTHS = (3.0, 6.0, 12.0, 65.0)
+#: Surfaces and widths, µm; bitmaps are read alike at all widths.
+CASES = [
+    (name, width)
+    for name in SURFACES
+    for width in ((6.0, 65.0) if name.startswith("texture") else WIDTHS)
+]
 VARIANTS = ("llvm_ad_mono", "llvm_ad_rgb", "llvm_ad_spectral")
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize(("name", "width"), CASES)
 @pytest.mark.parametrize("mitsuba_variant", VARIANTS)
 def test_every_parameter_has_the_derivative_of_differences(mitsuba_variant, name, width):
     if not runs(mitsuba_variant):
@@ -48,3 +53,28 @@ def test_a_mix_has_the_derivatives_of_differences(mitsuba_variant):
     }
     own = {"back.orientation": 20.0, "back.lateral_scale": 1.5, "belly.orientation": 40.0}
     check(mix, {"weight_back": 0.4, "belly.eta": 1.5, **own})
+
+
+@pytest.mark.parametrize("mitsuba_variant", VARIANTS)
+def test_a_mix_of_sheets_has_the_derivatives_of_differences(mitsuba_variant):
+    mi.set_variant(mitsuba_variant)
+    mix = {
+        "type": "diffraction_mix",
+        "back": plate("sheet", 6.0),
+        "belly": plate("sheet", 12.0, lateral_scale=1.0),
+        "weight_back": 0.4,
+    }
+    own = {"back.orientation": 20.0, "belly.orientation": 40.0, "belly.lateral_scale": 0.9}
+    check(mix, {"weight_back": 0.4, "back.eta": 1.5, "belly.height_scale": 0.9, **own})
+
+
+@pytest.mark.parametrize("mitsuba_variant", VARIANTS)
+def test_a_mix_by_a_texture_has_the_derivatives_of_differences(mitsuba_variant):
+    mi.set_variant(mitsuba_variant)
+    mix = {
+        "type": "diffraction_mix",
+        "back": plate("textures", 6.0),
+        "belly": plate("metal", 12.0),
+        "weight_back": with_bitmaps(0.5 * TEXELS),
+    }
+    check(mix, {"weight_back.data": 0.5 * TEXELS, "back.height_scale.data": TEXELS})

@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.fitted_mesh import STAGE_HEIGHT, STAGE_RADIUS, UPS, fit_of
+from mitsuba_diffraction.scene.fitted_mesh import (
+    STAGE_HEIGHT,
+    STAGE_RADIUS,
+    UPS,
+    fit_of,
+    framing,
+    turned_around,
+)
 
 FILE = Path("table.obj")
 
@@ -57,3 +64,33 @@ def test_a_mesh_that_cannot_stand_is_refused(positions, said):
         fit_of(positions, FILE)
     with pytest.raises(DiffractionError, match="choose one of"):
         fit_of(table(2), FILE, "up")
+
+
+@given(
+    st.lists(st.tuples(*[st.floats(-3, 3)] * 3), min_size=4, max_size=20),
+    st.floats(-3, 3), st.floats(-1.2, 1.2), st.floats(0.1, 1.0), st.floats(0.1, 1.0),
+)  # fmt: skip
+def test_a_framed_mesh_touches_the_picture_s_margin_on_two_opposite_sides(points, az, el, tx, ty):
+    positions = np.array(points)
+    if np.linalg.matrix_rank(positions - positions[0], tol=1e-3) < 3:
+        return
+    forwards = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+    right = np.array([-np.sin(az), np.cos(az), 0.0])
+    camera = np.stack([right, np.cross(forwards, right), forwards], axis=-1)
+    local = (positions - framing(positions, camera, (tx, ty))) @ camera
+    assert local[:, 2].min() > 0
+    seen = local[:, :2] / local[:, 2:] / (tx, ty)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    assert high.max() == pytest.approx(-low[np.argmax(high)])
+    assert high.max() == pytest.approx(-low.min())
+    assert 0.8 < high.max() < 0.9
+
+
+def test_a_mesh_that_turns_stays_within_its_sweep():
+    positions = np.random.default_rng(0).normal(size=(200, 3))
+    swept = turned_around(positions)
+    radius = np.hypot(swept[:, 0], swept[:, 1])
+    for x, y, z in positions:
+        near = np.abs(swept[:, 2] - z) <= np.ptp(positions[:, 2]) / 63
+        assert radius[near].max() >= np.hypot(x, y)
+    assert radius.max() == pytest.approx(np.hypot(positions[:, 0], positions[:, 1]).max())

@@ -22,9 +22,24 @@ PIXELS = 8
 STEP = 1e-3
 #: Half the step of angles, degrees, and of a film's thickness, nm: g follows it in steps of 1 nm.
 STEPS = {"orientation": 0.02, "film_thickness": 1.0}
+#: Texels of bitmaps: factors or weights, and directions 10° to 25° from the tangent.
+TEXELS = np.array([[[0.8], [0.9]], [[0.95], [0.85]]])
+_ANGLES = np.radians([[10.0, 20.0], [25.0, 15.0]])
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0.0 * _ANGLES], axis=2)
 
-#: Surfaces by what they show: plugin's parameters, and the values to take derivatives at.
-SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+
+#: Orientation and factors of bitmaps, with room above their largest factors.
+VARYING = {
+    "orientation": DIRECTIONS, "height_scale": TEXELS, "height_scale_max": 1.2,
+    "lateral_scale": TEXELS, "lateral_scale_max": 1.2,
+}  # fmt: skip
+VARIED = {
+    "orientation.data": DIRECTIONS, "height_scale.data": TEXELS, "lateral_scale.data": TEXELS,
+}  # fmt: skip
+
+#: Surfaces by what they show: plugin's parameters, and the values to take derivatives at. Arrays
+#: are texels of bitmaps.
+SURFACES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "metal": (
         {"eta": 0.9, "k": 6.0, "lateral_scale": 2.0},
         {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 1.5, "eta.value": 0.9,
@@ -59,7 +74,23 @@ SURFACES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
         {"plugin": "diffraction_dielectric", "thin": True},
         {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5},
     ),
+    "textures": (
+        {"int_ior": 1.5, "beneath": {"type": "diffuse", "reflectance": 0.5 * TEXELS}, **VARYING},
+        {"nested.reflectance.data": 0.5 * TEXELS, "eta": 1.5, **VARIED},
+    ),
+    "textured sheet": (
+        {"plugin": "diffraction_dielectric", "thin": True, **VARYING}, {"eta": 1.5, **VARIED},
+    ),
 }  # fmt: skip
+
+
+def with_bitmaps(value: Any) -> Any:
+    """Replace arrays of texels in a dictionary by bitmaps, interpolated, of the current variant."""
+    if isinstance(value, dict):
+        return {name: with_bitmaps(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray):
+        return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(value.astype(np.float32))}
+    return value
 
 
 def scene(bsdf: dict[str, Any]) -> Any:
@@ -92,8 +123,11 @@ def scene(bsdf: dict[str, Any]) -> Any:
     )
 
 
-def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
-    """Compare derivatives, forward and backward, with differences of the same random numbers."""
+def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64) -> None:
+    """Compare derivatives, forward and backward, with differences of the same random numbers.
+
+    All texels of a bitmap move alike.
+    """
     # look-ups of colours bend between their bins: their kinks average out
     spp = 4 * spp if mi.is_rgb else spp
     loaded = scene(bsdf)
@@ -101,7 +135,7 @@ def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
     keys = {name: f"plate.bsdf.{name}" for name in at}
 
     def picture(
-        values: dict[str, float], seeds: tuple[int, int] = (2, 1), ad: tuple[str, ...] = ()
+        values: dict[str, Any], seeds: tuple[int, int] = (2, 1), ad: tuple[str, ...] = ()
     ) -> Any:
         for name, value in values.items():
             parameters[keys[name]] = type(parameters[keys[name]])(value)
@@ -127,12 +161,12 @@ def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
     dr.backward(dr.sum(image * mi.TensorXf(weights.astype(np.float32)), axis=None))
     sums = {name: float(np.sum(pixels * weights)) for name, pixels in forward.items()}
     for name, total in sums.items():
-        backward = float(np.array(dr.grad(parameters[keys[name]])).ravel()[0])
+        backward = float(np.array(dr.grad(parameters[keys[name]])).sum())
         # to rounding of sums
         assert backward == pytest.approx(total, rel=2e-3, abs=2e-3 * max(map(abs, sums.values())))
 
     for name, value in at.items():
-        step = STEPS.get(name.rpartition(".")[2], STEP * value)
+        step = STEPS.get(name.rpartition(".")[2], STEP * float(np.mean(value)))
         ends = [np.array(picture(at | {name: value + s * step}), np.float64) for s in (1.0, -1.0)]
         difference = (ends[0] - ends[1]) / (2.0 * step)
         # single precision of the sums
@@ -145,4 +179,4 @@ def check(bsdf: dict[str, Any], at: dict[str, float], spp: int = 64) -> None:
 def plate(name: str, width: float, **more: Any) -> dict[str, Any]:
     """A surface of the table above, without scales of energy, which bend at their nodes."""
     own = {"energy_conserving": False, "coherence_width": width, "tolerance": 1e-3}
-    return md.bsdf_dict(GRATING, **(own | SURFACES[name][0] | more))
+    return md.bsdf_dict(GRATING, **with_bitmaps(own | SURFACES[name][0] | more))

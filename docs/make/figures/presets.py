@@ -21,7 +21,7 @@ from . import pages
 from .pages import exit_code, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
-_COLUMNS, _SIZE, _LABEL = 5, (240, 220), 16
+_COLUMNS, _SIZE, _LABEL = 5, (160, 147), 16
 _MOST = 160_000  # bytes of the picture
 
 
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Render the balls and write the page; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.presets")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
-    parser.add_argument("-s", "--samples", type=int, default=48, help="per pixel; default: 48")
+    parser.add_argument("-s", "--samples", type=int, default=32, help="per pixel; default: 32")
     args = parser.parse_args(argv)
 
     def work() -> None:

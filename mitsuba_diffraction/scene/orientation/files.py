@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic import atomic_path
-from ...errors import DiffractionError
+from ...errors import DiffractionError, warn
 from ...files import read_bytes, readable_file
 from ...plugin.meshes import MeshArrays, mesh_arrays, mesh_faces
 from ...plugin.textures import ORIENTATION
@@ -28,6 +28,9 @@ _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
+# Lines of normals in an OBJ file, and corners v/t/n or v//n of its faces
+_NORMAL, _CORNER = re.compile(rb"(?m)^vn .*$"), re.compile(rb"(?<= )(\d+)(/\d+)?/{1,2}\d+(?=\s|$)")
+
 _CODES = {
     "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h",
     "ushort": "H", "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I",
@@ -38,7 +41,8 @@ _CODES = {
 def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     """Read a mesh file.
 
-    Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.
+    Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons. Normals of an OBJ
+    file are rebuilt, with a warning, if one has length 0.
 
     Raises
     ------
@@ -90,6 +94,9 @@ def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
         return _read(file, kind, face_normals)
     except _UNREAD as error:
         triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
+        if kind == "obj" and "invalid vertex normal" in str(error):
+            warn(f"mesh '{file}': a vertex normal has length 0; all are rebuilt from the triangles")
+            triangles = _CORNER.sub(rb"\1\2", _NORMAL.sub(b"", file.read_bytes()))
         if triangles is not None:
             with tempfile.TemporaryDirectory() as folder, contextlib.suppress(*_UNREAD):
                 cut = Path(folder, file.name)

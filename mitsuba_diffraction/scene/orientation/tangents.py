@@ -33,6 +33,8 @@ BREAK = 60.0
 # than this many of its edges, or than this share of the mesh.
 _EDGES, _SHARE = 4.0, 0.2
 
+# Share of the surface on which texture coordinates may be mirrored: caps and small parts
+MOST_MIRRORED = 0.05
 MOST_TURNING = 0.05  # share of the surface on which the direction may turn too fast
 LONG = 0.05  # share of the mesh's size: longer breaks, all together, are visible
 TURN = 30.0  # degrees between neighbours from which on a seam shows
@@ -113,7 +115,9 @@ class TangentReport:
     has_uv: bool
     has_normals: bool
     degenerate: float  # share whose texture coordinates span no area: no tangent there
-    mirrored: float  # share where u × v runs the other way round: the patch is seen mirrored
+    # share where u × v runs the other way round than on most of the surface; which way that is does
+    # not matter, and Mitsuba flips v of OBJ files
+    mirrored: float
     # share within which the direction turns by over 60 degrees, or which lies beside an edge across
     # which it turns by more than 30
     turning: float
@@ -180,9 +184,10 @@ class TangentReport:
                     else "colours will show seams; unwrap along the body in one piece"
                 )
             )
-        if 0.01 < self.mirrored < 0.99:
+        if self.mirrored > MOST_MIRRORED:
             lines.append(
-                f"{self.mirrored:.0%} of the surface shows the patch mirrored: flip those parts"
+                f"texture coordinates on {self.mirrored:.0%} of the surface are mirrored against "
+                "the rest, where u may run the other way, and the patch with it: flip those parts"
             )
         return lines
 
@@ -263,7 +268,7 @@ def check_tangents(
         has_uv=True,
         has_normals=normals is not None,
         degenerate=float(area[flat].sum() / total),
-        mirrored=float(area[good & mirrored].sum() / total),
+        mirrored=float(min(area[good & side].sum() for side in (mirrored, ~mirrored)) / total),
         turning=float(area[turning].sum() / total),
         stretch=float(np.median(lengths[0] / lengths[1])) if good.any() else 0.0,
         broken=_length_of_breaks(places, corners, crossed, jumps),

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.orientation.directions import direction_field
 from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
@@ -75,6 +75,33 @@ def test_a_mirrored_half_is_named() -> None:
     report = check_tangents(positions, normals, uv, faces)
     assert report.mirrored == pytest.approx(0.5)
     assert any("mirrored" in line for line in report.problems())
+
+
+def test_coordinates_that_are_mirrored_everywhere_are_no_problem() -> None:
+    """As those of OBJ files, of which Mitsuba flips v."""
+    positions, normals, uv, faces = _sheet()
+    uv[:, 1] = 1.0 - uv[:, 1]
+    report = check_tangents(positions, normals, uv, faces)
+    assert report.mirrored == 0
+    assert not report.problems()
+
+
+@pytest.mark.parametrize("corner", ["{0}//{1}", "{0}/{0}/{1}"])
+def test_normals_without_length_are_rebuilt_with_a_note(tmp_path, some_variant, corner) -> None:
+    file = tmp_path / "a.obj"
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    lines = [f"v {x} {y} 0" for x, y in square]
+    if "/{0}/" in corner:
+        lines += [f"vt {x} {y}" for x, y in square]
+    corners = [corner.format(v, 1 + (v > 2)) for v in (1, 2, 3, 4)]
+    lines += ["vn 0 0 1", "vn 0 0 0", "f " + " ".join(corners[:3]),
+              "f " + " ".join(corners[n] for n in (0, 2, 3))]  # fmt: skip
+    file.write_text("\n".join(lines) + "\n")
+    with pytest.warns(DiffractionWarning, match="length 0; all are rebuilt"):
+        mesh = load_mesh(file)
+    assert mesh.normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.normals), 1)))
+    assert len(mesh.faces) == 2
+    assert (mesh.uv is not None) == ("/{0}/" in corner)
 
 
 def test_turning_tangents_are_named() -> None:

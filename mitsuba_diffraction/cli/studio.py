@@ -1,0 +1,126 @@
+"""Light, material and camera of a mesh in a few words: options of `render`.
+
+Each is short for parameters of the stage, `scenes/own_mesh.xml`, which -D may set instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import DiffractionError, quoted
+from ..files import MESHES, readable_file
+from ..scene.parameters import numbers_in
+from .options import number_between
+
+#: Materials of --look: parameters of the BSDF, that which --base sets, and its default.
+LOOKS: dict[str, tuple[dict[str, str], str, str]] = {
+    "metal": ({}, "material", "Al"),
+    "coated": ({"coat_ior": "1.5"}, "material", "Al"),
+    "skin": ({"material": "keratin"}, "pigment", "0.2"),
+}
+# Frames of --orbit, and irradiance of the sun beside a panorama, in the panorama's units of white.
+_FRAMES, _IRRADIANCE = 24, 3.0
+
+
+def add_studio(parser: argparse.ArgumentParser) -> None:
+    """Declare the options; see `take_studio`."""
+    group = parser.add_argument_group("a mesh in a few words")
+    group.add_argument(
+        "--env", metavar="FILE", help="panorama (HDR, EXR) that lights the scene instead of lamps"
+    )
+    group.add_argument(
+        "--sun", metavar="AZ,EL", type=_angles,
+        help="sun at this azimuth and elevation in degrees, azimuth 0 to the right and 90 away "
+        "from the camera; with a clear sky, or beside --env",
+    )  # fmt: skip
+    group.add_argument(
+        "--look", choices=tuple(LOOKS),
+        help="material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
+        "default: metal, or skin with a --base that is a colour",
+    )  # fmt: skip
+    group.add_argument(
+        "--base", metavar="COLOUR|FILE|METAL",
+        help="pigment of a skin: 'r,g,b', '#804020', sienna or a picture (by the mesh's texture "
+        "coordinates); or name of the metal, e.g. gold",
+    )  # fmt: skip
+    group.add_argument(
+        "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"
+    )
+    group.add_argument(
+        "--orbit", action="store_true",
+        help=f"let the camera go around the mesh: --frames ({_FRAMES}) and --turn camera_azimuth",
+    )  # fmt: skip
+    group.add_argument(
+        "--clamp", metavar="L", type=number_between(1e-3, 1e6),
+        help="limit each sample to L times white, against bright dots; 10 to 30 leaves most "
+        "highlights as they are",
+    )  # fmt: skip
+
+
+def take_studio(args: argparse.Namespace) -> None:
+    """Turn the options into values of -D and --turn; `args.scene` is a scene or a mesh.
+
+    Raises a DiffractionError if a file cannot be read.
+    """
+    from ..scene.additions import CLAMP
+
+    values: dict[str, str] = {}
+    is_mesh = args.scene.suffix.lower() in MESHES
+    if args.env is not None or args.sun is not None:
+        sky = "daylight.xml" if args.env is None else "environment.xml"
+        values |= {"light": "outdoors.xml", "sky": sky} if is_mesh else {"light": sky}
+    if args.env is not None:
+        values["environment"] = str(readable_file(args.env).absolute())
+    if args.sun is not None:
+        values |= {"sun_azimuth": args.sun[0], "sun_elevation": args.sun[1]}
+        if args.env is not None:
+            values["sun_irradiance"] = f"{_IRRADIANCE:g}"
+    values |= _material(args)
+    if args.height_scale is not None:
+        values["height_scale"] = f"{args.height_scale:g}"
+    if args.orbit:
+        args.turn.append("camera_azimuth")
+        args.frames = args.frames or _FRAMES
+    if is_mesh and {"turn", "camera_azimuth"} & set(args.turn):
+        values["frame"] = "turning"
+    if args.clamp is not None:
+        values[CLAMP] = f"{args.clamp:g}"
+    # -D goes before: its value may be finer
+    given = {name for name, _ in args.parameters}
+    args.parameters = [*args.parameters, *((k, v) for k, v in values.items() if k not in given)]
+
+
+def _material(args: argparse.Namespace) -> dict[str, str]:
+    """Return the parameters of --look and --base."""
+    if args.look is None and args.base is None:
+        return {}
+    if args.patch is None:
+        args.parser.error("--look and --base are for a mesh with --patch; a preset has its "
+                          "material: --preset cd,pigment=sienna")  # fmt: skip
+    look = args.look or ("metal" if _is_metal(args.base) else "skin")
+    values, name, default = LOOKS[look]
+    if name == "material" and args.base is not None and not _is_metal(args.base):
+        raise DiffractionError(
+            f"--base {quoted(args.base)} is no metal, which --look {look} needs, such as gold or "
+            "Cr; a colour or a picture is for --look skin"
+        )
+    return {**values, name: args.base or default}
+
+
+def _is_metal(text: str) -> bool:
+    """Whether a text names a conductor, by symbol or plain name."""
+    from ..optics.materials import METALS, TISSUES
+    from ..plugin.conductors import tabulated_range
+
+    name = METALS.get(text.lower(), text)
+    return name not in TISSUES and tabulated_range(name) is not None
+
+
+def _angles(text: str) -> tuple[str, str]:
+    """Type of argument: azimuth and elevation in degrees."""
+    angles = numbers_in(text)
+    if angles is None or len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
+        raise argparse.ArgumentTypeError(
+            f"expected azimuth and elevation in degrees, such as 120,40, got {quoted(text)}"
+        )
+    return f"{angles[0]:g}", f"{angles[1]:g}"
