@@ -30,13 +30,22 @@ ROOT = Path(__file__).parents[2]
 
 
 class Claim(NamedTuple):
-    """One figure of README."""
+    """Figure that README claims, with the measurement behind it.
+
+    Attributes
+    ----------
+    quantity : name of the quantity.
+    stated : text of README.
+    page : path of the page with the measurement.
+    measured : function that returns the line of a page with the figure.
+    command : command that measures the figure again.
+    """
 
     quantity: str
-    stated: str  # words of README
-    page: str  # page with the measurement
-    measured: Callable[[str], str]  # the line of that page with the figure
-    command: str  # command that measures it anew
+    stated: str
+    page: str
+    measured: Callable[[str], str]
+    command: str
 
 
 def line(*words: str) -> Callable[[str], str]:

@@ -152,11 +152,11 @@ class Surface:
     text : material with its layers, for people.
     coherence_width : 4σ of the amplitude window, µm.
     orientation : degrees from the first tangent to the patch's x axis.
-    frame : function of interactions that returns (cos, sin) of the orientation, and the factor on
-        lengths over those of the table.
+    frame : function of interactions that returns (cos, sin) of the orientation, and the stretch
+        of lengths relative to the table's patch.
     coherence : "ensemble", "patch" or "surface".
-    heights : function that reads the heights of the table, or None of solved orders.
-    height_scale, lateral_scale : factors on heights, and on lengths over those of the table.
+    heights : function that reads the heights of the table; None for solved orders.
+    height_scale, lateral_scale : factors on the heights and lengths of the table's patch.
     largest_scale : largest height scale of the table.
     material, coat, film : material of the structure; index of a coat over the medium above it.
     model : name of the boundary model; empty for solved orders.

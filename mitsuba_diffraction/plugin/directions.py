@@ -22,8 +22,8 @@ class PatchFrame:
     Attributes
     ----------
     rotation : (cos, sin) of the angle from the first tangent to the patch's x axis.
-    stretch : factor on lengths in the plane, over those of the table's patch. Where it is the plain
-        number 1, Dr.Jit leaves the multiplications out.
+    stretch : length in the plane over the same length of the table's patch. The plain number 1
+        compiles to no multiplication.
     """
 
     rotation: Rotation

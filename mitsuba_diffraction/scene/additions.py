@@ -180,19 +180,24 @@ def remove_dark_lights(state: Any) -> None:
     state : `mi.parser.ParserState`, its references resolved.
     """
 
-    def is_dark(number: int) -> bool:
-        props = state.nodes[number].props
-        return props.plugin_name() == "d65" and float(props.get("scale", 1.0)) == 0.0
-
+    nodes = state.nodes
+    black = {
+        number
+        for number, node in enumerate(nodes)
+        if node.props.plugin_name() == "d65" and float(node.props.get("scale", 1.0)) == 0.0
+    }
+    if not black:  # reading a property hides from Mitsuba that no plugin reads it
+        return
     dark = {
-        number for number, node in enumerate(state.nodes)
-        if node.type == mi.ObjectType.Emitter and any(map(is_dark, _targets(node)))
-    }  # fmt: skip
-    for node in state.nodes:
-        for name in list(node.props.keys()):
-            value = node.props[name]
-            if isinstance(value, mi.Properties.ResolvedReference) and value.index() in dark:
-                del node.props[name]
+        number
+        for number, node in enumerate(nodes)
+        if node.type == mi.ObjectType.Emitter and black.intersection(_targets(node))
+    }
+    resolved = mi.Properties.Type.ResolvedReference
+    for props in (node.props for node in nodes):
+        for name in list(props.keys()):
+            if props.type(name) == resolved and props[name].index() in dark:
+                del props[name]
 
 
 def put_box_filters(state: Any) -> None:

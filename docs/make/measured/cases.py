@@ -1,4 +1,4 @@
-"""Measurements, what is known of each grating, and what is fitted."""
+"""Measured gratings: efficiencies, printed properties, and fitted grooves."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _GMOS = {
     "B1200_G5301": (1200, 463), "R831_G5302": (831, 757), "B600_G5303": (600, 461),
     "R600_G5304": (600, 926), "R400_G5305": (400, 764), "R150_G5306": (150, 717),
 }  # fmt: skip
-# wavelengths of the instrument over those of the laboratory
+# ratio of the wavelength in the instrument to the wavelength in the laboratory
 _MOUNT = 0.906
 
 
@@ -99,7 +99,7 @@ class Case:
 
     @cached_property
     def grooves(self) -> dict[int, Groove]:
-        """The groove of the drawing (0 unknowns fitted), and those of `FITS`."""
+        """Groove by number of fitted parameters: 0, the drawing, and each of `FITS`."""
         if self.like:
             return self.like.grooves
         stored = {
@@ -171,9 +171,9 @@ def reflection_gratings() -> list[Case]:
 
 
 def transmission_gratings() -> list[Case]:
-    """One ruled grating of glass on a bench, in both mounts, and its maker's data sheet.
+    """Cases of a ruled glass grating: both mounts on a bench, and its maker's data sheet.
 
-    The sheet comes twice: with the index of the fit, and with a higher one.
+    The data sheet gives two cases: the index of the fit, and a higher index.
     """
     rows = table("thor300")
     period = 1e3 / 300.0

@@ -20,7 +20,7 @@ class Groove(NamedTuple):
 
     facet : angle of the long facet to the grating's plane, degrees.
     apex : angle between the facets, degrees; a ruling diamond has about 90.
-    roughness : RMS height of what is too fine for the period, nm.
+    roughness : RMS height of roughness finer than the period, nm.
     rounding : width over which heights are averaged, nm.
     """
 

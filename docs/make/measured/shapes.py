@@ -1,4 +1,4 @@
-"""What each imperfection of a groove does to its orders."""
+"""Effect of each imperfection of a groove on its orders."""
 
 from __future__ import annotations
 

@@ -30,10 +30,10 @@ from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
 from .transport import Orders, ScatteredLight, Transport
 
-#: Where order 0 has less of the light, it is not scaled.
+#: Minimum share of order 0 in the light; a weaker order 0 is not scaled.
 MIN_ORDER_0 = 1e-4
-#: Polar angles beyond the grid of directions. Towards the horizon an albedo that gains there rises
-#: as 1/cosθ or faster, and the plugin attenuates what is scaled.
+#: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
+#: 1/cosθ or faster, and the plugin attenuates scaled light.
 GRAZING = np.radians([89.8, 89.9])
 
 
