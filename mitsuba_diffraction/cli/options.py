@@ -66,8 +66,8 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
     "periodic": (
         "METHOD",
-        "smooth or taper: make the patch tile without seams; exact: it is whole periods of a "
-        "surface that repeats; none; default: smooth if the seams of a file show",
+        "make edges meet: trend, of waves longer than the patch; smooth or taper, of all heights; "
+        "exact: whole periods of a surface that repeats; none; default: trend if seams show",
     ),
 }
 _TABLE = (

@@ -61,10 +61,10 @@ def load(
     clip
         Clip heights to this many robust standard deviations; default not at all.
     periodic
-        "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the patch is
-        whole periods of a surface that repeats; "none". By default "smooth" where seams show
-        (`validity.seam_defects`). The treatments are applied in the order crop, fill, level, clip,
-        periodic, and each leaves a line in `history`.
+        "trend", "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the
+        patch is whole periods of a surface that repeats; "none". By default "trend" where seams of
+        waves longer than the patch show (`validity.seam_defects`). The treatments are applied in
+        the order crop, fill, level, clip, periodic, and each leaves a line in `history`.
 
     Raises
     ------

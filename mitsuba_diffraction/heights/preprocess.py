@@ -304,9 +304,51 @@ def periodic_smooth(field: HeightField) -> HeightField:
     ŝ = v̂ / (Laplacian's eigenvalues), with mean 0. Differences along x and y are weighted by
     1/dx² and 1/dy², so that pixels need not be square.
     """
-    h = field.heights
-    ny, nx = field.shape
-    dx, dy = field.pixel_size
+    h = field.heights - _smooth_component(field.heights, field.pixel_size)
+    return _reported(field, h, "made periodic by dropping its smooth component")
+
+
+def periodic_trend(field: HeightField) -> HeightField:
+    """Drop the smooth component (Moisan 2011) of the cubic trend alone.
+
+    Waves longer than the patch then meet at the seams. Structure within the patch stays: the smooth
+    component of ridges that the edge cuts is a ramp across the patch, and would tilt them.
+    """
+    trend = trend_of(field)
+    smooth = _smooth_component(trend.along_y @ trend.weights @ trend.along_x.T, field.pixel_size)
+    what = "made periodic by dropping the smooth component of its cubic trend"
+    return _reported(field, field.heights - smooth, what)
+
+
+class Trend(NamedTuple):
+    """Cubic trend of a patch: along_y @ weights @ along_x.T in µm, with orthonormal polynomials."""
+
+    along_y: FloatArray  # (ny, 4), or fewer of fewer samples
+    weights: FloatArray  # (4, 4)
+    along_x: FloatArray  # (nx, 4)
+
+    def steps(self) -> tuple[FloatArray, FloatArray]:
+        """Return last minus first column (ny,) and last minus first row (nx,), µm."""
+        across = self.along_y @ (self.weights @ (self.along_x[-1] - self.along_x[0]))
+        return across, (self.along_y[-1] - self.along_y[0]) @ self.weights @ self.along_x.T
+
+
+def trend_of(field: HeightField) -> Trend:
+    """Return the least-squares polynomial of x and y of degree 3."""
+    bases = []
+    for count in field.shape:
+        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(3, count - 1))
+        bases.append(np.linalg.qr(powers)[0])
+    along_y, along_x = bases
+    weights = along_y.T @ field.heights @ along_x
+    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 3] = 0.0
+    return Trend(along_y, weights, along_x)
+
+
+def _smooth_component(h: FloatArray, pixel_size: tuple[float, float]) -> FloatArray:
+    """Return Moisan's smooth component of heights, µm; see `periodic_smooth`."""
+    ny, nx = h.shape
+    dx, dy = pixel_size
     wx, wy = dy / dx, dx / dy  # only their ratio matters
     v = np.zeros_like(h)
     step_y = wy * (h[-1] - h[0])
@@ -321,8 +363,7 @@ def periodic_smooth(field: HeightField) -> HeightField:
     eigenvalues[0, 0] = 1  # v has mean 0
     spectrum = np.fft.rfft2(v) / eigenvalues
     spectrum[0, 0] = 0
-    smooth = np.fft.irfft2(spectrum, s=(ny, nx))
-    return _reported(field, h - smooth, "made periodic by dropping its smooth component")
+    return np.fft.irfft2(spectrum, s=(ny, nx))
 
 
 def periodic_taper(field: HeightField) -> HeightField:

@@ -35,6 +35,7 @@ from .validity import seam_defects, tilted
 
 LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
 PERIODICS = {
+    "trend": preprocess.periodic_trend,
     "smooth": preprocess.periodic_smooth,
     "taper": preprocess.periodic_taper,
     "exact": preprocess.periodic_exact,
@@ -158,7 +159,7 @@ def treated_by_default(
         field = field.changed(field.heights, line)
     field = treat(field, replace(options, periodic=None))
     if options.periodic is None and small and seam_defects(field)[1] is not None:
-        return _by_default(PERIODICS["smooth"](field), "periodic")
+        return _by_default(PERIODICS["trend"](field), "periodic")
     return treat(field, LoadOptions(periodic=options.periodic))
 
 

@@ -33,10 +33,11 @@ level : string [auto]
 clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
 periodic : string [auto]
-    Treatment of opposite edges, which meet where the patch is tiled: `smooth` keeps the periodic
-    component (Moisan 2011), `taper` attenuates heights towards the edges; `exact` leaves heights as
-    they are and states that the patch is whole periods of a surface that repeats; `none`. `auto`
-    is `smooth` for a file of heights whose seams would diffract like a grating, else `none`.
+    Treatment of opposite edges, which meet where the patch is tiled: `trend` keeps the periodic
+    component (Moisan 2011) of waves longer than the patch, `smooth` that of all heights; `taper`
+    attenuates heights towards the edges; `exact` leaves heights as they are and states that the
+    patch is whole periods of a surface that repeats; `none`. `auto` is `trend` for a file of
+    heights where seams of waves longer than the patch would diffract like a grating, else `none`.
     Treatments are applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,

@@ -44,8 +44,8 @@ def _integrator() -> type[Any]:
             self.nested = props["nested"]
             if not isinstance(self.nested, mi.SamplingIntegrator):
                 raise DiffractionError(
-                    f"--clamp limits samples of paths from the camera; {self.nested.class_name()} "
-                    "traces light from lamps: leave --clamp out"
+                    f"clamping limits samples of paths from the camera; {self.nested.class_name()} "
+                    "traces light from lamps: leave clamping out"
                 )
 
         def sample(

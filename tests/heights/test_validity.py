@@ -7,6 +7,7 @@ import pytest
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.heights.seams import seam_step
 from mitsuba_diffraction.heights.validity import edge_lines
 from tests.support.directions import rough_patch
 
@@ -14,6 +15,8 @@ SHORTEST = 0.36
 Y, X = np.mgrid[0:128, 0:128]
 # Two incommensurate waves: no edge meets the opposite one.
 SCALE = 0.06 * np.cos(0.17 * X + 0.05 * Y) + 0.03 * np.cos(0.11 * Y + 0.07 * X + 1)
+# A wave longer than the patch, without tilt, and one edge 0.24 µm above the opposite one.
+BENT = SCALE + 0.3 * ((X / 63.5 - 1) ** 3 - 0.6 * (X / 63.5 - 1))
 
 
 def cut_out(heights, pixel_size=0.05):
@@ -32,17 +35,24 @@ def test_a_ramp_is_found_and_said_with_its_rise():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_seams_are_said_until_they_are_mended(turned):
-    field = cut_out(SCALE.T if turned else SCALE)
+    field = cut_out(BENT.T if turned else BENT)
     (line,) = edge_lines(field, SHORTEST)
-    assert line.startswith("scan: use periodic=smooth: ")
-    for how in ("smooth", "taper"):
+    assert line.startswith("scan: use periodic=trend: ")
+    for how in ("trend", "smooth", "taper"):
         assert edge_lines(field.treated(periodic=how), SHORTEST) == []
 
 
+def test_ridges_that_the_edge_cuts_are_let_be():
+    ridges = 0.06 * np.sin(0.31 * X)  # 6.3 periods
+    assert seam_step(cut_out(ridges)) > 0.04
+    for heights in (SCALE, ridges, ridges.T):
+        assert edge_lines(cut_out(heights), SHORTEST) == []
+
+
 def test_the_seams_of_a_tilted_patch_are_those_that_levelling_leaves():
-    _, line = edge_lines(cut_out(SCALE + 0.01 * X), SHORTEST)
+    _, line = edge_lines(cut_out(BENT + 0.01 * X), SHORTEST)
     assert "even after levelling" in line
-    (alone,) = edge_lines(cut_out(SCALE + 0.01 * X).treated(level="plane"), SHORTEST)
+    (alone,) = edge_lines(cut_out(BENT + 0.01 * X).treated(level="plane"), SHORTEST)
     assert line.replace(" even after levelling", "") == alone
 
 
@@ -88,7 +98,9 @@ def test_what_is_made_is_not_asked_and_what_is_cut_is(tmp_path):
     assert sum("level=plane" in line for line in loaded.validity()) == 1
     tiling = rough_patch((64, 64), (0.05, 0.05), 0.05)
     assert not any("periodic=" in line for line in tiling.validity())
-    assert any("periodic=smooth" in line for line in tiling.treated(crop=1.6).validity())
+    bent = HeightField(BENT, 0.05, periodic=True)
+    assert not any("periodic=" in line for line in bent.validity())
+    assert any("periodic=trend" in line for line in bent.treated(crop=6.0).validity())
 
 
 def test_measured_patches(shared_afm):
@@ -100,7 +112,7 @@ def test_measured_patches(shared_afm):
     assert edge_lines(period, SHORTEST) == []
     pytest.importorskip("SurfaceTopography")
     scan = HeightField.load(shared_afm / "nanoscope-10um.di", periodic="none")
-    assert any("periodic=smooth" in line for line in scan.validity())
+    assert any("periodic=trend" in line for line in scan.validity())
     assert edge_lines(HeightField.load(shared_afm / "nanoscope-10um.di"), SHORTEST) == []
 
 
@@ -109,11 +121,11 @@ def test_files_are_mended_by_default_and_left_alone_where_nothing_shows(tmp_path
         np.save(tmp_path / "a.npy", heights)
         return HeightField.load(tmp_path / "a.npy", pixel_size=0.05, **options)
 
-    tilted = SCALE + 0.01 * X
+    tilted = BENT + 0.01 * X
     mended = loaded(tilted)
     assert edge_lines(mended, SHORTEST) == []
     assert [line.split()[0] for line in mended.history] == ["plane", "made"]
-    asked = loaded(tilted, level="plane", periodic="smooth")
+    asked = loaded(tilted, level="plane", periodic="trend")
     np.testing.assert_array_equal(mended.heights, asked.heights)
     np.testing.assert_array_equal(loaded(tilted, level="none", periodic="none").heights, tilted)
     np.testing.assert_array_equal(loaded(tilted, periodic="exact").heights, tilted)

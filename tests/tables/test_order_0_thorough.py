@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.heights.read import LoadOptions, treated_by_default
 from tests.support.mirror import FAST, beside_the_mirror
 
 # small and coarse scans are what is tested
@@ -31,7 +32,7 @@ def rough_ridges(n, pixel):
 
 
 def test_crops_of_a_rough_surface_have_the_light_of_the_whole():
-    """Six crops of 10 µm as they are, cut out of 266 µm, against the whole."""
+    """Six crops of 10 µm, as files of them are treated by default, against the whole 266 µm."""
     pixel, n, side = 0.25, 1064, 40
     heights, rng = rough_ridges(n, pixel), np.random.default_rng(5)
     limit = {"tolerance": 1e-2, "frequency_limit": (6.0, 1.5), **FAST}
@@ -40,7 +41,8 @@ def test_crops_of_a_rough_surface_have_the_light_of_the_whole():
     for _ in range(6):
         y, x = rng.integers(0, n - side, 2)
         part = md.HeightField(heights[y : y + side, x : x + side], pixel, cut_out=True)
-        crops.append(md.DiffractionTable.build(part, **limit))
+        treated = treated_by_default(part, LoadOptions())
+        crops.append(md.DiffractionTable.build(treated, **limit))
     wavelengths = np.arange(450.0, 801.0, 50.0)
     for degrees in (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0):
         truth = beside_the_mirror(whole, degrees, wavelengths)

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess import periodic_smooth, periodic_taper
+from mitsuba_diffraction.heights.preprocess import (
+    periodic_smooth,
+    periodic_taper,
+    periodic_trend,
+)
 from mitsuba_diffraction.heights.seams import seam_share, seam_step
 
 Y, X = np.mgrid[0:48, 0:64]
@@ -44,6 +48,18 @@ def test_periodic_heights_keep_their_waves_and_lose_their_ramp():
     assert " of the mean-square slope; RMS change " in line
 
 
+def test_trend_loses_waves_longer_than_the_patch_and_keeps_ridges():
+    ridges = HeightField(0.1 * np.sin(0.75 * X), 0.1)  # 7.6 periods
+    change = (periodic_trend(ridges).heights - ridges.heights).std()
+    # of white noise a cubic in 64 columns has 4/64 of the mean square
+    assert change < 0.25 * ridges.rms_height
+    assert change < 0.6 * (periodic_smooth(ridges).heights - ridges.heights).std()
+    long = HeightField(1e-5 * (X - 32.0) ** 3 + RAMP, 0.1)
+    assert seam_step(periodic_trend(long)) < 0.1 * seam_step(long)
+    smallest = HeightField(np.array([[0.0, 0.1], [0.2, 0.5]]), 0.1)
+    assert np.isfinite(periodic_trend(smallest).heights).all()
+
+
 def test_taper_meets_at_the_mean_and_keeps_the_middle():
     field = HeightField(WAVES + RAMP, 0.1)
     tapered = periodic_taper(field)
@@ -56,5 +72,5 @@ def test_taper_meets_at_the_mean_and_keeps_the_middle():
 
 def test_flat_patches_stay_flat():
     flat = HeightField(np.full((4, 6), 0.2), 0.1)
-    for treat in (periodic_smooth, periodic_taper):
+    for treat in (periodic_smooth, periodic_taper, periodic_trend):
         assert treat(flat).heights == pytest.approx(0.2, abs=1e-15)
