@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.solve import jobs
 from tests.support.clone import small_clone
 from tests.support.pages import PAGES, blocks
 
@@ -36,6 +37,9 @@ def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch, some_variant
     monkeypatch.chdir(inputs)
     monkeypatch.setitem(boundary.MODELS, "dulled", None)  # extending.md enters a model
     monkeypatch.delitem(boundary.MODELS, "dulled")
+    for entered in (jobs.METHODS, jobs.MOST_RESOLUTION):  # and a solver
+        monkeypatch.setitem(entered, "phase_screen", None)
+        monkeypatch.delitem(entered, "phase_screen")
     here = [text for text in blocks(page, "python") if DENOISER or "import pyoidn" not in text]
     for text in here:  # one after the other: they read what those before have written
         exec(re.sub(r"\.advance\(\d+\)", ".advance(2)", text), {})  # of many frames two
