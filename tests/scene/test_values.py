@@ -50,7 +50,7 @@ def test_the_scenes_own_parameter_goes_first(scene):
 def test_a_scene_without_the_surface_refuses_its_parameters(scene):
     scene.write_text(SCENE.replace('"diffraction"', '"diffuse"').split("<string")[0] +
                      SCENE[SCENE.index("</bsdf>"):])  # fmt: skip
-    with pytest.raises(DiffractionError, match="--material or --preset"):
+    with pytest.raises(DiffractionError, match="as a material or a preset"):
         load_scene(scene, {"height_scale": "0.5"})
     with pytest.raises(DiffractionError, match="did you mean lamp"):
         load_scene(scene, {"lamq": "0.5"})
