@@ -157,7 +157,7 @@ def put_surface_parameters(state: Any, values: Mapping[str, Any]) -> None:
         if not surfaces:
             raise DiffractionError(
                 f"{name}={text} is a parameter of a diffracting surface, and the scene has none "
-                "that takes it; put one on an id with --material or --preset"
+                "that takes it; put one on an id as a material or a preset"
             )
         for props in surfaces:
             for other in MATERIALS if name in MATERIALS else (name,):
