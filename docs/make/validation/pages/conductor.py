@@ -62,7 +62,7 @@ def _polarisation(measured: Measurements) -> str:
             rows.append([str(grating), light.upper(), *map(percent, values)])
     return f"""## Polarised light
 
-Deviation of all orders of the model, a mean over polarisations, from one polarisation at a time (TE:
-the electric field along the grooves):
+Deviation of all orders of the model, a mean over polarisations, from one polarisation at a time
+(TE: the electric field along the grooves):
 
 {table(["grating", "light", *map(angle, angles)], rows)}"""

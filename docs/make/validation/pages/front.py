@@ -195,7 +195,8 @@ Largest deviation of colours in light up to 60°:
 
 {table(["layer", "worst"], rows)}
 
-[transmission.md](validation/transmission.md) has transmitted orders, and R + T of several surfaces."""
+[transmission.md](validation/transmission.md) has transmitted orders, and R + T of several
+surfaces."""
 
 
 def _numerics() -> str:
@@ -203,7 +204,8 @@ def _numerics() -> str:
 
 Order powers of ideal gratings agree with closed forms to 5e-6 in `md.reference.brdf` and to 1e-5 in
 tables ([numerics.md](validation/numerics.md)). The rigorous solutions change by less than 5e-3 of
-the incident light in their last refinement, most by 1e-5 ([solutions.md](validation/solutions.md))."""
+the incident light in their last refinement, most by 1e-5
+([solutions.md](validation/solutions.md))."""
 
 
 def _tables() -> str:

@@ -38,7 +38,8 @@ def _exact(measured: Measurements) -> str:
 
 Small slope without the blend, summed over all intermediate waves. Deviation of colours, mean and
 worst; *light* is all reflected light over the rigorous. *Times the mean* is the first order times
-the mean second order of Gaussian heights of the same spectrum. Gratings have a depth/period up to {DEEPEST:g}.
+the mean second order of Gaussian heights of the same spectrum. Gratings have a depth/period up to
+{DEEPEST:g}.
 
 {table(header, _rows(cases, MODELS, MODELS))}
 
@@ -99,8 +100,9 @@ Deviation of colours with `second_order=false` / `second_order=true`:
 
 {table(header, rows)}
 
-At the walls of lamellar and blazed gratings a gate switches the factor off. Of {len(every)} gratings and angles {len(worse)} are worse with the factor,
-by more than the solver's last refinement changed and a tenth of a point:
+At the walls of lamellar and blazed gratings a gate switches the factor off. Of {len(every)}
+gratings and angles {len(worse)} are worse with the factor, by more than the solver's last
+refinement changed and a tenth of a point:
 
 {table(["", "light from", *names], harmed)}
 
