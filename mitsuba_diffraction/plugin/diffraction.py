@@ -176,8 +176,8 @@ Variants
 wavelength : float [550]
     Wavelength of mono variants, nm.
 
-The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999), looked
-up in a table of the patch, times a factor of the material:
+The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999) times a
+factor of the material:
 
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
 
@@ -189,8 +189,6 @@ Denoisers that ask for an albedo get the reflectance at normal incidence, nested
 Derivatives pass through renderings backward and forward, for all parameters marked ∂. A function
 that `dr.freeze` records must give `mi.render` a seed of type `mi.UInt32`: a plain number becomes
 part of the recording.
-
-The BSDF `diffraction_mix` blends several such surfaces by weights (docs/own-scene.md).
 
 XML and the same in Python:
 
