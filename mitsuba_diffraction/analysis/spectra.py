@@ -136,7 +136,7 @@ class Spectra:
     band: tuple[Reals, Reals] | None = None
 
     def names(self, group: str = "") -> list[str]:
-        """Return names of the detectors' columns, with that of a group before them."""
+        """Return names of the detectors' columns, with a group's name before them."""
         words = re.sub(r"[^\w.]", "_", group)
         return [f"{words}_{name}" if words else name for name in self.geometry.names]
 
@@ -219,7 +219,7 @@ def spectrum(
 
 
 def check_relative(relative: str) -> None:
-    """Refuse a word that is none of `RELATIVE`."""
+    """Refuse a word outside `RELATIVE`."""
     if relative not in RELATIVE:
         raise DiffractionError(
             f"relative='{relative}' is unknown; choose one of {', '.join(RELATIVE)}"

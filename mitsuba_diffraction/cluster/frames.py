@@ -170,7 +170,7 @@ class Film:
         Raises
         ------
         DiffractionError
-            Naming frame, passes and worker, if a task fails; what is done is kept.
+            Naming frame, passes and worker, if a task fails; finished work is stored.
         """
         start = time.perf_counter()
         groups = Groups(

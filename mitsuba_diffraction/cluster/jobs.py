@@ -41,7 +41,7 @@ def build(
     heights : one scan or several.
     client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
     progress : called as progress(done, total, text).
-    settings : of `DiffractionTable.build`, `windows` among them. A scan that is no wider than a
+    settings : of `DiffractionTable.build`, `windows` among them. A scan not wider than a
         window is built here.
 
     Raises

@@ -131,7 +131,7 @@ def transmitted(
 
     Parameters
     ----------
-    jones, geometry, index : of the structure in the coat; index over that of the coat.
+    jones, geometry, index : of the structure in the coat; index relative to the coat.
     came, left : the face for the incident and for the outgoing light.
     """
     factors = passed_powers(geometry, index, came, left)

@@ -46,7 +46,7 @@ class Side:
 
     @property
     def beyond_face(self) -> bool:
-        """Whether directions are those beyond the flat face of a sheet or a coat."""
+        """Whether directions lie beyond the flat face of a sheet or a coat."""
         return self.index != self.at_structure
 
     def normal(self, cosine: Real) -> Real:

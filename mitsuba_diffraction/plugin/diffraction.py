@@ -104,19 +104,19 @@ eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
-    or names: `water`. The medium changes what is reflected; directions are those of light in air.
+    or names: `water`. The medium changes the reflectance; directions are those of light in air.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
     a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
     own face is a mirror of the same coherence width. Light that the face sends back is summed as
     between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md). Energy is conserved as without a coat. The index over that of the medium
+    (docs/validation.md). Energy is conserved as without a coat. The index relative to the medium
     above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
-    above it. The index over that of the medium above is the differentiable parameter `film_eta`.
+    above it. The index relative to the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
     costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01,
     or 0.001 of thick films. Derivatives with respect to the film include it.

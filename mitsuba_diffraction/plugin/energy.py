@@ -142,7 +142,7 @@ class EnergyModel:
             self._warned = True
             warn(
                 f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
-                "the normal: what is above 100 % is taken (energy_conserving=false keeps it); its "
+                "the normal: the excess is removed (energy_conserving=false keeps it); its "
                 "orders are least certain there"
             )
 

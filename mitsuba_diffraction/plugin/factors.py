@@ -105,8 +105,8 @@ class VaryingFactor:
 class LateralScale:
     """Factor by which the patch is stretched in its plane, at points of the surface.
 
-    The table is that of the patch stretched by the largest factor, or of the patch itself where no
-    factor is above 1, so that no look-up goes beyond its frequencies.
+    The table has the heights stretched by the largest factor, or unstretched where no factor is
+    above 1, so that no look-up goes beyond its frequencies.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def read_factor(props: Properties, limits: FactorLimits) -> float | VaryingFacto
     Raises
     ------
     DiffractionError
-        With the parameter, its value and what is allowed.
+        With the parameter, its value and the allowed values.
     """
     name, largest = limits.name, f"{limits.name}_max"
     texture = dict(props.objects()).get(name)
@@ -195,7 +195,7 @@ def read_lateral(props: Properties) -> LateralScale:
     Raises
     ------
     DiffractionError
-        With the parameter, its value and what is allowed.
+        With the parameter, its value and the allowed values.
     """
     name, largest = LATERAL.name, f"{LATERAL.name}_max"
     factor = read_factor(props, LATERAL) if name in props else None

@@ -35,7 +35,7 @@ class CoatedPair(Pair):
 
     Attributes
     ----------
-    n : index of the coat over that of the medium above it.
+    n : index of the coat relative to the medium above it.
     """
 
     def __init__(self, outer: Pair, n: Float) -> None:
@@ -66,7 +66,7 @@ class UnderCoat:
         return coated_reflectance(face, self.material.reflectance(inside, si, active))
 
     def traverse(self, callback: Callback) -> None:
-        """Expose the material's index, and the coat's over that of the medium above it."""
+        """Expose the material's index, and the coat's relative to the medium above it."""
         self.material.traverse(callback)
         self.coat.traverse(callback)
 
@@ -141,7 +141,7 @@ class UnderFilm:
     Parameters
     ----------
     material : the material itself.
-    film : the real part of the film's index, over that of the medium above it.
+    film : the real part of the film's index, relative to the medium above it.
     k : its imaginary part.
     thickness : nm.
     wavelength : nm, of mono variants.

@@ -29,7 +29,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     Parameters
     ----------
     wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or
+    index : (...) n + ik of the material relative to the medium above it, finite, k ≥ 0; or
         the index under a film, `optics.fresnel.Filmed`.
     """
     s_in, s_out = polarisation_axes(wi, wo)

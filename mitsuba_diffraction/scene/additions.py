@@ -134,7 +134,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     state : `mi.parser.ParserState`.
     materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
 
-    Raises a DiffractionError if an id is unknown; the text names those of the scene.
+    Raises a DiffractionError if an id is unknown; the text lists the scene's.
     """
     for name, text in materials.items():
         number = _node_of(state, name)

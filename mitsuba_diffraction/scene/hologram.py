@@ -67,7 +67,7 @@ class Hologram:
     def mix(self, grating: dict[str, Any], blank: dict[str, Any]) -> dict[str, Any]:
         """Return a `diffraction_mix` of the gratings and the foil between them.
 
-        grating : BSDF with `parameters`; blank : BSDF where there is no grating.
+        grating : BSDF with `parameters`; blank : BSDF without a grating.
         """
         weight = _texture(self.weight[..., None])
         return {
@@ -204,7 +204,7 @@ def _read(path: Path) -> NDArray[Any]:
 def _of_dots(
     name: str, given: Values, values: NDArray[Any], full_scale: float
 ) -> NDArray[np.float64]:
-    """Return a quantity at the dots (ny, nx); NaN where there is none."""
+    """Return a quantity at the dots (ny, nx), or NaN."""
     try:
         if isinstance(given, Mapping):
             if values.dtype.kind == "f":

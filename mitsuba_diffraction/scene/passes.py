@@ -204,7 +204,7 @@ def render_passes(
     seed : whole number from 0; each pass gets its own, derived from it.
     variant : name of the variant.
     stop : asked, it ends the rendering after the current pass.
-    progress : called as progress(samples done, samples in all, what is being done).
+    progress : called as progress(samples done, samples in all, activity).
 
     Raises a DiffractionError if Mitsuba refuses or fails to render.
     """

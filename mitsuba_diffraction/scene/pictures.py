@@ -26,7 +26,7 @@ def read_exr(path: Path) -> Any:
 
     readable_file(path)
     if path.suffix.lower() != ".exr":
-        raise DiffractionError(f"'{path}' is no EXR; name a picture that 'render' wrote as .exr")
+        raise DiffractionError(f"'{path}' is not an EXR; name a picture that 'render' wrote")
     try:
         colours = colours_of(mi.Bitmap(str(path)))
     except RuntimeError as error:

@@ -54,7 +54,7 @@ def solve_beam(
         x towards y; a grid of both.
     step : between wavelengths, nm; the ends of the settings' wavelengths are solved exactly.
     profile, material, superstrate, layers, settings, jobs, announce : as for `solve_orders`; the
-        tolerance is that of the solver.
+        tolerance bounds the solver's error.
 
     Raises
     ------

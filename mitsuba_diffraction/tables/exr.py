@@ -94,7 +94,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         _check_headers(headers, description, os.path.getsize(path))
         planes = _planes(_read(path, lambda file: file.channels()), description)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
-            raise ValueError("its checksum is that of another one")
+            raise ValueError("its checksum is of another one")
         return description.table(_coefficients(planes, description))
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(

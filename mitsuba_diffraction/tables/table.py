@@ -43,7 +43,7 @@ class DiffractionTable:
     expansion : which series in κ.
     grid : bins, window and taps.
     spacing : (dqx, dqy), rad/µm between bins.
-    settings : what was asked for.
+    settings : requested settings.
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.

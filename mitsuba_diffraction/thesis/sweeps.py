@@ -108,7 +108,7 @@ def sweep(
     kind : one of `SWEEPS`.
     heights : the patch.
     light : direction to the light; a sweep over its angle keeps the azimuth.
-    values : values of the parameter; by default those of `SWEEPS`.
+    values : values of the parameter; by default from `SWEEPS`.
     method : method of the maps, except in a sweep over methods; `terms` requires "flss".
     resolution, samples, gain : see `methods.method_map`.
     progress : called as progress(done, total, text).
@@ -279,12 +279,12 @@ class Compiled:
 
     @property
     def ratio(self) -> float:
-        """Time of `flss` over that of the default look-up at every wavelength."""
+        """Time of `flss` relative to the default look-up at every wavelength."""
         return self.flss / self.spectral
 
     @property
     def colour_ratio(self) -> float:
-        """Time of `flss` over that of the default look-up in colours."""
+        """Time of `flss` relative to the default look-up in colours."""
         return self.flss / self.colours
 
 

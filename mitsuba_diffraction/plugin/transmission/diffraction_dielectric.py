@@ -1,7 +1,7 @@
 """The Mitsuba BSDF plugin `diffraction_dielectric`: reflects light, and lets the rest through.
 
-A surface between two dielectrics, or a thin sheet with one structured side, that light meets from
-either side. It has the parameters of `diffraction` for the heights, the table (without
+Interface of two dielectrics, or thin sheet with one structured side, in light from either
+side. It has the parameters of `diffraction` for the heights, the table (without
 `coherence=surface`), `orientation`, `lateral_scale`, `height_scale` and `wavelength`, and those
 below. It has no coat, film, nested BSDF, shadowing or second order.
 

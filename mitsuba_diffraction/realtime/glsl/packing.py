@@ -274,7 +274,7 @@ def pack_boundary(model: Model, roughness: RoughnessTable) -> Packed:
 def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
     """Pack the second order's coefficients and slope ratios (`optics.second_order`).
 
-    index : index of a dielectric over that of the medium above it.
+    index : index of a dielectric relative to the medium above it.
     """
     first, last = ratios.kappa
     count, _, rows, columns = ratios.values.shape

@@ -32,7 +32,7 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, dict
     the picture under one directional light: all of the fragment stage, with next to no geometry. A
     look-up is only the method's function at as many points, without the surface's shading. Methods
     alternate in rounds, and the fastest time of each counts, so that background load affects all
-    equally. The clock is that of `context.clock_of`.
+    equally. The clock is `context.clock_of`.
     """
     timed = {
         (method, kind): prepare(renderer, method)

@@ -113,7 +113,7 @@ class Session:
     def record(
         self, bsdf: BSDF, si: Interaction, uv: Vector2f, scaled_w: Float, value: Colour
     ) -> None:
-        """Write down what a BSDF was asked and what it answered; for the BSDF to call."""
+        """Record a look-up of a BSDF and its result; the BSDF calls it."""
         if not self._buffers:
             return
         number = next(n for n, (_, known) in enumerate(self.bsdfs) if known is bsdf)

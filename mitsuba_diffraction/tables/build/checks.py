@@ -93,7 +93,7 @@ def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple
 
 
 def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[str]:
-    """Return warnings of a table of these scans; they are no part of the table.
+    """Return warnings of a table of these scans; they are not stored in the table.
 
     Heights that are refused have none.
     """

@@ -95,7 +95,7 @@ class OrderTable:
     """Efficiencies of the orders of a periodic profile, at nodes of smooth coordinates.
 
     x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
-    are those of `cells`.
+    are defined in `cells`.
 
     Attributes
     ----------
