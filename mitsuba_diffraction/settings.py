@@ -137,7 +137,7 @@ class TableSettings:
     Attributes
     ----------
     coherence_width : µm over which the light is coherent, 4σ₀ of order 0's amplitude window; "auto"
-        is 65 µm, that of sunlight.
+        is 65 µm, as in sunlight.
     coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
     basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
     tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.

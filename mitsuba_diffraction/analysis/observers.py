@@ -300,7 +300,7 @@ def quantum_catches(
 
 
 def noises(eye: Eye, weber: float = WEBER) -> Reals:
-    """Return the noise e of each receptor's channel: `weber` that of the longest waves."""
+    """Return the noise e of each receptor's channel: `weber` for the longest waves."""
     density = np.array(eye.density)
     return np.asarray(weber * np.sqrt(density[-1] / density))
 

@@ -6,7 +6,7 @@ directions. Its signal at one wavelength, per power that falls on the surface, i
     P(λ) = ∫ f(ωi, ωo, λ) cosθo dωo   over the cone.
 
 A white standard, Lambertian of reflectance 1, has f = 1/π. Spectra relative to white are P over
-that of the standard in the same place: the reflectance factor of CIE 15:2018, section 6. Detectors
+the P of a standard in the same place: the reflectance factor of CIE 15:2018, section 6. Detectors
 lie in the plane of incidence: at +θ on the far side of the normal, where a mirror reflects the lamp
 of angle θ to, and at −θ on the lamp's side.
 """

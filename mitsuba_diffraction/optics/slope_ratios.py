@@ -106,7 +106,7 @@ class SlopeRatios:
     ----------
     cell : (dqx, dqy), rad/µm.
     orders : whether a cell is one order, along x and y; q is then rounded to it.
-    kappa : first and last κ, rad/µm, evenly between; beyond them r is that of the nearest.
+    kappa : first and last κ, rad/µm, evenly between; beyond them r is taken at the nearest.
     values : (n, 2, ny, nx) complex, l and t; q = 0 is in the middle.
     change : relative change of the colours by the second order (`second_order_change`).
     """

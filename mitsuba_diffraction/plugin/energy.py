@@ -88,8 +88,8 @@ class EnergyModel:
     def update(self, scales: ScaleRange, beneath: bool) -> None:
         """Look up, or compute, what belongs to other factors or another material.
 
-        s is linear between height scales, 1 among them. At one of them its derivative is that of
-        the interval above; g has derivatives of its own.
+        s is linear between height scales, 1 among them. At a height scale its derivative is taken
+        from the interval above; g has derivatives of its own.
 
         scales : the factors; beneath : whether light goes on to something.
         """

@@ -30,8 +30,8 @@ from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 class CoatedPair(Pair):
     """Pair of the directions within a coat.
 
-    `uv` and `w` are optical, those of k in vacuum: `w` is n times the sum of the cosines. All else
-    is that of the refracted directions.
+    `uv` and `w` are optical, for k in vacuum: `w` is n times the sum of the cosines. All else
+    belongs to the refracted directions.
 
     Attributes
     ----------
@@ -185,11 +185,11 @@ class UnderFilm:
         return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(indices, waves, strict=True)]
 
     def summed(self, values: list[Float]) -> list[Float]:
-        """The channels' values of those of `indices`."""
+        """The channels' values from the values of `indices`."""
         return values if self.channels is None else self.channels.sums(values)
 
     def wavenumbers(self, wavenumbers: list[Float]) -> list[Float]:
-        """Return wavenumbers of `indices`, rad/µm, from those of the channels."""
+        """Return wavenumbers of `indices`, rad/µm, from the channels' wavenumbers."""
         if self.channels is None:
             return wavenumbers
         return [mi.Float(k) for k in wavenumber(self.channels.wavelengths).tolist()]

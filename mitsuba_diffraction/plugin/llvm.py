@@ -55,7 +55,7 @@ class Library:
 
 
 def find_llvm() -> list[Library]:
-    """All of them, the one to prefer first: 19, then the newest, then those of no known version."""
+    """All of them, the one to prefer first: 19, then the newest, then unknown versions."""
     named = named_library()
     files = [*([named.path] if named else []), *in_folders()]
     return sorted({Library.at(file) for file in files if file.is_file()}, key=_preference)
@@ -130,7 +130,7 @@ def _folders(
 def select_llvm() -> Library | None:
     """Point DRJIT_LIBLLVM_PATH to the best library, unless it is set or it is too late.
 
-    Returns the choice. Nothing is said if there is none: other backends do without LLVM, and
+    Returns the choice. Without an LLVM there is no message: other backends do without, and
     `require_llvm` has the words.
     """
     if "drjit" in sys.modules or os.environ.get(VARIABLE):

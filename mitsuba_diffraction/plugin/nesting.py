@@ -1,6 +1,6 @@
 """BSDF that diffracts light over a nested BSDF, which receives the remaining light.
 
-Component 0 is the diffraction; those of the nested BSDF follow.
+Component 0 is the diffraction; the nested BSDF's components follow.
 """
 
 from __future__ import annotations

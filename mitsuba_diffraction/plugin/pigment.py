@@ -112,7 +112,7 @@ def _reflectance(text: str) -> dict[str, Any]:
 
 
 def _colour(text: str) -> list[float]:
-    """Return the linear sRGB values of a number, three of them, or a colour of CSS."""
+    """Return the linear sRGB values of one number, three numbers, or a colour of CSS."""
     try:
         numbers = [float(part) for part in text.replace(",", " ").split()]
     except ValueError:

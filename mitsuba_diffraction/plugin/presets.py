@@ -76,7 +76,7 @@ def find_preset(name: str) -> Preset:
     Raises
     ------
     DiffractionError
-        If there is none; the text names the nearest.
+        If the name is unknown; the text names the nearest.
     """
     known = presets()
     if name in known:

@@ -185,7 +185,7 @@ def coherence_of(props: Properties) -> str:
 
 
 def read_index(props: Properties, name: str, default: float = 1.0) -> float | str:
-    """Return a refractive index, that of a tissue too, or a medium that Mitsuba knows by name.
+    """Return a refractive index, also of a tissue, or a medium that Mitsuba knows by name.
 
     Raises
     ------
@@ -290,7 +290,7 @@ def resolved_path(name: str, parameter: str) -> Path:
     Raises
     ------
     DiffractionError
-        If there is none, with the folders.
+        If the file is missing, with the folders.
     """
     resolver = mi.file_resolver()
     path = Path(str(resolver.resolve(name)))

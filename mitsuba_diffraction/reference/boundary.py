@@ -59,7 +59,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
 
     Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
-    those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
+    the axes of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
     4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)

@@ -134,8 +134,8 @@ def mueller(
 ) -> Real:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
-    They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
-    `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
+    They take Stokes vectors of light along −ωi to Stokes vectors of light along ωo, both about the
+    axes of `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))

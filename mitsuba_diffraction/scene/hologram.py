@@ -113,8 +113,8 @@ def hologram(
         brightness: of files and integers over the largest integer, of floats from 0 to 1.
     periods
         Periods of the gratings, µm, 0.1 to 100. A mapping gives the period of each label. A pair
-        gives those of black and of white, in proportion between. An array (ny, nx) gives those of
-        the dots, a number that of all.
+        gives the periods of black and of white, in proportion between. An array (ny, nx) gives the
+        periods of dots, a number one period.
     orientations
         Degrees from the surface's first tangent to the direction across the grooves, in which light
         is spread; given as the periods are.

@@ -211,7 +211,7 @@ def preview_samples(sensor: Any, preview: bool) -> int:
 def sensor_of(scene: Any, index: int) -> Any:
     """Return a sensor of the scene.
 
-    Raises a DiffractionError if there is none with that index.
+    Raises a DiffractionError if no sensor has that index.
     """
     sensors = scene.sensors()
     if not sensors:
@@ -226,7 +226,7 @@ def sensor_of(scene: Any, index: int) -> Any:
 def _check_films(state: Any) -> None:
     """Refuse films whose pictures would exceed the memory of this machine.
 
-    state : `mi.parser.ParserState`; nothing is loaded yet, since that may take minutes.
+    state : `mi.parser.ParserState`; no surface is loaded yet, since that may take minutes.
     """
     import mitsuba as mi
 

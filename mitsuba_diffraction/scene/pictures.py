@@ -69,7 +69,7 @@ def write_png(
 ) -> None:
     """Write 8 bits per channel: values times 2^exposure, shown by a view, sRGB's transfer curve.
 
-    colours : result of `colours_of`; its alpha is premultiplied, that of the PNG is not.
+    colours : result of `colours_of`; its alpha is premultiplied, the PNG's is not.
     exposure : stops.
     view : one of `optics.display.VIEWS`.
     metadata : text to store with it, ASCII.

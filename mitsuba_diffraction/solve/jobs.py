@@ -127,8 +127,8 @@ def solver_of(problem: Problem) -> Solver:
 class Solved(NamedTuple):
     """Amplitudes of a place, and the processor seconds that they took.
 
-    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. Those of a sheet, whose
-        light has no phase, are roots of its efficiencies.
+    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. For a sheet, whose light
+        has no phase, they are roots of its efficiencies.
     """
 
     values: Complex

@@ -165,7 +165,7 @@ def principal_functions(
     values : (nodes, bins), each bin's power, or part of its amplitude, at the interval's nodes.
     expansion : the Chebyshev series whose nodes they are.
     terms : how many functions.
-    near : the bins close to order 0, whose error is measured apart from that of all others.
+    near : the bins close to order 0, whose error is measured separately.
 
     Returns
     -------

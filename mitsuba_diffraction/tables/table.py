@@ -124,7 +124,7 @@ class DiffractionTable:
 
     @property
     def sigma_0(self) -> float:
-        """σ₀ of order 0's amplitude window, µm: that of the light."""
+        """σ₀ of order 0's amplitude window, µm: the light's."""
         return sigma_of(self.coherence_width)
 
     @property

@@ -216,7 +216,7 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
 
 
 def _compare_all(kind: str, values: Sequence[Any], maps: Sequence[TimedMap]) -> Sweep:
-    """Compare all maps with that of the reference value, if the sweep has one."""
+    """Compare all maps with the map of the reference value, if the sweep has one."""
     rule = SWEEPS[kind].reference
     reference: int | None
     if rule is None or (rule == "flss" and "flss" not in values):
@@ -301,8 +301,8 @@ def time_compiled(
 ) -> Compiled:
     """Time one map of the whole spectrum by three look-ups, without building tables.
 
-    The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or those of CUDA if the current
-    variant is one, and leaves the spectral one set.
+    The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or the CUDA variants
+    if one is current, and leaves the spectral one set.
 
     Raises
     ------

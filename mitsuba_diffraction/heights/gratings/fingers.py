@@ -30,7 +30,7 @@ class Layout:
     """Lattice of fingers and its irregularities; lengths in µm.
 
     `sway`, `wave` and `rise` are standard deviations of fields that vary over several fingers,
-    `jitter_x` and `jitter_y` those of single tips. Fingers vary more from column to column than
+    `jitter_x` and `jitter_y` vary single tips. Fingers vary more from column to column than
     along a column.
     """
 

@@ -78,7 +78,7 @@ def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
 
 
 def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Put each colour of order 0 (radii, zs, 3) beside that of the next z, padded: (n, 8)."""
+    """Put each colour of order 0 (radii, zs, 3) beside the next z, padded: (n, 8)."""
     following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
     pairs = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
     return np.asarray(pairs.reshape(-1, 8))

@@ -155,7 +155,7 @@ class Surface:
 class DirectionField:
     """Unit tangent vector of every vertex, and mask of vertices without one."""
 
-    # (n, 3) unit vectors at right angles to the normals; zero where there is none
+    # (n, 3) unit vectors at right angles to the normals; zero without a direction
     directions: Floats
     singular: Floats  # (k, 3) places around which the field turns
     indices: Ints  # (k,) how often, counter-clockwise

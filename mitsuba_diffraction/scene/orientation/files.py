@@ -127,7 +127,7 @@ def write_ply(
     """Write a binary PLY, with the names of properties that Mitsuba writes.
 
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
-    Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
+    Mitsuba 3.9 reads attributes of one or three channels and ignores attributes of two.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def _need_variant() -> None:
 
 
 def triangulated_ply(data: bytes) -> bytes | None:
-    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts those of OBJ.
+    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts polygons of OBJ.
 
     Faces must come after vertices; the result has nothing else. None for other files.
     """

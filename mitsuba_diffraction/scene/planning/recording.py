@@ -125,7 +125,7 @@ class Session:
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
     def records(self) -> list[Recorded]:
-        """Look-ups since `start`; nothing more is recorded."""
+        """Look-ups since `start`; recording has ended."""
         result = []
         for number, buffers in enumerate(self._buffers):
             u, v, w, *value = (np.array(buffer) for buffer in buffers)

@@ -159,7 +159,7 @@ def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -
 
 
 def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
-    """Refuse a table that exceeds the memory; `functions` counts those of basis "svd"."""
+    """Refuse a table that exceeds the memory; `functions` counts functions of basis "svd"."""
     components = 1 if expansion.kind == "power" else 2
     bins = (2 * grid.last[0] + 1) * (2 * grid.last[1] + 1)
     terms = functions or expansion.terms

@@ -127,8 +127,8 @@ def _powers_at(
 ) -> Iterator[tuple[float]]:
     """Powers of all bins (ny, nx, 1) at the nodes of an interval, written to `values`.
 
-    Gives that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so
-    that it takes double precision.
+    Gives the value of order 0, whose bin is left empty: a grating may put it out nearly
+    altogether, so that it takes double precision.
     """
     specular = float(expansion.order_0_offset(interval))
     inner = _inner(spectra.first, grid)

@@ -50,7 +50,7 @@ def efficiency(
     Raises
     ------
     DiffractionError
-        If light below is asked for, and the table is that of no sheet.
+        If light below is asked for, and the table is not of a sheet.
     """
     light = (table, x, y, wavelength, order, from_below, transmitted)
     return np.asarray(_stored(*light).mean(axis=-1))
@@ -130,7 +130,7 @@ def groove_efficiency(
 
 
 class TurnedAxes(NamedTuple):
-    """Cosine and sine of 2ψ, with ψ from the table's axis e to that of s polarisation."""
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
 
     cosine: Array
     sine: Array

@@ -101,8 +101,8 @@ class OrderTable:
     ----------
     period : µm.
     wavelengths : shortest and longest, in vacuum, nm. Light beyond them by less than `MARGIN`
-        has the nearest efficiencies: longer light those of the longest wavelength at the same s
-        and K, shorter light those of the shortest, in the same direction. Other light has none.
+        has the nearest efficiencies: longer light at the same s and K, shorter light in the
+        same direction. Other light has none.
     bands : of k = 0, 1, …, `cells.largest_band`.
     superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
         thick to interfere, as the polycarbonate of a CD.
