@@ -4,7 +4,8 @@ A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, 
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
 `re.I.T` and `im.I.T` the parts of an amplitude. Order 0 itself and the functions of κ that the
 terms of basis "svd" are multiplied with are in the attribute, in full precision. A second attribute
-has the SHA-256 of the rest of the file."""
+has the SHA-256 of the rest of the file.
+"""
 
 from __future__ import annotations
 
