@@ -13,7 +13,7 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# Gratings of a perfect conductor
 
-A perfect conductor (`material="none"`) has no index, and Kirchhoff's model without polarisation.
+A perfect conductor (`material="none"`) has Kirchhoff's model without polarisation.
 
 {_probe(measured)}
 

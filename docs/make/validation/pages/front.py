@@ -223,6 +223,4 @@ def _tables() -> str:
     ]
     return f"""## The tables
 
-{table(["page", "holds"], rows).replace("---:", "---")}
-
-`python -m docs.make.validation report gratings` writes one page."""
+{table(["page", "holds"], rows).replace("---:", "---")}"""

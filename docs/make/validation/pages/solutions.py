@@ -114,7 +114,7 @@ def _cells() -> str:
 Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the
 deviation of colours of one from the other. *Change* is what each solution still changed from
 {coarse} to {fine} and from {first} to {second} harmonics. All figures are the largest of all
-directions. The two solvers differ by less than coupled waves still change.
+directions.
 
 {table(header, rows)}
 

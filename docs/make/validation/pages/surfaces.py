@@ -31,8 +31,8 @@ does not converge on steeper metals than these.
 Mean over the planes of incidence, as Kirchhoff / small slope alone / `second_order=false` /
 `second_order=true`. *Change* is the largest change of the solution by more harmonics.
 
-Slope ratios are those of a table: of each order on gratings, of the whole patch, 20 to 65 µm wide,
-on cuts. Metals have no second order.
+Slope ratios are of each order on gratings, of the whole patch, 20 to 65 µm wide, on cuts. Metals
+have no second order.
 
 {table(header, list(_unpolarised(cells)))}
 
