@@ -1,4 +1,4 @@
-"""Errors and warnings: one line that says what is wrong, where, and what to do."""
+"""Errors and warnings: one line with the mistake, its place and the remedy."""
 
 from __future__ import annotations
 

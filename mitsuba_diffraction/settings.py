@@ -137,7 +137,7 @@ class TableSettings:
     Attributes
     ----------
     coherence_width : µm over which the light is coherent, 4σ₀ of order 0's amplitude window; "auto"
-        is 65 µm, that of sunlight.
+        is 65 µm, as in sunlight.
     coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
     basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
     tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.
@@ -158,7 +158,7 @@ class TableSettings:
     Raises
     ------
     DiffractionError
-        With the setting, its value and what is allowed.
+        With the setting, its value and the allowed values.
     """
 
     coherence_width: str | float = _setting(
@@ -234,7 +234,7 @@ class TableSettings:
         return self.coherence == "patch"
 
     def as_json(self) -> dict[str, Any]:
-        """Return the settings by name, without those that are None or False."""
+        """Return the settings by name, except None and False."""
         values = ((name, getattr(self, name)) for name in _BY_NAME)
         return {name: value for name, value in values if value not in (None, False)}
 

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.support.pages import first_columns
+
 pytestmark = pytest.mark.usefixtures("coarse")
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
@@ -47,16 +49,13 @@ def test_xml_example_loads():
     assert "Diffraction" in str(scene.shapes()[0].bsdf())
 
 
-def test_the_parameter_table_names_ten_that_the_plugin_takes():
+def test_its_table_of_parameters_names_those_of_the_plugin():
     mi.set_variant("llvm_ad_spectral")
     from mitsuba_diffraction.plugin.surface_parameters import NAMES
 
-    table = README[README.index("| parameter |") :]
-    table = table[: table.index("\n\n")]
-    first_column = " ".join(row.split("|")[1] for row in table.splitlines()[2:])
-    assert set(re.findall(r"`(\w+)`", first_column)) <= set(NAMES["diffraction"])
-    assert table.count("\n") == 1 + 10
+    known = set(NAMES["diffraction"])
+    assert any(len(names) >= 10 and names <= known for names in first_columns("README.md"))
 
 
-def test_it_is_read_in_ten_minutes():
+def test_it_has_at_most_200_lines():
     assert len(README.splitlines()) <= 200

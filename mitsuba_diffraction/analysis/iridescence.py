@@ -79,7 +79,7 @@ class DiffractedLight:
     def hues(self) -> dict[str, float]:
         """Return the shares of the luminance by hue: they add up to 1, or are 0 without light.
 
-        The hue is that of linear sRGB, clipped to the display's gamut, in sextants of HSV around
+        Hues are in linear sRGB, clipped to the display's gamut, in sextants of HSV around
         the primaries and their mixtures; "grey" has a saturation below `GREY`.
         """
         from matplotlib.colors import rgb_to_hsv
@@ -123,8 +123,8 @@ def diffracted_light(
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
     coherence window of `WINDOW`, or the table's if that is narrower. Orders of periods as long as
-    the window and longer, order 0 among them, are the mirror's lobe and left out. Powers are those
-    of Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
+    the window and longer, order 0 among them, are the mirror's lobe and left out. Powers follow
+    Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
     speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its

@@ -1,7 +1,7 @@
 """Eyes of animals: spectral sensitivities, quantum catches and contrasts.
 
-A receptor's sensitivity is that of its pigment's template, times the transmittance of its oil
-droplet, normalised to an area of 1, times that of the ocular media, as pavo's `sensmodel` has it.
+A receptor's sensitivity is its pigment's template, times the transmittance of its oil
+droplet, normalised to an area of 1, times the media's transmittance, as in pavo's `sensmodel`.
 
 References
 ----------
@@ -156,7 +156,7 @@ def eye_of(name: str) -> Eye:
     Raises
     ------
     DiffractionError
-        If there is no such animal, or the file has no sensitivities from 400 to 700 nm.
+        If the animal is unknown, or the file has no sensitivities from 400 to 700 nm.
     """
     if name.lower() in EYES:
         return EYES[name.lower()]()
@@ -214,7 +214,7 @@ def illuminant_of(name: str) -> Reals:
     Raises
     ------
     DiffractionError
-        If there is no such light, or the file does not cover 300 to 700 nm.
+        If the light is unknown, or the file does not cover 300 to 700 nm.
     """
     light = name.lower()
     if light == "leaves":
@@ -300,7 +300,7 @@ def quantum_catches(
 
 
 def noises(eye: Eye, weber: float = WEBER) -> Reals:
-    """Return the noise e of each receptor's channel: `weber` that of the longest waves."""
+    """Return the noise e of each receptor's channel: `weber` for the longest waves."""
     density = np.array(eye.density)
     return np.asarray(weber * np.sqrt(density[-1] / density))
 

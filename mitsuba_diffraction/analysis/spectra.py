@@ -6,7 +6,7 @@ directions. Its signal at one wavelength, per power that falls on the surface, i
     P(λ) = ∫ f(ωi, ωo, λ) cosθo dωo   over the cone.
 
 A white standard, Lambertian of reflectance 1, has f = 1/π. Spectra relative to white are P over
-that of the standard in the same place: the reflectance factor of CIE 15:2018, section 6. Detectors
+the P of a standard in the same place: the reflectance factor of CIE 15:2018, section 6. Detectors
 lie in the plane of incidence: at +θ on the far side of the normal, where a mirror reflects the lamp
 of angle θ to, and at −θ on the lamp's side.
 """
@@ -136,7 +136,7 @@ class Spectra:
     band: tuple[Reals, Reals] | None = None
 
     def names(self, group: str = "") -> list[str]:
-        """Return names of the detectors' columns, with that of a group before them."""
+        """Return names of the detectors' columns, with a group's name before them."""
         words = re.sub(r"[^\w.]", "_", group)
         return [f"{words}_{name}" if words else name for name in self.geometry.names]
 
@@ -219,7 +219,7 @@ def spectrum(
 
 
 def check_relative(relative: str) -> None:
-    """Refuse a word that is none of `RELATIVE`."""
+    """Refuse a word outside `RELATIVE`."""
     if relative not in RELATIVE:
         raise DiffractionError(
             f"relative='{relative}' is unknown; choose one of {', '.join(RELATIVE)}"

@@ -3,8 +3,8 @@
 References
 ----------
 R. Maia, H. Gruson, J. A. Endler and T. E. White, pavo 2: New tools for the spectral and spatial
-analysis of colour in R, Methods in Ecology and Evolution 10, 1097-1107 (2019): names of variables,
-those of R. Montgomerie in Bird Coloration 1 (2006).
+analysis of colour in R, Methods in Ecology and Evolution 10, 1097-1107 (2019): names of variables
+follow R. Montgomerie in Bird Coloration 1 (2006).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ A TOML file of patterns selects reading options and treatments:
     level = "plane"
 
 Patterns are matched with the whole path and with the file's name. Where several match, later ones
-override earlier ones. Keys are those of recipes.
+override earlier ones. Keys are the keys of recipes.
 """
 
 from __future__ import annotations

@@ -170,7 +170,7 @@ def add_relative(group: argparse._ArgumentGroup) -> None:
 def gain_of(args: argparse.Namespace) -> Any:
     """Return the gain factor of --relative, or None without it.
 
-    Raises a DiffractionError if --int-ior is no number.
+    Raises a DiffractionError if --int-ior is not a number.
     """
     from ..thesis.methods import Gain
 

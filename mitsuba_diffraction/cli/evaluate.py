@@ -329,7 +329,7 @@ def _windows(
 
 
 def _published(fit: Fit | None, window_error: float | None) -> str:
-    """Describe the period to publish: that of the fit, with all errors that are known.
+    """Describe the period to publish: the fit's, with all errors that are known.
 
     window_error : µm, of the window's position; None if it was not examined.
     """

@@ -309,7 +309,7 @@ def add_view(group: Group) -> None:
     """Add the view by which a picture's linear light is shown."""
     group.add_argument(
         "--view", choices=VIEWS, default="natural",
-        help="natural keeps hues and turns what is bright to white; standard clips each channel "
+        help="natural keeps hues and turns bright light white; standard clips each channel "
         "by itself; default: natural",
     )  # fmt: skip
 

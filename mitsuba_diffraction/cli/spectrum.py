@@ -199,7 +199,7 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
 
 
 def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
-    """Return what was measured, in words."""
+    """Describe the measurement in words."""
     first, *others = (file for members in groups.values() for file in members)
     crops = f", {args.crops} crops each" if others else f", {args.crops} crops"
     cut = crops if args.crops else ""
@@ -222,7 +222,7 @@ def _wavelengths(args: argparse.Namespace) -> Any:
 def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
     """Return the wavelengths at which the material and the pigment are known.
 
-    Raises a DiffractionError if --wavelength-range names others, or there is no such material.
+    Raises a DiffractionError if --wavelength-range names others, or the material is unknown.
     """
     from ..analysis.known_wavelengths import check_material, known_range
 

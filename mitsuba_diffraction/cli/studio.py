@@ -101,7 +101,7 @@ def _material(args: argparse.Namespace) -> dict[str, str]:
     values, name, default = LOOKS[look]
     if name == "material" and args.base is not None and not _is_metal(args.base):
         raise DiffractionError(
-            f"--base {quoted(args.base)} is no metal, which --look {look} needs, such as gold or "
+            f"--base {quoted(args.base)} is not a metal, which --look {look} needs, e.g. gold or "
             "Cr; a colour or a picture is for --look skin"
         )
     return {**values, name: args.base or default}

@@ -43,8 +43,9 @@ def render(
     """Render a scene on the workers of a Dask cluster.
 
     Workers add up the passes, in the tree in which one process adds them (`scene.passes`). With
-    `threads=1` the picture is, bit for bit, that of one process with one Dr.Jit thread on the same
-    kind of processor. With several threads, passes agree within 1e-6 of the film's largest value.
+    `threads=1` the picture is, bit for bit, equal to the result of one process with one Dr.Jit
+    thread on the same kind of processor. With several threads, passes agree within 1e-6 of the
+    film's largest value.
 
     Parameters
     ----------
@@ -170,7 +171,7 @@ class Film:
         Raises
         ------
         DiffractionError
-            Naming frame, passes and worker, if a task fails; what is done is kept.
+            Naming frame, passes and worker, if a task fails; finished work is stored.
         """
         start = time.perf_counter()
         groups = Groups(

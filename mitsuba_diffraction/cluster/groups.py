@@ -142,7 +142,7 @@ class Groups:
         self._left = sum(task.span.count for task in self._waiting)
 
     def sum_of(self, frame: Task, span: Span) -> Sums | None:
-        """Wait for the sum of a group; None for passes that are no group.
+        """Wait for the sum of a group; None for single passes.
 
         Raises
         ------

@@ -33,15 +33,15 @@ def build(
     """Build the table of a wide scan on the workers of a Dask cluster.
 
     Workers are sent some windows at a time, and send sums of their powers back, which the client
-    adds up in the order of the windows: the table is, to the last bit, that of
-    `DiffractionTable.build` on such a processor, with any number of workers.
+    adds up in the order of the windows: the table equals `DiffractionTable.build`, to the last
+    bit, on such a processor, with any number of workers.
 
     Parameters
     ----------
     heights : one scan or several.
     client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
     progress : called as progress(done, total, text).
-    settings : of `DiffractionTable.build`, `windows` among them. A scan that is no wider than a
+    settings : of `DiffractionTable.build`, `windows` among them. A scan not wider than a
         window is built here.
 
     Raises

@@ -36,7 +36,7 @@ class Kept:
         write_record(self._file(frame, span), _title(frame, span), Record(about, [sums.raw]))
 
     def read(self, frame: Task, span: Span) -> Sums | None:
-        """Read a sum; None if there is none, or if it is damaged, which is removed."""
+        """Read a sum; None if it is missing, or damaged, which is removed."""
         file = self._file(frame, span)
         try:
             record = read_record(file, _title(frame, span))

@@ -66,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Sums:
-    """Sum of the films of passes, and what it cost."""
+    """Sum of the films of passes, and its cost."""
 
     raw: NDArray[np.floating[Any]]  # (ny, nx, channels), the films' raw storage
     where: Sequence[str]  # processors and Dr.Jit threads, which decide the last bits

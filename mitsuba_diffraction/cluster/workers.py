@@ -128,7 +128,7 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
 
 
 def workers_of(client: Any) -> dict[str, Any]:
-    """Return the scheduler's description of its workers, by address; nothing while it is gone."""
+    """Return the scheduler's description of its workers, by address; empty while it is gone."""
     if client.status != "running":  # it would be waited for
         return {}
     try:

@@ -37,7 +37,7 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
     Raises
     ------
     DiffractionError
-        If the value is none of these; `where` names the parameter.
+        If the value is not one of these; `where` names the parameter.
     """
     if is_auto(value):
         return None

@@ -64,8 +64,8 @@ def central_slices(
             (ny, nx), (dx, dy) = shape, pixel_size
             raise DiffractionError(
                 f"{name}: crop to {size[0]:g} x {size[1]:g} µm is "
-                f"{'larger than the patch' if kept > count else 'less than two pixels'}: it is "
-                f"{nx * dx:.4g} x {ny * dy:.4g} µm with pixels of {dx:.4g} x {dy:.4g} µm"
+                f"{'larger than the patch' if kept > count else 'less than two pixels'}: the patch "
+                f"is {nx * dx:.4g} x {ny * dy:.4g} µm with pixels of {dx:.4g} x {dy:.4g} µm"
             )
         start = (count - kept) // 2
         slices.append(slice(start, start + kept))
@@ -386,7 +386,7 @@ def periodic_taper(field: HeightField) -> HeightField:
 
 
 def periodic_exact(field: HeightField) -> HeightField:
-    """Take the patch for whole periods of a surface that repeats exactly; heights stay."""
+    """Mark the patch as whole periods of a surface; heights stay as they are."""
     line = "taken for whole periods of a surface that repeats exactly"
     return field.changed(field.heights, line, cut_out=False, periodic=True)
 

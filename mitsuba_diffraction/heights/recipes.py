@@ -63,7 +63,7 @@ class Recipe:
         Raises
         ------
         DiffractionError
-            If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
+            If the file cannot be read, is not TOML, has a key that is unknown, of the wrong type or
             contradicted by another, or names a generator that does not exist; if it is a recipe of
             solved orders, which the room `solve` reads.
         """

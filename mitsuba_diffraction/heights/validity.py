@@ -192,7 +192,7 @@ def tilted(field: HeightField, shortest: float) -> bool:
 
 
 def units_warning(field: HeightField) -> str:
-    """Return a question whether lengths are nanometres taken for µm, or "" if they look right."""
+    """Return a warning that lengths look like nanometres read as µm, or "" if plausible."""
     coarse = max(field.pixel_size)
     if coarse > COARSEST_PIXEL:
         return f"is the pixel size of {coarse:.4g} µm in nm? Then divide it by 1000"

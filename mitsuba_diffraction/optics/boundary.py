@@ -10,7 +10,7 @@ survey of approximate scattering wave theories from random rough surfaces", sect
 
 Conventions: time is exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
 d = −ωi, then along d = ωo. The axes are s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is
-right-handed, as Mitsuba's bases are. Along the normal s is that of the other direction. Then r_s
+right-handed, as Mitsuba's bases are. Along the normal s is taken from the other direction. Then r_s
 and r_p of a mirror have opposite signs at normal incidence. A Jones matrix is the tuple of its
 entries ss, sp, ps, pp, outgoing polarisation first: E_out = J E_in. All matrices here are J times
 2 cosθi cosθo, which stays finite towards the horizon.
@@ -132,7 +132,7 @@ def kirchhoff(geometry: Geometry, index: Index) -> Jones:
     """Return 2 cosθi cosθo K of the tangent plane, eq. 7.
 
     Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
-    those of the surface, times 1 + ωi·ωo: for unpolarised light ½ Σ|J|² is then
+    the axes of the surface, times 1 + ωi·ωo: for unpolarised light ½ Σ|J|² is then
     R(cosθ_half) (1 + ωi·ωo)² (Stam 1999, eq. 7).
     """
     if isinstance(index, Filmed):

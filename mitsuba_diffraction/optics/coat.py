@@ -115,7 +115,7 @@ def passed_powers(geometry: Geometry, index: Index, came: Crossing, left: Crossi
 
 
 def _passed(into: tuple[Number, ...], out: tuple[Number, ...]) -> Number:
-    """Return T T G of T, |r| of the face times that of the structure, and the latter."""
+    """Return T T G of T, |r| of the face times |r| of the structure, and the latter."""
     (t_in, sent_in, mirror_in), (t_out, sent_out, mirror_out) = into, out
     xp = of(*into, *out)
     mirror = xp.maximum(mirror_in, mirror_out)
@@ -131,7 +131,7 @@ def transmitted(
 
     Parameters
     ----------
-    jones, geometry, index : of the structure in the coat; index over that of the coat.
+    jones, geometry, index : of the structure in the coat; index relative to the coat.
     came, left : the face for the incident and for the outgoing light.
     """
     factors = passed_powers(geometry, index, came, left)

@@ -17,7 +17,7 @@ class Dialect:
     components : of a vector and of a complex number, by "xyz", "real" and "imag".
     complex : by operation, with places for the operands: see `printer`.
     prelude : functions of complex numbers that `complex` calls.
-    functions : names of functions that differ from those of `symbols`.
+    functions : names of functions that differ from `symbols`.
     reserved : names that no variable may have.
     """
 

@@ -1,7 +1,7 @@
 """Display transform: linear sRGB to the values of a screen, by one of two views (NumPy only).
 
 `standard` clips each channel by itself. Bright or saturated light then ends in flat bands of six
-colours. `natural` keeps the order of hues and turns what is bright to white:
+colours. `natural` keeps the order of hues and turns bright light white:
 
 1. In Rec. 2020, a colour outside the gamut moves towards grey of its luminance until no channel is
    negative. This line keeps the dominant wavelength.
@@ -72,14 +72,14 @@ _MOST = 1e20
 def shown(linear: ArrayLike, view: str = "natural") -> Array:
     """Encode linear sRGB (..., 3), where 1 is white, for a display: 0 to 1, sRGB's transfer curve.
 
-    Raises a DiffractionError if `view` is none of `VIEWS`.
+    Raises a DiffractionError if `view` is not in `VIEWS`.
     """
     check_view(view)
     return encode_srgb(linear if view == "standard" else natural(linear))
 
 
 def check_view(view: str) -> None:
-    """Raise a DiffractionError if `view` is none of `VIEWS`."""
+    """Raise a DiffractionError if `view` is not in `VIEWS`."""
     if view not in VIEWS:
         raise DiffractionError(f"view={view!r} is unknown; choose one of {', '.join(VIEWS)}")
 

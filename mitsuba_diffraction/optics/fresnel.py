@@ -20,8 +20,8 @@ class Filmed:
 
     Attributes
     ----------
-    index : n + ik of the material over that of the medium above the film.
-    film : n + ik of the film over that of the medium above it.
+    index : n + ik of the material relative to the medium above the film.
+    film : n + ik of the film relative to the medium above it.
     depth : 2πd/λ with the film's thickness d and the wavelength λ in the medium above it. The
         film's lower face is the upper one displaced by d along the vertical.
     """
@@ -57,7 +57,7 @@ class Filmed:
         return material, film, np.real(np.asarray(self.depth))
 
 
-#: Index n + ik over that of the medium above, or of a material under a film.
+#: Index n + ik relative to the medium above, or of a material under a film.
 Index: TypeAlias = Number | Filmed
 
 
@@ -93,7 +93,7 @@ class _Layer(NamedTuple):
 def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
     """Return fields at the interface of a material, or at both interfaces of its film.
 
-    Films are those of Born and Wolf, Principles of Optics, section 1.6.4.
+    Films follow Born and Wolf, Principles of Optics, section 1.6.4.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def amplitudes(cosine: Number, square: Number, index: Index) -> tuple[Number, Nu
     Parameters
     ----------
     cosine, square : of the angle of incidence, 0 to 1, and of its sine the square.
-    index : over that of the medium above.
+    index : relative to the medium above.
     """
     if not isinstance(index, Filmed):
         epsilon = index * index

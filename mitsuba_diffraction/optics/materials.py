@@ -113,7 +113,7 @@ def material_named(value: str | float | complex, parameter: str = "material") ->
 
     value : a name of any case, a number, or a number's text, e.g. "1.56+0.05i".
 
-    Raises a DiffractionError if a number is no index. Names are checked where they are looked up.
+    Raises a DiffractionError if a number is not an index. Names are checked at look-up.
     """
     if isinstance(value, str):
         text = value.strip()

@@ -64,7 +64,7 @@ class OrderDirection(NamedTuple):
 
     Attributes
     ----------
-    x : tangential component across the grooves; along them it is that of the mirror direction.
+    x : tangential component across the grooves; along them it equals the mirror direction's.
     square : squared cosine to the normal, at most 0 of an order that does not propagate.
     """
 

@@ -5,8 +5,8 @@ On a path an order of a surface sends the share η = G |a_j|² of the light alon
     G = 4 qi qo N / w²,   w = qi + qo where light is reflected, |qi − qo| where it is let through,
 
 at κ = k w: N, mean power of the boundary's Jones matrix (`boundary`, `through`, `coat`), and
-q = √(m² − n² sin²θ), with n the index of the medium in which θ is measured and m that of the medium
-at the structure. For Kirchhoff's model and R = 1, G is (1 + ωi·ωo)²/(w² cosθi cosθo). G is
+q = √(m² − n² sin²θ), with n the index of the medium in which θ is measured and m the index of the
+medium at the structure. For Kirchhoff's model and R = 1, G is (1 + ωi·ωo)²/(w² cosθi cosθo). G is
 symmetric.
 """
 
@@ -46,7 +46,7 @@ class Side:
 
     @property
     def beyond_face(self) -> bool:
-        """Whether directions are those beyond the flat face of a sheet or a coat."""
+        """Whether directions lie beyond the flat face of a sheet or a coat."""
         return self.index != self.at_structure
 
     def normal(self, cosine: Real) -> Real:

@@ -110,7 +110,7 @@ class Program:
         Parameters
         ----------
         formula, arguments : as for `add`; the result is one number.
-        late : parameters of the second function; the others are those of the first.
+        late : parameters of the second function; the others belong to the first.
         names : of both functions.
         """
         for name in names:
@@ -167,7 +167,7 @@ class Scope:
         return function.record(list(map(_components, results)))
 
     def run(self, arguments: Sequence[Any]) -> tuple[list[Symbol], Any]:
-        """Run the formula on symbols; return those of its parameters, and its result."""
+        """Run the formula on symbols; return its parameters' symbols, and its result."""
         parameters: list[Symbol] = []
         names = list(inspect.signature(self.formula).parameters)
         values = [

@@ -89,7 +89,7 @@ class Perturbation:
     Parameters
     ----------
     wi : (3,) unit vector to the light.
-    index : n + ik of the material over that of the medium above it.
+    index : n + ik of the material relative to the medium above it.
     """
 
     def __init__(self, wi: ArrayLike, index: complex) -> None:
@@ -147,7 +147,7 @@ def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
     Parameters
     ----------
     wi : (3,) unit vector to the light; wo : (n, 3) unit vectors of light that leaves.
-    index : of a dielectric, over that of the medium above it.
+    index : of a dielectric, relative to the medium above it.
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     if abs(index - 1.0) < _NO_CONTRAST:  # nothing is reflected, by any order

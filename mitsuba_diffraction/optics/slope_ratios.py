@@ -11,10 +11,10 @@ share a cell of q, whose r is Σ a D* / Σ |a|²: the part that all windows on a
 common, without the speckle of one of them. Where a period is short each cell is one order. Order 0
 has no ratio: it keeps the power of the first order.
 
-Slopes are those of the surface filtered by 1/(1 + (q/23)²), q in rad/µm: finer structure diffracts
-light into waves that do not travel. At vertical walls the filter removes most of the slope
-variance; there r is multiplied by the gate G = ρ²/(ρ² + 0.01), with ρ the fraction that remains.
-"""
+Slopes are measured on the surface filtered by 1/(1 + (q/23)²), q in rad/µm: finer structure
+diffracts light into waves that do not travel. At vertical walls the filter removes most of the
+slope variance; there r is multiplied by the gate G = ρ²/(ρ² + 0.01), with ρ the fraction that
+remains."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class SlopeRatios:
     ----------
     cell : (dqx, dqy), rad/µm.
     orders : whether a cell is one order, along x and y; q is then rounded to it.
-    kappa : first and last κ, rad/µm, evenly between; beyond them r is that of the nearest.
+    kappa : first and last κ, rad/µm, evenly between; beyond them r is taken at the nearest.
     values : (n, 2, ny, nx) complex, l and t; q = 0 is in the middle.
     change : relative change of the colours by the second order (`second_order_change`).
     """

@@ -170,7 +170,7 @@ def _node(operation: str, *parts: Any, kind: str | None = None) -> Any:
             try:  # NumPy's numbers
                 float(part)
             except (TypeError, ValueError):
-                refuse(f"{part!r} is no real number")
+                refuse(f"{part!r} is not a real number")
     if kind is None:
         kinds = {part.kind for part in parts if isinstance(part, Symbol)}
         kind = "complex" if "complex" in kinds else "float"

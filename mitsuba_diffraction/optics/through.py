@@ -20,10 +20,10 @@ with N_0 of `order_0`, the geometric mean over both directions. In the middle of
 - Small slope: first-order perturbation (Rice 1951; Voronovich 1985), from the fields that light
   along ωi and reversed light along ωo make at the flat interface, as in `boundary.small_slope`.
 - Kirchhoff's tangent plane: Fresnel's coefficients at the facet that refracts ωi to ωo, whose
-  normal is along ωi + n ωo. The limit for short waves is that of Walter, Marschner, Li and Torrance
+  normal is along ωi + n ωo. The limit of short waves agrees with Walter, Marschner, Li and Torrance
   2007 (eq. 21).
 
-In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. The axes are those of
+In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. The axes are defined in
 `boundary`.
 """
 
@@ -52,7 +52,7 @@ def small_slope(geometry: Geometry, n: Number, outside: Number) -> Jones:
     Parameters
     ----------
     geometry : of ωi above the surface and ωo below it, in the dielectric.
-    n : real, of the dielectric over that of the medium above it.
+    n : real, of the dielectric relative to the medium above it.
     outside : γ² above the surface of the light below it; complex where it may be negative
         (`outside_square`).
     """

@@ -10,7 +10,7 @@ or with Python and the package `bpy`, which needs an output file:
 
 The script switches Cycles and OSL on and adds a node group with labelled inputs, and a material
 that uses it. Run it again after a new export: materials that use the group change with it.
-Blender 5.0 or newer; nothing beside Blender is needed.
+Needs Blender 5.0 or newer alone.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
     Parameters
     ----------
     folder : exported folder: a shader (`.osl`), its sockets (`.json`) and its textures.
-    name : of the material and its node group; by default that of the shader. Those that this
-        folder made under the name are rebuilt, and those of a folder that is no more; beside any
+    name : of the material and its node group; by default the shader's. Groups that this
+        folder made under the name are rebuilt, and groups of a deleted folder; beside any
         others Blender adds a number to the name.
     tangent : key of `TANGENTS`: direction of the patch's x axis before Rotation. `uv` is along
         the first texture coordinate, `radial-z` runs around the object's z axis.

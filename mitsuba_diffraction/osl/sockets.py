@@ -82,7 +82,7 @@ def window_socket(coherence_width: float) -> Socket:
     return Socket(
         "CoherenceWidth", "Coherence Width (µm)", "float", coherence_width,
         "Width over which light is coherent, 65 in sunlight. Narrower windows blur the mirror and "
-        "the orders: the roughness of their lobes. A small scan limits that of the orders",
+        "the orders: the roughness of their lobes. A small scan limits the orders' width",
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """Boundary models: the material's factor on the diffracted power (Dr.Jit).
 
-The formulas are those of `optics.boundary.MODELS`. With J' = 2 cosθi cosθo J,
+The formulas are `optics.boundary.MODELS`. With J' = 2 cosθi cosθo J,
 
     f cosθo = N' / (λ² A w² cosθi) · ⟨|P|²⟩,   N' = ½ Σ|J'|²,
 

@@ -55,7 +55,7 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
     Raises
     ------
     DiffractionError
-        If there is no table of that name.
+        If no table has that name.
     """
     if tabulated_range(material) is None:
         raise DiffractionError(unknown_conductor(material))

@@ -76,7 +76,7 @@ class Quantity:
     texture: Texture | None = None
 
 
-#: Index n + ik of a material, over that of the medium above, at wavelengths (n,) in nm.
+#: Index n + ik of a material, relative to the medium above, at wavelengths (n,) in nm.
 Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
@@ -100,7 +100,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Film:
-    """Thin film on a structure: index over that of the medium above, and thickness in nm."""
+    """Thin film on a structure: index relative to the medium above, and thickness in nm."""
 
     index: complex
     thickness: float

@@ -57,7 +57,7 @@ def bsdf_dict(
     Raises
     ------
     DiffractionError
-        If `field` is neither heights nor a path, or there is no such plugin.
+        If `field` is neither heights nor a path, or the plugin is unknown.
     """
     if plugin not in PLUGINS:
         raise DiffractionError(

@@ -34,7 +34,7 @@ clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
 periodic : string [auto]
     Treatment of opposite edges, which meet where the patch is tiled: `trend` keeps the periodic
-    component (Moisan 2011) of waves longer than the patch, `smooth` that of all heights; `taper`
+    component (Moisan 2011) of waves longer than the patch, `smooth` for all heights; `taper`
     attenuates heights towards the edges; `exact` leaves heights as they are and states that the
     patch is whole periods of a surface that repeats; `none`. `auto` is `trend` for a file of
     heights where seams of waves longer than the patch would diffract like a grating, else `none`.
@@ -47,7 +47,7 @@ orientation : float or texture ∂ [0]
 lateral_scale : float or texture ∂ [1]
     Factor that stretches the patch in its plane, heights unchanged, between 0.01 and 100: a
     grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
-    channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
+    channel. Spatial frequencies are divided by it. coherence_width applies at the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
     same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
     to 1. Scales of energy follow it (docs/holograms.md).
@@ -74,7 +74,7 @@ coherence : string [ensemble]
     `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the
     window centred where the light falls, the grain seen from close up, whose mean is `ensemble`.
     `surface` requires UV coordinates, uv_scale or world_scale, and a spectral or mono variant;
-    sampling and energy are those of `ensemble`.
+    sampling and energy are as in `ensemble`.
 uv_scale : float or string [none]
     µm per unit of the UV coordinates: one number, or "u, v".
 world_scale : float [none]
@@ -104,19 +104,19 @@ eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
-    or names: `water`. The medium changes what is reflected; directions are those of light in air.
+    or names: `water`. The medium changes the reflectance; directions are of light in air.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
     a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
     own face is a mirror of the same coherence width. Light that the face sends back is summed as
     between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md). Energy is conserved as without a coat. The index over that of the medium
+    (docs/validation.md). Energy is conserved as without a coat. The index relative to the medium
     above is the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
-    above it. The index over that of the medium above is the differentiable parameter `film_eta`.
+    above it. The index relative to the medium above is the differentiable parameter `film_eta`.
     Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
     costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01,
     or 0.001 of thick films. Derivatives with respect to the film include it.
@@ -148,7 +148,7 @@ energy_conserving : boolean [true]
     gratings of metal lose some per cent of the light in directions without gain, too
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
     first time and is cached. It is interpolated over height_scale: an optimisation waits when it
-    enters a new interval. For its derivative, enable that of height_scale before
+    enters a new interval. For its derivative, enable the derivative of height_scale before
     parameters.update(). Derivatives with respect to indices and films hold it constant.
 shadowing : string [none]
     `vcavity`: shadowing of long V-shaped grooves (Torrance and Sparrow 1967); `none`.
@@ -157,8 +157,8 @@ The light beneath
 -----------------
 (nested) : BSDF ∂
     BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected.
-    Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; those of the
-    nested BSDF follow.
+    Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; the nested BSDF's
+    components follow.
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
     or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
@@ -176,8 +176,8 @@ Variants
 wavelength : float [550]
     Wavelength of mono variants, nm.
 
-The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999), looked
-up in a table of the patch, times a factor of the material:
+The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999) times a
+factor of the material:
 
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
 
@@ -189,8 +189,6 @@ Denoisers that ask for an albedo get the reflectance at normal incidence, nested
 Derivatives pass through renderings backward and forward, for all parameters marked ∂. A function
 that `dr.freeze` records must give `mi.render` a seed of type `mi.UInt32`: a plain number becomes
 part of the recording.
-
-The BSDF `diffraction_mix` blends several such surfaces by weights (docs/own-scene.md).
 
 XML and the same in Python:
 

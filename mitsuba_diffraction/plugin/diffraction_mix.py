@@ -308,7 +308,7 @@ def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Bounded | 
 
 
 def _texture_refusal(name: str, texture: Texture) -> str | None:
-    """Reason why a texture's numbers are no weights, or None."""
+    """Reason why a texture's numbers cannot be weights, or None."""
     known = range_of(texture)
     if known is None or known[0] >= 0.0:
         return None

@@ -180,7 +180,7 @@ def _maps(tables: list[DirectionalTable], stretch: float) -> Array:
 def _cells(table: DirectionalTable, stretch: float) -> Array:
     """Values at the corners of each cell, (rows, columns, channels or wavelengths, 4).
 
-    stretch : factor from the table's wavelengths to those of the light.
+    stretch : factor from the table's wavelengths to the light's.
 
     All wavelengths of a cell lie together: a call reads several of them, within few cache lines.
     """

@@ -88,8 +88,8 @@ class EnergyModel:
     def update(self, scales: ScaleRange, beneath: bool) -> None:
         """Look up, or compute, what belongs to other factors or another material.
 
-        s is linear between height scales, 1 among them. At one of them its derivative is that of
-        the interval above; g has derivatives of its own.
+        s is linear between height scales, 1 among them. At a height scale its derivative is taken
+        from the interval above; g has derivatives of its own.
 
         scales : the factors; beneath : whether light goes on to something.
         """
@@ -142,7 +142,7 @@ class EnergyModel:
             self._warned = True
             warn(
                 f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
-                "the normal: what is above 100 % is taken (energy_conserving=false keeps it); its "
+                "the normal: the excess is removed (energy_conserving=false keeps it); its "
                 "orders are least certain there"
             )
 

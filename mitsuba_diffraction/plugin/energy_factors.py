@@ -2,8 +2,8 @@
 
 A patch stretched by a reflects light of wavelength λ as the patch itself, with heights divided by
 a, reflects light of λ/a: all lengths are divided by a. So the tables of the unstretched patch serve
-it too, at other wavelengths and height scales. Indices are those of the wavelength itself at the
-factor `centre`.
+it too, at other wavelengths and height scales. Indices are exact at the factor
+`centre`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ScaleRange(NamedTuple):
 
     @property
     def centre(self) -> float:
-        """Factor on lengths at which wavelengths are those of the light."""
+        """Factor on lengths at which wavelengths equal the light's."""
         low, high = self._rounded
         return math.sqrt(low * high)
 

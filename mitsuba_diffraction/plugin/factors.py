@@ -105,8 +105,8 @@ class VaryingFactor:
 class LateralScale:
     """Factor by which the patch is stretched in its plane, at points of the surface.
 
-    The table is that of the patch stretched by the largest factor, or of the patch itself where no
-    factor is above 1, so that no look-up goes beyond its frequencies.
+    The table has the heights stretched by the largest factor, or unstretched where no factor is
+    above 1, so that no look-up goes beyond its frequencies.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ class LateralScale:
             self.changeable = (self._number,)
 
     def over_table(self, si: Interaction, active: Mask) -> Float:
-        """Return the factor over that of the table; the plain number 1 without lateral_scale."""
+        """Return the factor relative to the table's; the plain number 1 without lateral_scale."""
         if self.varying is not None:
             return self.varying.at(si, active) * (1.0 / self.of_table)
         return self._number.value * (1.0 / self.of_table) if self._number is not None else 1.0
 
     def range_over_table(self) -> tuple[float, float]:
-        """Return the least and the largest factor over that of the table, as far as known."""
+        """Return the least and the largest factor relative to the table's, as far as known."""
         if self.varying is not None:
             low, high = self.varying.range()
             return low / self.of_table, min(high, self.varying.high) / self.of_table
@@ -152,7 +152,7 @@ class LateralScale:
 
     @property
     def quantity(self) -> Quantity:
-        """The factor over that of the table, for descriptions."""
+        """The factor relative to the table's, for descriptions."""
         texture = None if self.varying is None else self.varying.texture
         return Quantity(self.range_over_table()[1], texture)
 
@@ -173,7 +173,7 @@ def read_factor(props: Properties, limits: FactorLimits) -> float | VaryingFacto
     Raises
     ------
     DiffractionError
-        With the parameter, its value and what is allowed.
+        With the parameter, its value and the allowed values.
     """
     name, largest = limits.name, f"{limits.name}_max"
     texture = dict(props.objects()).get(name)
@@ -195,7 +195,7 @@ def read_lateral(props: Properties) -> LateralScale:
     Raises
     ------
     DiffractionError
-        With the parameter, its value and what is allowed.
+        With the parameter, its value and the allowed values.
     """
     name, largest = LATERAL.name, f"{LATERAL.name}_max"
     factor = read_factor(props, LATERAL) if name in props else None

@@ -161,7 +161,7 @@ class Conductor:
         if not first <= needed[0] <= needed[1] <= last:
             raise DiffractionError(
                 f"material={material!r} is tabulated from {first:.4g} to {last:.4g} nm, and light "
-                f"from {needed[0]:g} to {needed[1]:g} nm needs it; choose another material, or "
+                f"from {needed[0]:g} to {needed[1]:g} nm is needed; choose another material, or "
                 "give spectra of eta and k"
             )
         if mi.is_monochromatic:
@@ -200,7 +200,7 @@ class Conductor:
         return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
-        """The complex index n + ik of each channel, over that of the medium above."""
+        """The complex index n + ik of each channel, relative to the medium above."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
         if self.medium is not None:
             above = self.medium.eta
@@ -280,6 +280,6 @@ def _load(plugin: str, **parameters: Any) -> BSDF:
         if plugin == "conductor":
             raise DiffractionError(unknown_conductor(str(parameters.get("material")))) from error
         raise DiffractionError(
-            f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
+            f"{arguments} is not a material that Mitsuba knows ({reason[:200]}); give a number, a "
             "name from Mitsuba's table of materials, or eta and k"
         ) from error

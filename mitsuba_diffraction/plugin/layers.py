@@ -30,12 +30,12 @@ from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 class CoatedPair(Pair):
     """Pair of the directions within a coat.
 
-    `uv` and `w` are optical, those of k in vacuum: `w` is n times the sum of the cosines. All else
-    is that of the refracted directions.
+    `uv` and `w` are optical, for k in vacuum: `w` is n times the sum of the cosines. All else
+    belongs to the refracted directions.
 
     Attributes
     ----------
-    n : index of the coat over that of the medium above it.
+    n : index of the coat relative to the medium above it.
     """
 
     def __init__(self, outer: Pair, n: Float) -> None:
@@ -66,7 +66,7 @@ class UnderCoat:
         return coated_reflectance(face, self.material.reflectance(inside, si, active))
 
     def traverse(self, callback: Callback) -> None:
-        """Expose the material's index, and the coat's over that of the medium above it."""
+        """Expose the material's index, and the coat's relative to the medium above it."""
         self.material.traverse(callback)
         self.coat.traverse(callback)
 
@@ -141,7 +141,7 @@ class UnderFilm:
     Parameters
     ----------
     material : the material itself.
-    film : the real part of the film's index, over that of the medium above it.
+    film : the real part of the film's index, relative to the medium above it.
     k : its imaginary part.
     thickness : nm.
     wavelength : nm, of mono variants.
@@ -185,11 +185,11 @@ class UnderFilm:
         return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(indices, waves, strict=True)]
 
     def summed(self, values: list[Float]) -> list[Float]:
-        """The channels' values of those of `indices`."""
+        """The channels' values from the values of `indices`."""
         return values if self.channels is None else self.channels.sums(values)
 
     def wavenumbers(self, wavenumbers: list[Float]) -> list[Float]:
-        """Return wavenumbers of `indices`, rad/µm, from those of the channels."""
+        """Return wavenumbers of `indices`, rad/µm, from the channels' wavenumbers."""
         if self.channels is None:
             return wavenumbers
         return [mi.Float(k) for k in wavenumber(self.channels.wavelengths).tolist()]

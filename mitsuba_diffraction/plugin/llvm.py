@@ -5,7 +5,7 @@ names, else the loader's `libLLVM.so`, else the highest-numbered libLLVM*.so.* o
 library folder. On macOS it knows Homebrew's `llvm`, but not `llvm@19`. It refuses version 14 and
 older itself; 15 and 16 load, and end the whole process at the first kernel with a minimum or
 maximum ("Cannot select ... fminimum"). So the choice is made here, on import of the package
-(`select_llvm`), and later use checks what was loaded (`require_llvm`, `require_loaded_llvm`).
+(`select_llvm`), and later use checks the loaded library (`require_llvm`, `require_loaded_llvm`).
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Library:
 
 
 def find_llvm() -> list[Library]:
-    """All of them, the one to prefer first: 19, then the newest, then those of no known version."""
+    """All of them, the one to prefer first: 19, then the newest, then unknown versions."""
     named = named_library()
     files = [*([named.path] if named else []), *in_folders()]
     return sorted({Library.at(file) for file in files if file.is_file()}, key=_preference)
@@ -130,7 +130,7 @@ def _folders(
 def select_llvm() -> Library | None:
     """Point DRJIT_LIBLLVM_PATH to the best library, unless it is set or it is too late.
 
-    Returns what was chosen. Nothing is said if there is none: other backends do without LLVM, and
+    Returns the choice. Without an LLVM there is no message: other backends do without, and
     `require_llvm` has the words.
     """
     if "drjit" in sys.modules or os.environ.get(VARIABLE):
@@ -170,7 +170,7 @@ def require_llvm() -> None:
 
 
 def require_loaded_llvm() -> None:
-    """`require_llvm` where Mitsuba's current variant compiles with LLVM; nothing elsewhere."""
+    """Call `require_llvm` if Mitsuba's current variant compiles with LLVM."""
     import mitsuba as mi
 
     if (mi.variant() or "").startswith("llvm"):

@@ -38,7 +38,7 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
         return _named(props, coat)
     if conductor:
         if len(conductor) == 1:
-            raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
+            raise DiffractionError(f"{conductor[0]} alone is not a conductor; give both eta and k")
         metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
         metal.medium = _medium(props, coat)
         return metal
@@ -116,7 +116,7 @@ def film_of(
         return material
     if not {"film_ior", "film_thickness"} <= set(parameters):
         raise DiffractionError(
-            f"{parameters[0]} alone is no film; give both film_ior and film_thickness (nm)"
+            f"{parameters[0]} alone is not a film; give both film_ior and film_thickness (nm)"
         )
     if isinstance(material, Perfect):
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")

@@ -31,7 +31,7 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
 
 
 def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:
-    """Gather a number of an uploaded array; 0 where the lane is inactive."""
+    """Gather a number per lane from an uploaded array; 0 in inactive lanes."""
     if not dr.is_jit_v(mi.Float):
         return kind(source[index] if active else 0)
     return dr.gather(kind, source, index, active)

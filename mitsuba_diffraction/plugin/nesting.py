@@ -1,6 +1,6 @@
-"""BSDF that diffracts light over a nested BSDF, which receives what is not reflected.
+"""BSDF that diffracts light over a nested BSDF, which receives the remaining light.
 
-Component 0 is the diffraction; those of the nested BSDF follow.
+Component 0 is the diffraction; the nested BSDF's components follow.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class NestingBSDF(PluginBSDF):
         self.nested = nested
 
     def ready(self) -> None:
-        """See `PluginBSDF.ready`; the nested BSDF is the last parameter."""
+        """Finish loading (`PluginBSDF.ready`); the nested BSDF is the last parameter."""
         if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
         super().ready()

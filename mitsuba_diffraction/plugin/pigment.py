@@ -37,7 +37,7 @@ def pigment_bsdf(text: str | float) -> BSDF:
     Raises
     ------
     DiffractionError
-        If the text is none of these, or the spectrum is not one or ends within 400 to 700 nm.
+        If the text is not one of these, or the spectrum is not one or ends within 400 to 700 nm.
     """
     return mi.load_dict({"type": "diffuse", "reflectance": _reflectance(str(text))})
 
@@ -69,13 +69,13 @@ def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64
         except (ValueError, IndexError):
             if rows and line.strip():
                 raise DiffractionError(
-                    f"'{path}': {quoted(line)} is no wavelength and reflectance"
+                    f"'{path}': {quoted(line)} is not a wavelength and a reflectance"
                 ) from None
     table = np.array(sorted(rows)).reshape(-1, 2)
     lam, value = table[:, 0], table[:, 1]
     if len(lam) < 2 or not np.isfinite(table).all() or not np.all(np.diff(lam) > 0.0):
         raise DiffractionError(
-            f"'{path}' is no spectrum: give two columns, wavelengths in nm, each once, and "
+            f"'{path}' is not a spectrum: give two columns, wavelengths in nm, each once, and "
             "reflectances from 0 to 1 or in per cent"
         )
     if value.max() > 1.0:
@@ -112,7 +112,7 @@ def _reflectance(text: str) -> dict[str, Any]:
 
 
 def _colour(text: str) -> list[float]:
-    """Return the linear sRGB values of a number, three of them, or a colour of CSS."""
+    """Return the linear sRGB values of one number, three numbers, or a colour of CSS."""
     try:
         numbers = [float(part) for part in text.replace(",", " ").split()]
     except ValueError:
@@ -121,8 +121,8 @@ def _colour(text: str) -> list[float]:
         numbers *= 3
     if len(numbers) != 3 or not all(0.0 <= number <= 1.0 for number in numbers):
         raise DiffractionError(
-            f"pigment={quoted(text)} is no colour: give a grey from 0 to 1, 'r,g,b', '#804020', a "
-            f"name of CSS such as sienna, a spectrum ({', '.join(SPECTRA)}) or a picture "
+            f"pigment={quoted(text)} is not a colour: give a grey from 0 to 1, 'r,g,b', '#804020', "
+            f"a name of CSS such as sienna, a spectrum ({', '.join(SPECTRA)}) or a picture "
             f"({', '.join(PICTURES)})"
         )
     return numbers

@@ -76,7 +76,7 @@ def find_preset(name: str) -> Preset:
     Raises
     ------
     DiffractionError
-        If there is none; the text names the nearest.
+        If the name is unknown; the text names the nearest.
     """
     known = presets()
     if name in known:
@@ -100,7 +100,7 @@ def preset(name: str, **changes: Any) -> dict[str, Any]:
     Raises
     ------
     DiffractionError
-        If there is no such look; the text names the nearest.
+        If the look is unknown; the text names the nearest.
     """
     given = {key: value for key, value in changes.items() if value is not None}
     return find_preset(name).changed(given)
@@ -112,7 +112,7 @@ def diffraction_preset(props: Properties) -> BSDF:
     Raises
     ------
     DiffractionError
-        If there is no such look, or a parameter does not fit its BSDF.
+        If the look is unknown, or a parameter does not fit its BSDF.
     """
     if PARAMETER not in props:
         raise DiffractionError(f"{PLUGIN}: the parameter {PARAMETER} is missing; e.g. cd")

@@ -1,6 +1,6 @@
 """RGB variants: the diffracted power in daylight's colours, and directions drawn by brightness.
 
-`ColourLookup` is the twin of `ColourTable.colour`, which says what is interpolated: one packet load
+`ColourLookup` is the twin of `ColourTable.colour`, which defines the interpolation: one packet load
 fetches all terms of all colours of a bin. For the density of ωo per solid angle see
 `tables.colour.proposals`; (u, v) → ωo has the Jacobian dωo = du dv / cosθo.
 """

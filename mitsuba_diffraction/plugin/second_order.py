@@ -37,7 +37,7 @@ _NORMAL = 1.0 - 1e-7
 def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeRatios | None:
     """Return the table's slope ratios if the second order applies to it, or None.
 
-    The scene's `second_order` wins over that of the table; "auto" decides by the table's change of
+    The scene's `second_order` wins over the table's; "auto" decides by the table's change of
     colours.
 
     Raises

@@ -87,7 +87,7 @@ class SurfaceParameters:
     orientation : angle from the first tangent to the patch's x axis.
     lateral_scale : factor on lengths in the patch's plane.
     height_scale : factor on all heights, or a texture of factors.
-    optical : index of the medium that heights are in, over that of the medium above.
+    optical : index of the medium that heights are in, relative to the medium above.
     wavelength : nm, of mono variants.
     energy_conserving : whether the BSDF is scaled where it would gain or lose light.
     """
@@ -121,7 +121,7 @@ def read_surface(
     Parameters
     ----------
     provider : gets the tables of heights.
-    optical : index of the medium that heights are in, over that of the medium above.
+    optical : index of the medium that heights are in, relative to the medium above.
     second_order : whether the table may need slope ratios.
 
     Raises
@@ -185,7 +185,7 @@ def coherence_of(props: Properties) -> str:
 
 
 def read_index(props: Properties, name: str, default: float = 1.0) -> float | str:
-    """Return a refractive index, that of a tissue too, or a medium that Mitsuba knows by name.
+    """Return a refractive index, also of a tissue, or a medium that Mitsuba knows by name.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def _unknown(name: str, plugin: str) -> str:
     """Return the message on a parameter that a plugin does not have."""
     if name == "transmission":
         return (
-            f"'transmission' is no parameter: light goes through every BSDF of type "
+            f"'transmission' is not a parameter: light goes through every BSDF of type "
             f"'{TRANSMITTING}' and through none of type '{REFLECTING}'; set the type, and leave "
             "transmission out"
         )
@@ -290,7 +290,7 @@ def resolved_path(name: str, parameter: str) -> Path:
     Raises
     ------
     DiffractionError
-        If there is none, with the folders.
+        If the file is missing, with the folders.
     """
     resolver = mi.file_resolver()
     path = Path(str(resolver.resolve(name)))
@@ -328,7 +328,7 @@ def orientation_of(props: Properties) -> Orientation:
     Raises
     ------
     DiffractionError
-        If the element is no texture, or the number no angle.
+        If the element is not a texture, or the number not an angle.
     """
     objects = dict(props.objects())
     if "orientation" in objects:

@@ -203,8 +203,8 @@ def _check(texture: Texture) -> None:
     data = np.array(mi.traverse(texture)["data"])
     if data.shape[-1] < 3:
         raise DiffractionError(
-            f"orientation: the bitmap has {data.shape[-1]} channel, but directions take three: "
-            "cos, sin, and one that is not read"
+            f"orientation: the bitmap has {data.shape[-1]} channel; an orientation has "
+            "three: cosine, sine and an unused one"
         )
     require_raw(texture, "orientation", "(cos, sin)")
     levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])

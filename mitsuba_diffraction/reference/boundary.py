@@ -29,7 +29,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     Parameters
     ----------
     wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or
+    index : (...) n + ik of the material relative to the medium above it, finite, k ≥ 0; or
         the index under a film, `optics.fresnel.Filmed`.
     """
     s_in, s_out = polarisation_axes(wi, wo)
@@ -59,7 +59,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
 
     Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
-    those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
+    the axes of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
     4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)

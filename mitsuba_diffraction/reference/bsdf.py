@@ -42,9 +42,9 @@ class Material:
     Attributes
     ----------
     model : one of `optics.boundary.MODELS`.
-    index : (n,) n + ik over that of the medium above it, under a film where there is one; None for
+    index : (n,) n + ik relative to the medium above it, under a film where there is one; None for
         a perfect reflector.
-    coat : index of a clear coat over the surface, over that of the medium above it, or None.
+    coat : index of a clear coat over the surface, relative to the medium above it, or None.
     second_order : whether orders are multiplied by the second order of small slope.
     """
 
@@ -72,7 +72,7 @@ def brdf(
 ) -> Real:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
-    Equations (1) to (10) of `reference.model`; the defaults are those of the BSDF `diffraction`.
+    Equations (1) to (10) of `reference.model`; defaults as in the BSDF `diffraction`.
     Below the surface the BRDF is 0.
 
     Parameters
@@ -88,11 +88,11 @@ def brdf(
     place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
     model : "small_slope", the default where there is an index, "kirchhoff", or another of
         `optics.boundary.MODELS`.
-    eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
+    eta, k : (n,) or scalar, the index eta + ik of the material relative to the medium above it;
         without eta the surface is a perfect reflector, R = 1, by model "kirchhoff".
-    coat : index of a flat clear coat over the surface, over that of the medium above
+    coat : index of a flat clear coat over the surface, relative to the medium above
         (`optics.coat`); it needs eta, and its own reflection is the lobe of a flat patch.
-    film : index n + ik, over that of the medium above, and thickness in nm of a film that follows
+    film : index n + ik, relative to the medium above, and thickness in nm of a film that follows
         the heights, coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
         Small slope has the mean of the second order then (`optics.mean_second_order`).
     second_order : whether orders are multiplied by the second order of small slope, eq. (10):
@@ -134,8 +134,8 @@ def mueller(
 ) -> Real:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
-    They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
-    `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
+    They take Stokes vectors of light along −ωi to Stokes vectors of light along ωo, both about the
+    axes of `reference.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))

@@ -35,7 +35,7 @@ def reflected(
     Parameters
     ----------
     light : outside of the coat.
-    index : of the structure over that of the coat.
+    index : of the structure relative to the coat.
     power, jones : ⟨|P|²⟩ and J of the structure in the coat.
     """
     inside = refracted_light(light, coat)
@@ -63,7 +63,7 @@ def transmitted(
     """Jones matrices (..., 2, 2) of the structure in the coat, as seen from outside the coat.
 
     wi, wo : directions outside the coat, (..., 3).
-    index : (...) of the structure over that of the coat.
+    index : (...) of the structure relative to the coat.
     """
     (back0, sent0), (back, sent) = (_mirrors(np.asarray(w, np.float64), n, index) for w in (wi, wo))
     passed = (1.0 - back)[..., :, None] * (1.0 - back0)[..., None, :]

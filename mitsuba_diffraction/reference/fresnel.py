@@ -38,7 +38,7 @@ class Face:
 def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Face]:
     """Return fields at the interface of a material, or at both interfaces of its film.
 
-    Films are those of Born and Wolf, Principles of Optics, section 1.6.4.
+    Films follow Born and Wolf, Principles of Optics, section 1.6.4.
     """
     q, square = np.asarray(cosine, np.float64), np.asarray(squared_sine, np.float64)
     if not isinstance(index, Filmed):
@@ -82,7 +82,7 @@ def amplitudes(cos_theta: ArrayLike, index: Index) -> tuple[Complex, Complex]:
     Parameters
     ----------
     cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
-    index : n + ik of the material over that of the medium above it; broadcasts with `cos_theta`.
+    index : n + ik of the material relative to the medium above it; broadcasts with `cos_theta`.
     """
     cosine = np.asarray(cos_theta, np.float64)
     if isinstance(index, Filmed):
@@ -116,7 +116,7 @@ def reflectance(cos_theta: ArrayLike, index: Index) -> NDArray[np.float64]:
     Parameters
     ----------
     cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
-    index : n + ik of the material over that of the medium above it; broadcasts with `cos_theta`.
+    index : n + ik of the material relative to the medium above it; broadcasts with `cos_theta`.
         Infinity is a perfect conductor.
     """
     cosine = np.asarray(cos_theta, np.float64)

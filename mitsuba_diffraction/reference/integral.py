@@ -57,7 +57,7 @@ def screen_power(
 ) -> float:
     """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm.
 
-    sigmas : of the windows; one of `patch` has that of the orders.
+    sigmas : of the windows; for `patch` the orders' window.
     centre : of the window in µm, instead of the patch's centre.
     """
     sigma = sigmas.orders

@@ -1,8 +1,8 @@
 """The default model in one file: light that a rough surface reflects (NumPy, float64).
 
 A surface of heights h(r) tiles the plane. Light of wavelength λ arrives from ωi and leaves along
-ωo, unit vectors that point away from the surface; n is the material's complex index over that of
-the medium above it. Lengths are in µm. The equations have the numbers of docs/theory.md:
+ωo, unit vectors that point away from the surface; n is the material's complex index relative to the
+medium above it. Lengths are in µm. The equations have the numbers of docs/theory.md:
 
     (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
     a_j(κ) = mean of exp(iκh) exp(i q_j·r) over the pixels                                      (2)

@@ -2,10 +2,10 @@
 
     f = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²),   q = k (u, v),   q_m = (2πm/d, 0)
 
-Each lobe is that of order 0 of `reference.model` at normal incidence, moved to q_m: its integral
-over cosθo dωo is η_m. Under a flat clear layer of index n with face reflectance R and transmittance
-T = 1 − R (Born and Wolf, section 1.5.2; unpolarised powers), the channels of the grating, a matrix
-E of efficiencies, become
+Each lobe equals the lobe of order 0 of `reference.model` at normal incidence, moved to q_m: its
+integral over cosθo dωo is η_m. Under a flat clear layer of index n with face reflectance R and
+transmittance T = 1 − R (Born and Wolf, section 1.5.2; unpolarised powers), the channels of the
+grating, a matrix E of efficiencies, become
 
     η = R δ_m0 + T(ωo) [(1 − E R)⁻¹ E] T(ωi).
 """

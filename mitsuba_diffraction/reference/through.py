@@ -15,7 +15,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     Parameters
     ----------
     wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric.
-    index : real, of the dielectric over that of the medium above it.
+    index : real, of the dielectric relative to the medium above it.
     """
     s_in, s_out = polarisation_axes(wi, wo)
     n = float(index)
@@ -91,7 +91,7 @@ def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) 
     Parameters
     ----------
     cosine : of the direction to the normal, where it is measured: in the dielectric if below.
-    index : of the dielectric over that of the medium above it.
+    index : of the dielectric relative to the medium above it.
     thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
     side : 0 above the surface, 1 below.
     """

@@ -1,7 +1,7 @@
 """Meshes and materials put into a parsed scene, before Mitsuba makes objects of it.
 
 A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`). A surface that the
-command line puts on an id replaces the BSDF of that id, or that of the shape of that id.
+command line puts on an id replaces the BSDF of that id, or the BSDF of the shape of that id.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class SceneValues(NamedTuple):
 def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
     """Separate values of a scene's parameters from surfaces for its ids and their parameters.
 
-    known : names of the scene's parameters, which go before those of the BSDF.
+    known : names of the scene's parameters, which precede the BSDF's.
     """
     materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
     rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k != CLAMP}
@@ -134,7 +134,7 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
     state : `mi.parser.ParserState`.
     materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
 
-    Raises a DiffractionError if an id is unknown; the text names those of the scene.
+    Raises a DiffractionError if an id is unknown; the text lists the scene's.
     """
     for name, text in materials.items():
         number = _node_of(state, name)
@@ -231,7 +231,7 @@ def _node_of(state: Any, name: str) -> int:
 
 
 def _put_on_shape(state: Any, number: int, text: str) -> None:
-    """Give a shape a BSDF with the surface, over that of the scene."""
+    """Give a shape a BSDF with the surface, over the scene's BSDF."""
     shape = state.nodes[number].props
     beneath, replaced = None, []
     for key in shape.keys():  # noqa: SIM118 - Properties is no mapping

@@ -36,7 +36,7 @@ def _integrator() -> type[Any]:
     """Return the class of the integrator in the variant that is set."""
 
     class ClampedSamples(mi.SamplingIntegrator):
-        """Integrator whose samples are those of another, scaled down to a largest radiance."""
+        """Integrator whose samples are another's, scaled down to a largest radiance."""
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)

@@ -71,7 +71,7 @@ def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
     Raises
     ------
     DiffractionError
-        If `up` is none of these, a vertex is not finite, or the mesh has no volume.
+        If `up` is not one of these, a vertex is not finite, or the mesh has no volume.
     """
     if up not in UPS:
         raise DiffractionError(f"up={up!r} is unknown; choose one of {', '.join(UPS)}")
@@ -109,7 +109,7 @@ def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMe
     Raises
     ------
     DiffractionError
-        If the file is no mesh, or the mesh does not fit.
+        If the file is not a mesh, or the mesh does not fit.
     """
     positions, normals, uv, faces = load_mesh(file)
     placed = fit_of(positions, file, up)

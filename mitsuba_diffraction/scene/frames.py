@@ -55,7 +55,7 @@ class Frame:
         before = _settings_in(self.png)
         if before is None:
             raise DiffractionError(
-                f"'{self.png}' exists and is no frame of this command; name another folder with -o"
+                f"'{self.png}' exists and is not a frame of this command; name another folder by -o"
             )
         for name in {**before, **self.settings}:
             old, new = before.get(name), self.settings.get(name)

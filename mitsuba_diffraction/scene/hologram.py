@@ -67,7 +67,7 @@ class Hologram:
     def mix(self, grating: dict[str, Any], blank: dict[str, Any]) -> dict[str, Any]:
         """Return a `diffraction_mix` of the gratings and the foil between them.
 
-        grating : BSDF with `parameters`; blank : BSDF where there is no grating.
+        grating : BSDF with `parameters`; blank : BSDF without a grating.
         """
         weight = _texture(self.weight[..., None])
         return {
@@ -113,8 +113,8 @@ def hologram(
         brightness: of files and integers over the largest integer, of floats from 0 to 1.
     periods
         Periods of the gratings, µm, 0.1 to 100. A mapping gives the period of each label. A pair
-        gives those of black and of white, in proportion between. An array (ny, nx) gives those of
-        the dots, a number that of all.
+        gives the periods of black and of white, in proportion between. An array (ny, nx) gives the
+        periods of dots, a number one period.
     orientations
         Degrees from the surface's first tangent to the direction across the grooves, in which light
         is spread; given as the periods are.
@@ -204,7 +204,7 @@ def _read(path: Path) -> NDArray[Any]:
 def _of_dots(
     name: str, given: Values, values: NDArray[Any], full_scale: float
 ) -> NDArray[np.float64]:
-    """Return a quantity at the dots (ny, nx); NaN where there is none."""
+    """Return a quantity at the dots (ny, nx), or NaN."""
     try:
         if isinstance(given, Mapping):
             if values.dtype.kind == "f":

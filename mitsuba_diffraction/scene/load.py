@@ -211,7 +211,7 @@ def preview_samples(sensor: Any, preview: bool) -> int:
 def sensor_of(scene: Any, index: int) -> Any:
     """Return a sensor of the scene.
 
-    Raises a DiffractionError if there is none with that index.
+    Raises a DiffractionError if no sensor has that index.
     """
     sensors = scene.sensors()
     if not sensors:
@@ -226,7 +226,7 @@ def sensor_of(scene: Any, index: int) -> Any:
 def _check_films(state: Any) -> None:
     """Refuse films whose pictures would exceed the memory of this machine.
 
-    state : `mi.parser.ParserState`; nothing is loaded yet, since that may take minutes.
+    state : `mi.parser.ParserState`; no surface is loaded yet, since that may take minutes.
     """
     import mitsuba as mi
 
@@ -249,9 +249,9 @@ def _check_films(state: Any) -> None:
 
 
 def plain_text(error: BaseException) -> str:
-    """Return the text of Mitsuba's exception as one line: where in the scene, and what is wrong.
+    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake. The
 
-    The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
+    places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
     "while loading" are left out.
     """
     text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", _words(error)))
@@ -306,7 +306,7 @@ def _no_ply(match: re.Match[str]) -> str:
         return f"'{file}' is no undamaged PLY: {match['why']}; export the mesh again"
     if file.suffix.lower() not in (".obj", ".serialized"):
         todo = "convert it to PLY or OBJ"
-    return f"'{file}' is no PLY mesh, which the scene expects: {todo}"
+    return f"'{file}' is not a PLY mesh, which the scene expects: {todo}"
 
 
 def _unused(match: re.Match[str]) -> str:

@@ -27,7 +27,7 @@ Numbers = tuple[float, ...]
 def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
     """Refuse parameters given on the command line that the scene, an XML file, does not have.
 
-    Raises a DiffractionError if one is unknown; the text names those of the scene and its includes,
+    Raises a DiffractionError if one is unknown; the text lists the scene's and its includes,
     with defaults.
     """
     known = parameters_of(scene, values)
@@ -156,7 +156,7 @@ class Change:
 def change_of(text: str) -> Change:
     """KEY=FROM:TO, where FROM and TO are numbers, or lists of them with commas between.
 
-    Raises a DiffractionError if it is none.
+    Raises a DiffractionError if it is not one.
     """
     name, equals, values = text.partition("=")
     start, colon, end = values.partition(":")
@@ -171,7 +171,7 @@ def change_of(text: str) -> Change:
 
 
 def numbers_in(text: str) -> Numbers | None:
-    """The finite numbers of a list with commas between, or None if it is none."""
+    """The finite numbers of a list with commas between, or None if it is not one."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -191,7 +191,7 @@ def values_of_frames(
     fixed : parameters that stay.
     changes : from the first frame to the last, both ends included.
     turns : names of angles in degrees that turn once around, beginning where the scene has them;
-        the last frame is one step before the first, so that a film of them closes.
+        the last frame is one step before the first, so that their film closes.
 
     Raises a DiffractionError if an angle to be turned has no value to begin with, or one that is no
     number.
@@ -202,7 +202,7 @@ def values_of_frames(
         begin = numbers_in(start or "")
         if begin is None or len(begin) != 1:
             raise DiffractionError(
-                f"the turn of {name} begins at {start!r}, which is no angle in degrees; give a "
+                f"the turn of {name} begins at {start!r}, which is not an angle in degrees; give a "
                 f"number: {name}=0"
             )
         around.append(Change(name, begin, (begin[0] + 360.0,)))

@@ -134,8 +134,8 @@ def added(span: Span, sum_of: Callable[[Span], Any]) -> Any:
     At most log2(n) + 1 sums exist at a time besides the two that are being added.
 
     span : the passes.
-    sum_of : gives the sum of a span, or None to have it added from its halves; it must give that
-        of single passes.
+    sum_of : gives the sum of a span, or None to have it added from its halves; it must give the
+        sum of single passes.
     """
     value = sum_of(span)
     if value is not None:
@@ -175,7 +175,7 @@ def developed(scene: Any, sensor: Any, total: NDArray[np.floating[Any]], spp: in
 def integrator_of(scene: Any) -> Any:
     """Return the scene's integrator.
 
-    Raises a DiffractionError if there is none.
+    Raises a DiffractionError without an integrator.
     """
     integrator = scene.integrator()
     if integrator is None:
@@ -204,7 +204,7 @@ def render_passes(
     seed : whole number from 0; each pass gets its own, derived from it.
     variant : name of the variant.
     stop : asked, it ends the rendering after the current pass.
-    progress : called as progress(samples done, samples in all, what is being done).
+    progress : called as progress(samples done, samples in all, activity).
 
     Raises a DiffractionError if Mitsuba refuses or fails to render.
     """

@@ -26,7 +26,7 @@ def read_exr(path: Path) -> Any:
 
     readable_file(path)
     if path.suffix.lower() != ".exr":
-        raise DiffractionError(f"'{path}' is no EXR; name a picture that 'render' wrote as .exr")
+        raise DiffractionError(f"'{path}' is not an EXR; name a picture that 'render' wrote")
     try:
         colours = colours_of(mi.Bitmap(str(path)))
     except RuntimeError as error:
@@ -69,7 +69,7 @@ def write_png(
 ) -> None:
     """Write 8 bits per channel: values times 2^exposure, shown by a view, sRGB's transfer curve.
 
-    colours : result of `colours_of`; its alpha is premultiplied, that of the PNG is not.
+    colours : result of `colours_of`; its alpha is premultiplied, the PNG's is not.
     exposure : stops.
     view : one of `optics.display.VIEWS`.
     metadata : text to store with it, ASCII.

@@ -43,7 +43,7 @@ class Measured(NamedTuple):
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     """Compare a table with solutions at random directions and wavelengths.
 
-    Directions are those of diffuse light within the superstrate, wavelengths even over the table's.
+    Directions are sampled as in diffuse light within the superstrate, wavelengths evenly.
     """
     x, y, lam = diffuse_light(SAMPLES, table.wavelengths)
     cell = cells.to_cell(x, y, lam, table.optical_period)

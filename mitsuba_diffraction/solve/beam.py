@@ -1,8 +1,8 @@
 """`solve_beam`: orders of some directions of light alone, as of an echelle in its mount.
 
 A grating with tens of orders has too many directions for a table of all. In an instrument light
-comes from one of them: the efficiencies there, wavelength by wavelength, make a table as those of a
-file do (`measured`), with the same warning.
+comes from one of them: the efficiencies there, wavelength by wavelength, make a table as a file's
+efficiencies do (`measured`), with the same warning.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def solve_beam(
         x towards y; a grid of both.
     step : between wavelengths, nm; the ends of the settings' wavelengths are solved exactly.
     profile, material, superstrate, layers, settings, jobs, announce : as for `solve_orders`; the
-        tolerance is that of the solver.
+        tolerance bounds the solver's error.
 
     Raises
     ------

@@ -13,7 +13,7 @@ The light comes from ωi = (sinθ cosφ, sinθ sinφ, cosθ), with x along the g
 the grooves, θ and φ within the superstrate, and order m leaves with x = mλ/d − sinθ cosφ.
 Wavelengths (in vacuum), θ and φ form a regular grid, and mirrored φ (φ and −φ) need not be listed.
 θ below 0 is light from the other side: φ + 180°. R and T are reflected and transmitted shares of
-the incident light, for light of s and of p polarisation. T is that of a thin sheet.
+the incident light, for light of s and of p polarisation. T is transmitted by a thin sheet.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     ------
     DiffractionError
         If the file cannot be read, lacks a column or variable, has an unknown unit, a hole in its
-        grid, an order twice, or numbers that are no wavelengths, angles, orders or efficiencies.
+        grid, an order twice, or numbers out of range.
     """
     shown = repr(os.fspath(path))
     head = read_bytes(path)[: len(_BEGINS_HDF5)]
@@ -282,7 +282,7 @@ def _variable(dimensions: Any, values: Any, attributes: Any) -> Variable:
 
 
 def _check_axes(axes: Sequence[Real], shown: str) -> None:
-    """Refuse numbers that are no wavelengths in nm, angles in degrees, or orders; as `AXES`."""
+    """Check the ranges of wavelengths (nm), angles (degrees) and orders, as in `AXES`."""
     wavelengths, theta, phi, orders = axes
     check_light(wavelengths, theta, phi, shown)
     whole = (orders == np.round(orders)) & (np.abs(orders) <= 2 * MOST_BANDS)
@@ -290,7 +290,7 @@ def _check_axes(axes: Sequence[Real], shown: str) -> None:
 
 
 def check_light(wavelengths: Real, theta: Real, phi: Real, shown: str) -> None:
-    """Refuse numbers that are no wavelengths in nm, or angles in degrees.
+    """Check the ranges of wavelengths (nm) and angles (degrees).
 
     shown : source of the numbers, for the message.
     """
@@ -320,7 +320,7 @@ def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:
 
 
 def _check(grid: Efficiencies, shown: str) -> None:
-    """Refuse numbers that are no efficiencies."""
+    """Check the range of efficiencies."""
     wrong = ~np.isnan(grid.values) & ~((grid.values >= -ROUNDING) & (grid.values <= LARGEST_SUM))
     if wrong.any():
         *light, order, _ = np.argwhere(wrong)[0]

@@ -46,7 +46,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Problem:
-    """Grating, solver and its resolution; `digest` is that of the grating and the solver.
+    """Grating, solver and its resolution; `digest` identifies the grating and the solver.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     Raises
     ------
     DiffractionError
-        If there is no such method.
+        If the method is unknown.
     """
     if method == AUTO:
         method = method_for(grating)
@@ -127,8 +127,8 @@ def solver_of(problem: Problem) -> Solver:
 class Solved(NamedTuple):
     """Amplitudes of a place, and the processor seconds that they took.
 
-    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. Those of a sheet, whose
-        light has no phase, are roots of its efficiencies.
+    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. For a sheet, whose light
+        has no phase, they are roots of its efficiencies.
     """
 
     values: Complex
@@ -192,7 +192,7 @@ class Jobs:
     ) -> dict[Place, Complex]:
         """Return the amplitudes at all places, of which those in the folder are read.
 
-        An exception or Ctrl-C leaves in the folder what is done by then.
+        An exception or Ctrl-C leaves finished stations in the folder.
 
         Raises
         ------

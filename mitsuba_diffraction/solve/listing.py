@@ -65,7 +65,7 @@ def list_orders(
     wavelengths : in vacuum, nm, within the table's.
     theta, phi : direction to the light, degrees, within the superstrate: from the normal, and from
         x towards y.
-    polarised : whether R_s and R_p are those of s and of p light; otherwise both are the share of
+    polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
         unpolarised light.
 
     Raises

@@ -69,7 +69,7 @@ class SolvedRecipe:
         Raises
         ------
         DiffractionError
-            If the file cannot be read, is no TOML, or has a key or value that is not allowed.
+            If the file cannot be read, is not TOML, or has a key or value that is not allowed.
         """
         file, shown = Path(path), repr(os.fspath(path))
         try:
@@ -116,7 +116,7 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     Raises
     ------
     DiffractionError
-        If there is no such generator or file, or an argument is missing, unknown or out of range.
+        If the generator or file is unknown, or an argument is missing, unknown or out of range.
     """
     names = ", ".join(GENERATORS)
     if not isinstance(name, str) or (name not in GENERATORS and "." not in name):

@@ -1,6 +1,6 @@
 """Efficiencies of a thin sheet: its structured upper side, and its flat lower side.
 
-The sheet is too thick for light from its two sides to interfere, as that of `optics.through`. Light
+The sheet is too thick for light from its two sides to interfere, as in `optics.through`. Light
 of a channel adds up in powers, then, with the polarisation that it has: two components E and B of
 one wave keep their phase. Their products E_a E_b* (Born and Wolf, section 10.9), four numbers for
 each channel, go down and up between the sides. With light a from above and b from below,

@@ -1,7 +1,7 @@
 """Stations: sets of directions between which a grating scatters light, solved together.
 
 All channels of one (band, kind, τ, ρ) of `tables.orders.cells` have the same Bloch wave, so they
-share what is expensive in a solver. A station has several wavelengths w at the same s and K.
+share the expensive part of a solver. A station has several wavelengths w at the same s and K.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Grating:
         )
 
     def _relative(self, material: Material, wavelength: Real) -> Complex:
-        """Return the index of a film, over that of the medium above; wavelength : in vacuum, nm."""
+        """Return the index of a film, relative to the medium above; wavelength : in vacuum, nm."""
         index = material.index(wavelength)
         assert index is not None  # `orders.films_of` refuses perfect conductors
         return np.asarray(index / self.superstrate)
@@ -115,11 +115,11 @@ class Station:
     fraction : f of all channels, in (0, 1).
     channels : number of propagating channels.
     wavelengths : (n,) in the medium above, µm.
-    indices : (n,) n + ik of the material over that of the medium above; None for a perfect
+    indices : (n,) n + ik of the material relative to the medium above; None for a perfect
         conductor, of which only the first wavelength is solved.
     along : (n,) direction cosine y along the grooves.
     thin : whether light comes from within the material as well.
-    films : indices (n,) of each film, over that of the medium above.
+    films : indices (n,) of each film, relative to the medium above.
     """
 
     extent: float
@@ -180,7 +180,7 @@ class Solver(Protocol):
 def reversed_light(values: NDArray[Number], sides: int = 1) -> NDArray[Number]:
     """Return the amplitudes, or efficiencies, of the reversed light, at 1 − t, by reciprocity.
 
-    sides : 2 of efficiencies of a sheet, whose ports are those of `cells`.
+    sides : 2 of efficiencies of a sheet, with the ports of `cells`.
 
     The amplitude from channel j and polarisation a to q and b is the amplitude from last − q and b
     to last − j and a (Petit 1980, "Electromagnetic theory of gratings", section 1.4).

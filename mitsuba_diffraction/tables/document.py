@@ -283,7 +283,7 @@ def _source(value: Any) -> dict[str, Any]:
 
 
 def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float) -> None:
-    """Refuse coefficients that are no numbers, or make an order brighter than all the light."""
+    """Refuse coefficients that are not finite, or make an order brighter than all the light."""
     shares = np.linspace(0.02, 1.0 - 1e-9, 5)  # at 1 the next interval begins
     _, ny, nx, components, terms = coefficients.shape
     rows = max(1, _BLOCK // (nx * components * terms))

@@ -52,7 +52,7 @@ class Expansion:
     Attributes
     ----------
     basis : "svd", "chebyshev" or "taylor".
-    kind : "power" or "amplitude", what is expanded.
+    kind : "power" or "amplitude", the quantity expanded.
     terms : coefficients per interval. Taylor's count starts at n = 1: n = 0 is δ_j0 itself.
     intervals : equal parts of [0, kappa_max].
     kappa_max : rad/µm.
@@ -130,7 +130,7 @@ class Expansion:
     def fit(self, interval: int) -> NDArray[np.float64]:
         """Matrix (nodes, series_terms) that takes values at the nodes to Chebyshev coefficients.
 
-        The values are those of the power or amplitude less `order_0_offset`·δ_j0; the matrix
+        The values are powers or amplitudes minus `order_0_offset`·δ_j0; the matrix
         divides out the factor κ̂² or κ̂ of the first interval.
         """
         nodes = self.nodes(interval)
@@ -165,7 +165,7 @@ def principal_functions(
     values : (nodes, bins), each bin's power, or part of its amplitude, at the interval's nodes.
     expansion : the Chebyshev series whose nodes they are.
     terms : how many functions.
-    near : the bins close to order 0, whose error is measured apart from that of all others.
+    near : the bins close to order 0, whose error is measured separately.
 
     Returns
     -------

@@ -2,9 +2,9 @@
 
 A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, and the first row
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
-`re.I.T` and `im.I.T` those of an amplitude. Order 0 itself and the functions of κ that the terms of
-basis "svd" are multiplied with are in the attribute, in full precision. A second attribute has the
-SHA-256 of the rest of the file.
+`re.I.T` and `im.I.T` the parts of an amplitude. Order 0 itself and the functions of κ that the
+terms of basis "svd" are multiplied with are in the attribute, in full precision. A second attribute
+has the SHA-256 of the rest of the file.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         _check_headers(headers, description, os.path.getsize(path))
         planes = _planes(_read(path, lambda file: file.channels()), description)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
-            raise ValueError("its checksum is that of another one")
+            raise ValueError("its checksum is of another one")
         return description.table(_coefficients(planes, description))
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(

@@ -151,7 +151,7 @@ class _Powers:
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
     def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
-        """Powers (ny, nx) of all orders but order 0, and that of order 0."""
+        """Powers (ny, nx) of all orders but order 0, and the power of order 0."""
         table, axes = self._table, self._axes
         expansion = table.expansion
         interval = int(expansion.interval(kappa))

@@ -165,7 +165,7 @@ def _cell_matrix(
 ) -> sparse.csr_array:
     """Sparse (cells, bins): the window around a bin, integrated over a cell.
 
-    Amplitudes are taken at the cell's centre instead: their square is what is wanted.
+    Amplitudes are taken at the cell's centre instead: as their square is tabulated.
     """
     last, spacing = table.grid.last[axis], table.spacing[axis]
     frequency = spacing * np.arange(-last, last + 1)

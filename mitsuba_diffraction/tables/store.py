@@ -1,4 +1,4 @@
-"""Cache of tables and all that is computed from them, in files found by what they are made of.
+"""Cache of tables and all that is computed from them, in files named by a digest of their inputs.
 
 A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
 lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables,
@@ -91,7 +91,7 @@ def cached(
     """Return the value under a key, from memory or from disk; otherwise make and store it.
 
     Of several threads and processes that want one thing at a time, one makes it and the others
-    wait. A cache that cannot be written is no reason to fail: the thing is then made every time.
+    wait. A cache that cannot be written fails no command: results are rebuilt.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _from_disk(
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a file among all processes; where there are no locks, do nothing."""
+    """Hold the lock of a file among all processes; does nothing without file locks."""
     lock = FileLock(path.with_suffix(".lock"))
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -169,7 +169,7 @@ def read_record(path: Path, title: str) -> Record:
     Raises
     ------
     OSError
-        If there is no such file.
+        If the file does not exist.
     ValueError, LookupError, TypeError, MemoryError, RecursionError
         If it is damaged, or has another title.
     """

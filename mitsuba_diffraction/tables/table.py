@@ -43,7 +43,7 @@ class DiffractionTable:
     expansion : which series in κ.
     grid : bins, window and taps.
     spacing : (dqx, dqy), rad/µm between bins.
-    settings : what was asked for.
+    settings : requested settings.
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.
@@ -124,7 +124,7 @@ class DiffractionTable:
 
     @property
     def sigma_0(self) -> float:
-        """σ₀ of order 0's amplitude window, µm: that of the light."""
+        """σ₀ of order 0's amplitude window, µm: the light's."""
         return sigma_of(self.coherence_width)
 
     @property

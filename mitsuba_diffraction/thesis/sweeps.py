@@ -108,7 +108,7 @@ def sweep(
     kind : one of `SWEEPS`.
     heights : the patch.
     light : direction to the light; a sweep over its angle keeps the azimuth.
-    values : values of the parameter; by default those of `SWEEPS`.
+    values : values of the parameter; by default from `SWEEPS`.
     method : method of the maps, except in a sweep over methods; `terms` requires "flss".
     resolution, samples, gain : see `methods.method_map`.
     progress : called as progress(done, total, text).
@@ -216,7 +216,7 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
 
 
 def _compare_all(kind: str, values: Sequence[Any], maps: Sequence[TimedMap]) -> Sweep:
-    """Compare all maps with that of the reference value, if the sweep has one."""
+    """Compare all maps with the map of the reference value, if the sweep has one."""
     rule = SWEEPS[kind].reference
     reference: int | None
     if rule is None or (rule == "flss" and "flss" not in values):
@@ -279,12 +279,12 @@ class Compiled:
 
     @property
     def ratio(self) -> float:
-        """Time of `flss` over that of the default look-up at every wavelength."""
+        """Time of `flss` relative to the default look-up at every wavelength."""
         return self.flss / self.spectral
 
     @property
     def colour_ratio(self) -> float:
-        """Time of `flss` over that of the default look-up in colours."""
+        """Time of `flss` relative to the default look-up in colours."""
         return self.flss / self.colours
 
 
@@ -301,8 +301,8 @@ def time_compiled(
 ) -> Compiled:
     """Time one map of the whole spectrum by three look-ups, without building tables.
 
-    The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or those of CUDA if the current
-    variant is one, and leaves the spectral one set.
+    The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or the CUDA variants
+    if one is current, and leaves the spectral one set.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def test_luminance_and_alpha_are_shown(run, light):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("none.exr", "none.exr"), ("words.exr", "cannot read"), ("a.txt", "no EXR"),
+    [("none.exr", "none.exr"), ("words.exr", "cannot read"), ("a.txt", "not an EXR"),
      ("depth.exr", "holds no colours"), (".", "is a folder"), ("/", "is a folder")],
 )  # fmt: skip
 def test_other_files_are_refused_in_one_line(run, light, name, said):

@@ -227,8 +227,8 @@ def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
 @pytest.mark.parametrize(
     ("parameters", "line"),
     [
-        ({"film_ior": 1.4}, "film_ior alone is no film"),
-        ({"film_k": 0.1}, "film_k alone is no film"),
+        ({"film_ior": 1.4}, "film_ior alone is not a film"),
+        ({"film_k": 0.1}, "film_k alone is not a film"),
         ({"film_ior": 1.4, "film_thickness": -5.0}, "film_thickness=-5 nm must be at least 0"),
         ({"film_ior": 1.4, "film_thickness": 1e4}, "over which light is coherent"),
         ({"film_ior": 0.5, "film_thickness": 100.0}, "film_ior=0.5"),

@@ -23,7 +23,7 @@ def bitmap(degrees, raw=True, channels=3, levels=None):
     ("texture", "mend"),
     [
         ({"raw": False}, "raw"),
-        ({"channels": 1}, "take three"),
+        ({"channels": 1}, "has three"),
         ({"levels": 255}, "save .* as EXR"),
         ({"levels": 65535}, "save .* as EXR"),
     ],

@@ -51,8 +51,8 @@ CASES = {
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
     '[ply.cpp:136] Error while loading PLY file "/m/ball.obj": "/m/ball.obj": invalid PLY header: '
     'unknown token "#"!': (
-        "'a.xml', line 2: shape 'ply': '/m/ball.obj' is no PLY mesh, which the scene expects: run "
-        "the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
+        "'a.xml', line 2: shape 'ply': '/m/ball.obj' is not a PLY mesh, which the scene expects: "
+        "run the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
     ),
     # quads, in binary and as text
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '

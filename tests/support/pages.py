@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from collections.abc import Iterator
 
 from tests.support import ROOT
 
@@ -42,3 +43,10 @@ def typed(text: str) -> list[list[str]]:
     """The words of each command of a shell block."""
     lines = text.replace("\\\n", " ").splitlines()
     return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def first_columns(page: str) -> Iterator[set[str]]:
+    """Yield the names in code spans of the first column of each table."""
+    for table in re.findall(r"(?:^\|.*\n)+", PAGES[page], re.M):
+        cells = (row.split("|")[1] for row in table.splitlines()[2:])
+        yield {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}

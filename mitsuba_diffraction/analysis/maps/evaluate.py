@@ -74,7 +74,7 @@ def brdf_map(
     ------
     DiffractionError
         If a parameter is out of range; if the variant is scalar, or neither spectral nor RGB; or if
-        it is RGB and the parameters are not those of the whole spectrum in daylight.
+        it is RGB and the parameters do not describe the whole spectrum in daylight.
     """
     light = Light(theta, phi)
     bands = Bands.choose(wavelength_range, step, wavelength)

@@ -56,7 +56,7 @@ class Sample:
         n: int,
         progress: Progress,
     ) -> Sample:
-        """Draw n pairs for a patch, and compute the exact sums from all of its pixels."""
+        """Draw n pairs of directions, and compute exact window sums from all pixels."""
         sigma = sigma_of(coherence_width)
         sigmas = Sigmas.same(sigma)
         pairs = lit_pairs(field, sigma, n, seed=20140113)

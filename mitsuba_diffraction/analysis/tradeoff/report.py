@@ -89,7 +89,7 @@ def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
 
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
-    """Write the settings of `plain`, one row for each."""
+    """Write a CSV with a row for each setting of `plain`."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,

@@ -34,7 +34,7 @@ def read_npy(path: Path) -> RawHeights:
     Raises
     ------
     DiffractionError
-        If the file is no NPY, is truncated, or holds anything but a real two-dimensional array.
+        If the file is not NPY, is truncated, or holds anything but a real two-dimensional array.
     """
     shown = repr(str(path))
     try:

@@ -30,7 +30,7 @@ class Layout:
     """Lattice of fingers and its irregularities; lengths in µm.
 
     `sway`, `wave` and `rise` are standard deviations of fields that vary over several fingers,
-    `jitter_x` and `jitter_y` those of single tips. Fingers vary more from column to column than
+    `jitter_x` and `jitter_y` vary single tips. Fingers vary more from column to column than
     along a column.
     """
 
@@ -259,9 +259,8 @@ def _profile(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the height of a sheet relative to its crest, and the distance from a finger's side.
 
-    Both are in µm. u is the distance from the finger's axis over the pitch, 0 to ½; t is that of
-    `Blade`.
-    """
+    Both are in µm. u is the distance from the finger's axis over the pitch, 0 to ½; t as in
+    `Blade`."""
     behind = np.maximum(t, 0.0)
     rounded = 1 - np.minimum(behind / blade.tip_round, 1)
     to_notch = np.minimum(behind / blade.notch, 1)

@@ -1,8 +1,7 @@
 """The Mitsuba BSDF plugin `diffraction_orders`: gratings whose orders were solved.
 
-For steep grooves, most of all of metal, where the models of `diffraction` are far off: a CD, a
-blazed grating, an embossed hologram. `mitsuba-diffraction solve` makes the table
-([orders.md](orders.md)). The profile repeats along x.
+For steep grooves, most of all of metal: a CD, a blazed grating, an embossed hologram.
+`mitsuba-diffraction solve` makes the table ([orders.md](orders.md)). The profile repeats along x.
 
 The grating
 -----------

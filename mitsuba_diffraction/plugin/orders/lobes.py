@@ -205,7 +205,7 @@ class SpectralLobes(_Window):
 
 
 class DaylightLobes(_Window):
-    """RGB variants: sums over daylight, see `tables.orders.daylight`."""
+    """Lobes of RGB variants, summed over daylight (`tables.orders.daylight`)."""
 
     def __init__(self, table: OrderTable, coherence_width: float) -> None:
         super().__init__(table, coherence_width)

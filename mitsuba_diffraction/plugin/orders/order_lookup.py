@@ -221,7 +221,7 @@ class OrderLookup:
 
     @staticmethod
     def _outside(row: Row, within: Float, mirror: Float) -> Float:
-        """Return light that enters through the coat's face, and adds to that of the face."""
+        """Return light that enters through the coat's face, and adds to the face's light."""
         return dr.fma(1.0 - row.face, within, mirror)
 
     def _through(self, cosine: Float) -> Float:

@@ -1,7 +1,7 @@
 """Thin sheets with solved orders, and the plugin `diffraction_orders` (Dr.Jit).
 
 Both sides of a sheet have the same medium, so order m leaves with the same tangential part above
-and below: lobes, look-ups and draws are those of a reflecting grating, with another column of the
+and below: lobes, look-ups and draws work as for a reflecting grating, with another column of the
 table for light that leaves on the other side.
 """
 
@@ -77,7 +77,7 @@ def _requested(ctx: Context, passed: Mask) -> Mask:
 
 
 def diffraction_orders(props: Properties) -> DiffractionOrders:
-    """Return the BSDF of the plugin: a sheet if the table is that of one.
+    """Return the BSDF of the plugin: a sheet if the table has one.
 
     Raises
     ------

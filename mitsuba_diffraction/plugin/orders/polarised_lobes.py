@@ -1,6 +1,6 @@
 """Mueller matrices of solved orders, in polarised variants (Dr.Jit).
 
-The axes are those of `tables.orders.polarised`, whose `nearest_pure` is here again, in a kernel.
+The axes are defined in `tables.orders.polarised`, whose `nearest_pure` is here again, in a kernel.
 Light goes from ωi to ωo; where radiance is followed, it comes the other way, and the Jones matrix
 is transposed (de Hoop 1960, Appl. Sci. Res. B 8, 135).
 

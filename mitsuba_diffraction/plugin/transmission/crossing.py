@@ -35,7 +35,7 @@ class Turned(Pair):
 
     @property
     def place(self) -> TablePoint:
-        """Return the point of tables to look up; see `reached`."""
+        """Return the coordinates to look up; 0 where not `reached`."""
         return TablePoint(dr.select(self.reached, self.uv, 0.0), self.w)
 
     @property

@@ -25,7 +25,7 @@ from ..surface_parameters import (
 )
 from ..types import Properties
 
-#: Smallest index over that of the medium above. Orders of light that goes through depend on n − 1.
+#: Smallest index relative to the medium above. Orders of light that goes through depend on n − 1.
 LEAST_INDEX = 1.01
 
 

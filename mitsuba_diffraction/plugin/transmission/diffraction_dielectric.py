@@ -1,7 +1,7 @@
 """The Mitsuba BSDF plugin `diffraction_dielectric`: reflects light, and lets the rest through.
 
-A surface between two dielectrics, or a thin sheet with one structured side, that light meets from
-either side. It has the parameters of `diffraction` for the heights, the table (without
+Interface of two dielectrics, or thin sheet with one structured side, in light from either
+side. It has the parameters of `diffraction` for the heights, the table (without
 `coherence=surface`), `orientation`, `lateral_scale`, `height_scale` and `wavelength`, and those
 below. It has no coat, film, nested BSDF, shadowing or second order.
 
@@ -26,11 +26,7 @@ The model is that of `diffraction` where light is reflected; light that goes thr
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that
 change the tangential part by more than 2/λ are left out.
 
-From below, a dielectric reflects like a surface of index 1/n in light of λ/n, and a thin sheet like
-such a surface under a coat of index n, its flat side. Light from above that the flat side sends
-back passes the structure twice, at independent positions: to first order in κ² that is one passage
-of κ = √(κi² + κo²), exact for order 0 of a Gaussian surface, with the power that two mirrors leave
-it. The formulas are those of `optics.through`.
+[theory/transmission.md](theory/transmission.md) has the equations, from `optics.through`.
 
 XML and the same in Python:
 

@@ -188,7 +188,7 @@ def _tables(method: str, surface: Diffracting) -> Packed:
 
 
 def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: str) -> Shader:
-    """Join the shared source with that of each method, under prefixed names."""
+    """Join the shared source with each method's, under prefixed names."""
     definitions = dict(common.definitions)
     for packed in tables.values():
         definitions |= packed.definitions

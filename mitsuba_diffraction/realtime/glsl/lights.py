@@ -166,7 +166,7 @@ class _MeanSample(NamedTuple):
 
 
 def _mean_sample(emitter: Any, point: Array, samples: int, sun: Array | None = None) -> _MeanSample:
-    """Average Mitsuba's samples of an emitter from a point, or only those of its sun."""
+    """Average Mitsuba's samples of an emitter from a point, or only the samples of its sun."""
     values, directions, distances, wavelengths = sampled_directions(emitter, point, samples)
     if sun is not None:
         values = values * (directions @ sun > _SUN_COSINE)[:, None, None]

@@ -78,7 +78,7 @@ def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
 
 
 def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Put each colour of order 0 (radii, zs, 3) beside that of the next z, padded: (n, 8)."""
+    """Put each colour of order 0 (radii, zs, 3) beside the next z, padded: (n, 8)."""
     following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
     pairs = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
     return np.asarray(pairs.reshape(-1, 8))
@@ -274,7 +274,7 @@ def pack_boundary(model: Model, roughness: RoughnessTable) -> Packed:
 def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
     """Pack the second order's coefficients and slope ratios (`optics.second_order`).
 
-    index : index of a dielectric over that of the medium above it.
+    index : index of a dielectric relative to the medium above it.
     """
     first, last = ratios.kappa
     count, _, rows, columns = ratios.values.shape

@@ -108,7 +108,7 @@ class Renderer:
         ----------
         method : one of `source.METHODS`.
         supersampling : samples along either side of a pixel, averaged evenly.
-        size : width and height; by default those of the camera.
+        size : width and height; by default the camera's.
         """
         self._warn(self._of_light)
         self._of_light.clear()
@@ -126,7 +126,7 @@ class Renderer:
     ) -> float:
         """Return the seconds of the fastest of some frames with one sample per pixel.
 
-        The program is compiled before. The clock is that of `context.clock_of`.
+        The program is compiled before. The clock is `context.clock_of`.
         """
         width, height = size or self.camera.size
         target = self.target(width, height)
@@ -192,7 +192,7 @@ class Renderer:
         Parameters
         ----------
         method : one of `source.METHODS`.
-        size : width and height; by default those of the camera.
+        size : width and height; by default the camera's.
         camera : by default the scene's camera.
         lights : lights to draw instead of the scene's emitters.
         shadow_size : texels a side of a shadow map.

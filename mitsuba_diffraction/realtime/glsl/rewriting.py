@@ -98,7 +98,7 @@ def global_names(source: str) -> set[str]:
 
 
 def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
-    """Prefix names in a source, and remove comments except those of uniforms and functions.
+    """Prefix names in a source, and remove comments except of uniforms and functions.
 
     prefixes : pairs of a prefix and the names that get it.
     """

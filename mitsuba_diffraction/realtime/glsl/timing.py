@@ -28,11 +28,11 @@ _LIGHT = (0.36, 0.48, 0.8, 0.0)
 def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return the seconds per fragment of each method, as "whole" and "look_up".
 
-    Whole fragments are those of a plane with the first diffracting surface's material, which fills
+    Whole fragments belong to a plane with the first diffracting surface's material, which fills
     the picture under one directional light: all of the fragment stage, with next to no geometry. A
     look-up is only the method's function at as many points, without the surface's shading. Methods
     alternate in rounds, and the fastest time of each counts, so that background load affects all
-    equally. The clock is that of `context.clock_of`.
+    equally. The clock is `context.clock_of`.
     """
     timed = {
         (method, kind): prepare(renderer, method)

@@ -70,7 +70,7 @@ def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.floa
 def difference(
     reference: Image, other: Image, mask: NDArray[np.bool_] | None, exposure: float
 ) -> Difference:
-    """Compare a picture (height, width, 3) with its reference, over all pixels or those of a mask.
+    """Compare a picture (height, width, 3) with its reference, over all pixels or a mask.
 
     With a mask, nearly black pixels do not count for ΔE2000. FLIP's filters reach neighbouring
     pixels: outside the mask, both pictures are assumed to be equal.

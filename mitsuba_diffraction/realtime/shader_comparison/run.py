@@ -128,7 +128,7 @@ class Comparison:
     folder : folder of pictures (EXR) and sheets (PNG), created with the first file.
     sensor : index of the camera.
     spp, full_spp : samples per pixel of the direct light and of full transport; 0 leaves it out.
-    frames : frames of progressive light, for all methods but those of the thesis.
+    frames : frames of progressive light, for all methods but the thesis'.
     supersampling : samples of the shaders along either side of a pixel.
     seed : seed of the random numbers.
     progress : called as progress(done, total, text).

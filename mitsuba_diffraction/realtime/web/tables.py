@@ -192,7 +192,7 @@ def strongest_orders(described: Surface) -> list[list[float]]:
     """Return the brightest separate orders in green light along the normal.
 
     Each entry has q_x and q_y in rad/µm, and the share of the light; a pair ±q has one entry. The
-    list of a coherent table is empty; that of solved orders has the first.
+    list is empty for a coherent table; solved orders have the first.
     """
     if described.orders is not None:
         return [[2.0 * np.pi / described.orders.period, 0.0, 1.0]]

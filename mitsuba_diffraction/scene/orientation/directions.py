@@ -10,7 +10,7 @@ smoothest field is its lowest eigenvector, and one that follows a guide q within
 (L + M/ℓ²) z = (M/ℓ²) q, M the vertices' areas (Knöppel, Crane, Pinkall and Schröder 2013, *Globally
 optimal direction fields*, sections 3 and 6.2, for n = 1).
 
-On a closed surface that is no torus every field has singular points, around which it turns once:
+On a closed surface other than a torus every field has singular points, around which it turns once:
 their indices add up to the Euler characteristic (Poincaré and Hopf), 2 for a ball.
 """
 
@@ -153,9 +153,9 @@ class Surface:
 
 @dataclass(frozen=True)
 class DirectionField:
-    """A unit tangent vector for every vertex, and where there is none."""
+    """Unit tangent vector of every vertex, and mask of vertices without one."""
 
-    # (n, 3) unit vectors at right angles to the normals; zero where there is none
+    # (n, 3) unit vectors at right angles to the normals; zero without a direction
     directions: Floats
     singular: Floats  # (k, 3) places around which the field turns
     indices: Ints  # (k,) how often, counter-clockwise
@@ -183,7 +183,7 @@ def direction_field(
     Raises
     ------
     DiffractionError
-        If `along` or `smoothing` is none of these, or the mesh has no area or is not finite.
+        If `along` or `smoothing` is not one of these, or the mesh has no area or is not finite.
     """
     if along not in GUIDES:
         raise DiffractionError(f"along={along!r} is unknown; choose one of {', '.join(GUIDES)}")

@@ -47,7 +47,7 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     Raises
     ------
     DiffractionError
-        If the file cannot be read, or is no mesh of these kinds.
+        If the file cannot be read, or is not a mesh of these kinds.
     """
     file = Path(path)
     kind = KINDS.get(file.suffix.lower())
@@ -127,7 +127,7 @@ def write_ply(
     """Write a binary PLY, with the names of properties that Mitsuba writes.
 
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
-    Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
+    Mitsuba 3.9 reads attributes of one or three channels and ignores attributes of two.
 
     Raises
     ------
@@ -162,9 +162,9 @@ def _need_variant() -> None:
 
 
 def triangulated_ply(data: bytes) -> bytes | None:
-    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts those of OBJ.
+    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts polygons of OBJ.
 
-    Faces must come after vertices; the result has nothing else. None where the file is no such PLY.
+    Faces must come after vertices; the result has nothing else. None for other files.
     """
     try:
         return _triangulated(data)

@@ -122,7 +122,7 @@ def oriented_mesh(
     ----------
     positions, normals : (n, 3).
     faces : (m, 3).
-    directions : (n, 3), of any length, not along the normal; zero where there is none.
+    directions : (n, 3), of any length, not along the normal; zero without a direction.
     uv : (n, 2), kept; None makes coordinates that unroll each triangle on its own, in the unit of
         the positions, which hold no picture together.
 

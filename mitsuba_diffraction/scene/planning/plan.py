@@ -57,7 +57,7 @@ class PlannedTable:
     ----------
     recorded : the table of all orders, and the look-ups in it.
     settings : of the limited table; None where it would save too little.
-    table : the limited table, or that of all orders.
+    table : the limited table, or the table of all orders.
     outside : share of the surfaces' light that is looked up beyond the limits, and missing.
     """
 

@@ -113,7 +113,7 @@ class Session:
     def record(
         self, bsdf: BSDF, si: Interaction, uv: Vector2f, scaled_w: Float, value: Colour
     ) -> None:
-        """Write down what a BSDF was asked and what it answered; for the BSDF to call."""
+        """Record a look-up of a BSDF and its result; the BSDF calls it."""
         if not self._buffers:
             return
         number = next(n for n, (_, known) in enumerate(self.bsdfs) if known is bsdf)
@@ -125,7 +125,7 @@ class Session:
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
     def records(self) -> list[Recorded]:
-        """Look-ups since `start`; nothing more is recorded."""
+        """Look-ups since `start`; recording has ended."""
         result = []
         for number, buffers in enumerate(self._buffers):
             u, v, w, *value = (np.array(buffer) for buffer in buffers)

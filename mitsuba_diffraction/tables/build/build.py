@@ -56,8 +56,8 @@ class Attempt:
 
     Parameters
     ----------
-    patches, grid, expansion : what is tabulated, where, and in which series.
-    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is.
+    patches, grid, expansion : heights, orders and series of the table.
+    functions : number of functions of basis "svd", or None.
     half : store half floats.
     tolerance : of the table; the finest take transforms in double precision.
     tell : called as tell(done, total, text).

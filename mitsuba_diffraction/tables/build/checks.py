@@ -93,7 +93,7 @@ def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple
 
 
 def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[str]:
-    """Return warnings of a table of these scans; they are no part of the table.
+    """Return warnings of a table of these scans; they are not stored in the table.
 
     Heights that are refused have none.
     """
@@ -159,7 +159,7 @@ def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -
 
 
 def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
-    """Refuse a table that exceeds the memory; `functions` counts those of basis "svd"."""
+    """Refuse a table that exceeds the memory; `functions` counts functions of basis "svd"."""
     components = 1 if expansion.kind == "power" else 2
     bins = (2 * grid.last[0] + 1) * (2 * grid.last[1] + 1)
     terms = functions or expansion.terms

@@ -48,9 +48,9 @@ def series_of(
 
     Parameters
     ----------
-    values_at : what is expanded, at the nodes of an interval.
+    values_at : values to expand, at the nodes of an interval.
     shape : (ny, nx, components) of the values.
-    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
+    functions : number of functions of basis "svd", or None; the
         expansion returned then has them.
     near : indices of the values close to order 0, see `principal_functions`.
     """
@@ -108,7 +108,7 @@ def _taylor(
 
 
 def _near(grid: Grid, components: int) -> NDArray[np.int64]:
-    """Indices of the bins close to order 0, which it is none of, in (ny, nx, components)."""
+    """Indices of the bins close to order 0 (excluded), in (ny, nx, components)."""
     x, y = (
         step * np.arange(-last, last + 1) for step, last in zip(grid.steps, grid.last, strict=True)
     )
@@ -127,8 +127,8 @@ def _powers_at(
 ) -> Iterator[tuple[float]]:
     """Powers of all bins (ny, nx, 1) at the nodes of an interval, written to `values`.
 
-    Gives that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so
-    that it takes double precision.
+    Gives the value of order 0, whose bin is left empty: a grating may put it out nearly
+    altogether, so that it takes double precision.
     """
     specular = float(expansion.order_0_offset(interval))
     inner = _inner(spectra.first, grid)

@@ -92,7 +92,7 @@ class ErrorMeter:
 
         Parameters
         ----------
-        coefficients : (ny, nx, components, terms), those of the interval.
+        coefficients : (ny, nx, components, terms), of the interval.
         order_0 : (components, series_terms), likewise.
         kappas : (n,), rad/µm.
         scale : what `coefficients` were multiplied with.

@@ -6,8 +6,8 @@ taken out fades at the edges (Hann, of mean square 1), so that the seams of the 
 nothing. The mean itself is order 0, and has no seams. Windows are cut out when they are asked for:
 memory does not grow with the scan.
 
-A Hann window L wide widens every lobe. Its power has the variance 1/3 in bins of 2π/L, that of the
-coherence window 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 19 % wider.
+A Hann window L wide widens every lobe. Its power has the variance 1/3 in bins of 2π/L, the
+coherence window's 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 19 % wider.
 """
 
 from __future__ import annotations

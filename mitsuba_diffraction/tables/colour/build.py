@@ -59,7 +59,7 @@ class PolarGrid:
 
         Parameters
         ----------
-        lobe : of the narrowest lobes, those of short wavelengths.
+        lobe : of the narrowest lobes, at short wavelengths.
         step : distance of rings in ln r.
         share : largest distance of azimuths, in units of `lobe`.
         """

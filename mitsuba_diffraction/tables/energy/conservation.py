@@ -1,6 +1,6 @@
 """Energy conservation: scales of directions by which no more light is sent on than comes in.
 
-The scales and their equations are those of docs/energy.md: s of all light, and c of order 0 where a
+docs/energy.md has the equations: s of all light, and c of order 0 where a
 dielectric lets light through. Between the grid's directions and wavelengths an order may appear or
 vanish (a Rayleigh anomaly), so s and c are lowered where light between them exceeds 1. No scale
 exists where a direction's partners all gain and it does not, as between the two groups of

@@ -62,7 +62,7 @@ class Gain:
         return np.asarray(common * ratio * reached)
 
     def exact(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
-        """Return G at cosines that broadcast, without a table."""
+        """Return G at arrays of cosines that broadcast, computed without a table."""
         common = self.path.common(cos_i, cos_o, cos_turn)
         if self.path.index is None:
             return common

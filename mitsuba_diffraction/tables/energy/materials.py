@@ -26,8 +26,8 @@ class Reflector:
     Attributes
     ----------
     model : one of `optics.boundary.MODELS`.
-    index : of the material over that of the medium at the structure.
-    coat : index of a coat over that of the medium above; 1 without a coat.
+    index : of the material relative to the medium at the structure.
+    coat : index of a coat relative to the medium above; 1 without a coat.
     """
 
     model: str
@@ -36,7 +36,7 @@ class Reflector:
 
     @property
     def densest(self) -> float:
-        """Largest index of the media that light travels in, over that of the medium above."""
+        """Largest index of the media that light travels in, relative to the medium above."""
         return self.coat
 
     def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
@@ -64,7 +64,7 @@ class Dielectric:
 
     Attributes
     ----------
-    index : over that of the medium above.
+    index : relative to the medium above.
     model : one of `optics.through.MODELS`.
     thin : whether below is beyond the flat side of a sheet.
     """
@@ -75,7 +75,7 @@ class Dielectric:
 
     @property
     def densest(self) -> float:
-        """Largest index of the media that light travels in, over that of the medium above."""
+        """Largest index of the media that light travels in, relative to the medium above."""
         return self.index
 
     def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:

@@ -1,4 +1,4 @@
-"""Resolution and limits of what conserves energy: one record, all of it part of the cache's key."""
+"""Resolution and limits of energy conservation; the whole record is part of the cache's key."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     """
     data = read_bytes(path)
     if kind_of(path) is not FileKind.ORDERS:
-        raise DiffractionError(f"'{path}' is no table of orders; {_advice(Path(path))}")
+        raise DiffractionError(f"'{path}' is not a table of orders; {_advice(Path(path))}")
     try:
         with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
             version = int(getattr(file, ORDERS_ATTRIBUTE))
@@ -114,7 +114,7 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
                 )
             return _table(file)
     except DiffractionError as error:
-        raise DiffractionError(f"'{path}' is no table of orders: {error}; {_AGAIN}") from error
+        raise DiffractionError(f"'{path}' is not a table of orders: {error}; {_AGAIN}") from error
     except Exception as error:  # whatever SciPy makes of damaged bytes
         raise DiffractionError(
             f"'{path}' is a damaged table of orders ({one_line(str(error))[:100]}); {_AGAIN}"
@@ -149,7 +149,7 @@ def _table(file: Any) -> OrderTable:
         packed[int(k), kind + (_MUELLER if first == "mueller" else "")] = variable[:]
     checksum = _checksum((period, (low, high), superstrate, header), thin, components, packed)
     if file.sha256 != checksum.encode():
-        raise ValueError("its checksum is that of another one")
+        raise ValueError("its checksum is of another one")
     unpacked = {
         key: (numbers * file.variables[f"kind_{key[1][0]}_{key[0]}"].scale_factor).astype(
             np.float32

@@ -37,8 +37,8 @@ def efficiency(
     ----------
     x, y : direction cosines within the superstrate of the mirror direction of the incident
         light, −(ωi)_x and −(ωi)_y.
-    wavelength : in vacuum, nm. Beyond the table's by more than `table.MARGIN` octaves there is no
-        light, which is warned of; within that margin, the nearest wavelength's.
+    wavelength : in vacuum, nm. Beyond the table's by more than `table.MARGIN` octaves the table is
+        dark, with a warning; within that margin, the nearest wavelength's.
     order : m; order m leaves at x + m λ/(n d) and y.
     from_below : whether the light comes from below a thin sheet.
     transmitted : whether the order leaves on the other side of a thin sheet.
@@ -50,7 +50,7 @@ def efficiency(
     Raises
     ------
     DiffractionError
-        If light below is asked for, and the table is that of no sheet.
+        If light below is asked for, and the table is not of a sheet.
     """
     light = (table, x, y, wavelength, order, from_below, transmitted)
     return np.asarray(_stored(*light).mean(axis=-1))
@@ -130,7 +130,7 @@ def groove_efficiency(
 
 
 class TurnedAxes(NamedTuple):
-    """Cosine and sine of 2ψ, with ψ from the table's axis e to that of s polarisation."""
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
 
     cosine: Array
     sine: Array

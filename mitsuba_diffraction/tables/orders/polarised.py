@@ -6,7 +6,7 @@ axes are smooth over all directions but y itself. The elements `ODD` change thei
 direction cosine of the light along the grooves: what is smooth in the coordinates of `cells` is
 their ratio to y.
 
-An order is one plane wave for each incident one, so that its matrix is that of a Jones matrix, and
+An order is one plane wave for each incident one, so that its matrix is a Jones matrix', and
 fully polarised light stays so. Interpolation between nodes breaks that slightly; `nearest_pure`
 mends it, so that no matrix gains light or polarisation.
 """

@@ -95,14 +95,14 @@ class OrderTable:
     """Efficiencies of the orders of a periodic profile, at nodes of smooth coordinates.
 
     x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
-    are those of `cells`.
+    are defined in `cells`.
 
     Attributes
     ----------
     period : µm.
     wavelengths : shortest and longest, in vacuum, nm. Light beyond them by less than `MARGIN`
-        has the nearest efficiencies: longer light those of the longest wavelength at the same s
-        and K, shorter light those of the shortest, in the same direction. Other light has none.
+        has the nearest efficiencies: longer light at the same s and K, shorter light in the
+        same direction. Other light has none.
     bands : of k = 0, 1, …, `cells.largest_band`.
     superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
         thick to interfere, as the polycarbonate of a CD.

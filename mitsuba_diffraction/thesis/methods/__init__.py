@@ -1,4 +1,4 @@
-"""Methods to sum the BRDF over wavelengths: those of the thesis and the package's default.
+"""Methods to sum the BRDF over wavelengths: the methods of the thesis and the package's default.
 
 All have one interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the thesis
 defines reflectance, `xyz` and `linear_srgb` under D65, for arrays of direction pairs (NumPy only).

@@ -3,8 +3,8 @@
 `flss` and the package's `default` sum one integral over the same wavelengths (`FullSpectrum`); they
 differ in the series that approximates S.
 
-Relative reflectance, as the thesis defines it, divides the reflected radiance by that of a flat
-mirror of the same material lit and seen along the normal. With S(ωi, ωo; λ) = ⟨|P|²⟩ under the
+Relative reflectance, as the thesis defines it, divides the reflected radiance by the radiance of a
+flat mirror of the same material lit and seen along the normal. With S(ωi, ωo; λ) = ⟨|P|²⟩ under the
 window, normalised to 1 for that mirror, the BRDF (Stam 1999, eq. 7) becomes
 
     ρ(λ) = C(ωi, ωo)·S,   C = F²(ωi, ωo)/F²(ω0, ω0) · (1 + ωi·ωo)²/(w² cosθo) · G,

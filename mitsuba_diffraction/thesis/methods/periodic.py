@@ -45,7 +45,7 @@ class OrdersOnly(Method):
     lobe; it is exact where the lobes of neighbouring orders do not overlap.
 
     Light between orders, and light of a surface that is not periodic, is lost: `brdf` and
-    `relative` equal those of `flss` within half a step of a λₙ and around the mirror direction, and
+    `relative` equal `flss` within half a step of a λₙ and around the mirror direction, and
     are 0 elsewhere.
 
     Parameters

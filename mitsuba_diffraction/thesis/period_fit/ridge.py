@@ -1,6 +1,6 @@
 """Ridge of maxima of a response, and the period for which the grating equation fits it.
 
-The response is that of a virtual goniometer: a monochromatic beam, and a detector that swings
+The response is measured by a virtual goniometer: a monochromatic beam, and a detector that swings
 through the plane of incidence.
 """
 

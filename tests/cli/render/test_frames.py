@@ -126,7 +126,7 @@ def test_somebody_elses_picture_is_not_overwritten(render):
     os.mkdir("out")
     Image.new("RGB", (4, 4)).save("out/frame_0001.png")
     line = render("--frames", "2", *LIGHT, "-o", "out").failed_in_one_line()
-    assert "'out/frame_0001.png' exists and is no frame of this command" in line
+    assert "'out/frame_0001.png' exists and is not a frame of this command" in line
     assert os.listdir("out") == ["frame_0001.png"]
 
 
@@ -226,7 +226,7 @@ def test_unusable_options_are_usage_errors(render, options, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--turn", "text"], "the turn of text begins at 'word', which is no angle"),
+        (["--turn", "text"], "the turn of text begins at 'word', which is not an angle"),
         (["--animate", "lihgt=0:1"], "did you mean light?"),
         (["--turn", "light", "-o", "no/where"], None),
     ],
@@ -253,5 +253,5 @@ def test_what_is_no_picture_is_no_frame(tmp_path):
 
     file = tmp_path / "frame_0000.png"
     file.write_bytes(b"no picture")
-    with pytest.raises(DiffractionError, match="no frame of this command"):
+    with pytest.raises(DiffractionError, match="not a frame of this command"):
         Frame(file, {}, {}).outdated(False)

@@ -52,7 +52,7 @@ def test_arguments_that_do_not_fit_are_one_line(run, scene, arguments, said):
     ("name", "content", "said"),
     [
         ("a.obj", "# of a modeller\nv 0 0 0\n", "tangents a.obj -o mesh.ply' first"),
-        ("a.stl", "solid a\n", "'a.stl' is no PLY mesh, which the scene expects: convert it"),
+        ("a.stl", "solid a\n", "'a.stl' is not a PLY mesh, which the scene expects: convert it"),
         ("a.ply", "ply\n#\n", "'a.ply' is no undamaged PLY"),
     ],
 )  # fmt: skip

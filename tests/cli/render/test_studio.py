@@ -80,7 +80,7 @@ def test_parameters_of_the_surface_change_a_preset(parameters):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--look", "metal", "--base", "sienna"], "--base 'sienna' is no metal"),
+        (["--look", "metal", "--base", "sienna"], "--base 'sienna' is not a metal"),
         (["--env", "none.hdr"], "'none.hdr' does not exist"),
     ],
 )

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from docs.make.figures import pages
 from docs.make.figures.cluster_simulation import Costs, Job, Simulation
-from tests.support import ROOT
 
 #: Passes of 2 s.
 COSTS = Costs(
@@ -44,9 +42,3 @@ def test_additions_wait_for_the_network_of_workers():
         for network in (1e-12, 1e-7)
     )
     assert slow > fast + STILL.bytes * 1e-7 * 3  # three sums come to the last addition at least
-
-
-def test_the_page_has_the_places_for_the_figures():
-    page = (ROOT / "docs" / "cluster.md").read_text("utf-8")
-    for name in ("film", "times", "scaling"):
-        assert pages.part(page, name)

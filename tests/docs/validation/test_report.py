@@ -9,7 +9,6 @@ import pytest
 from docs.make.validation.__main__ import main
 from docs.make.validation.pages.markdown import joined, percent, table
 from docs.make.validation.pages.report import PAGES, page_path
-from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
 
@@ -36,11 +35,6 @@ def test_the_report_is_whole(tmp_path, capsys):
 def test_a_page_is_written_alone(tmp_path):
     assert main(["report", "solutions", "--quick", "-o", str(tmp_path)]) == 0
     assert [path.name for path in tmp_path.rglob("*.md")] == ["solutions.md"]
-
-
-def test_the_page_to_decide_by_is_short():
-    page = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
-    assert len(page.splitlines()) <= 150
 
 
 def test_a_folder_that_cannot_be_written_is_an_error_in_one_line(tmp_path, capsys):

@@ -34,7 +34,7 @@ def test_all_of_a_patch_is_the_patch():
 def test_what_is_not_there_is_refused_in_one_line(size, words):
     with pytest.raises(DiffractionError, match=words) as caught:
         crop(FIELD, size)
-    assert "it is 4 x 1.5 µm" in str(caught.value)
+    assert "the patch is 4 x 1.5 µm" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

@@ -13,7 +13,7 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# Gratings of a perfect conductor
 
-A perfect conductor (`material="none"`) has no index, and Kirchhoff's model without polarisation.
+A perfect conductor (`material="none"`) has Kirchhoff's model without polarisation.
 
 {_probe(measured)}
 
@@ -62,7 +62,7 @@ def _polarisation(measured: Measurements) -> str:
             rows.append([str(grating), light.upper(), *map(percent, values)])
     return f"""## Polarised light
 
-The model is the mean over polarisations. Against one polarisation at a time (TE: the electric field
-along the grooves) its deviation is larger. Deviation of all orders:
+Deviation of all orders of the model, a mean over polarisations, from one polarisation at a time
+(TE: the electric field along the grooves):
 
 {table(["grating", "light", *map(angle, angles)], rows)}"""

@@ -40,8 +40,8 @@ def _surfaces(measured: Measurements) -> str:
     header = ["surface", "cases", *(f"{name}, 60°" for name in names), "0°", "30°"]
     return f"""# How far the model holds
 
-This page compares the model with rigorous solutions, closed forms and statistics. `make validation`
-computes every number on it.
+The model beside rigorous solutions, closed forms and statistics. `make validation` computes every
+number.
 
 - Gentle surfaces: up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than
   {percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in light up to
@@ -195,8 +195,8 @@ Largest deviation of colours in light up to 60°:
 
 {table(["layer", "worst"], rows)}
 
-[layers.md](validation/layers.md) has each grating. [transmission.md](validation/transmission.md)
-has transmitted orders, and the sum of reflected and transmitted light of several surfaces."""
+[transmission.md](validation/transmission.md) has transmitted orders, and R + T of several
+surfaces."""
 
 
 def _numerics() -> str:
@@ -204,7 +204,7 @@ def _numerics() -> str:
 
 Order powers of ideal gratings agree with closed forms to 5e-6 in `md.reference.brdf` and to 1e-5 in
 tables ([numerics.md](validation/numerics.md)). The rigorous solutions change by less than 5e-3 of
-the incident light in their last refinement, most by 1e-5, and two independent solvers agree
+the incident light in their last refinement, most by 1e-5
 ([solutions.md](validation/solutions.md))."""
 
 
@@ -223,6 +223,4 @@ def _tables() -> str:
     ]
     return f"""## The tables
 
-{table(["page", "holds"], rows).replace("---:", "---")}
-
-`python -m docs.make.validation report gratings` writes one of them again."""
+{table(["page", "holds"], rows).replace("---:", "---")}"""

@@ -27,25 +27,23 @@ def _introduction() -> str:
 Deviation of colours of three models from rigorous solutions
 ([method](solutions.md), [definition](../validation.md#what-the-figures-are)):
 
-- *Kirchhoff*: `model="kirchhoff"`, Fresnel's coefficients at the half vector.
-- *Small slope*: first-order small slope alone, with Rice's coefficients. The plugin does not offer
-  it.
-- *Blend*: `model="small_slope"`, on dielectrics with `second_order=true`.
-  [second_order.md](second_order.md#gratings) compares it with `second_order=false`.
+- *Kirchhoff*: `model="kirchhoff"`.
+- *Small slope*: first-order small slope alone, which the plugin does not offer.
+- *Blend*: `model="small_slope"`, on dielectrics with `second_order=true`; without it:
+  [second_order.md](second_order.md#gratings).
 
-Light falls across the grooves. Keratin has the index 1.56. Angles are measured from the normal."""
+Light falls across the grooves. Keratin has the index 1.56."""
 
 
 def _bands(measured: Measurements) -> str:
     return f"""## By depth and profile
 
-Mean over the gratings, as Kirchhoff / small slope / blend. The blend equals small slope on gentle
-gratings and Kirchhoff on deep ones.
+Mean over the gratings, as Kirchhoff / small slope / blend.
 
 {_groups(measured.by_model)}
 
-In unpolarised light the errors of the two polarisations partly cancel, most of all on metals. For
-one polarisation, as Kirchhoff / blend (TE: the electric field along the grooves):
+In unpolarised light the errors of the two polarisations partly cancel. For one polarisation, as
+Kirchhoff / blend (TE: the electric field along the grooves):
 
 {_polarised_groups(measured.by_model)}"""
 
@@ -126,8 +124,7 @@ def _slopes(measured: Measurements) -> str:
     gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
     return f"""## Sinusoids by slope
 
-The deviation grows with the RMS slope, for narrow periods and in oblique light. Period/depth,
-Kirchhoff / blend:
+Period/depth, Kirchhoff / blend:
 
 {table(header, rows)}
 
@@ -141,9 +138,9 @@ def _edges(measured: Measurements) -> str:
     parts = [
         """## Walls
 
-Light that vertical walls reflect is missing in the model, most of all on metals. Period/depth,
-Kirchhoff / blend. Blazed gratings ascend towards +x: light from positive angles falls on their
-steps, light from negative angles on the facets."""
+Light that vertical walls reflect is missing in the model. Period/depth, Kirchhoff / blend. Light
+from positive angles falls on the steps of blazed gratings, light from negative angles on the
+facets."""
     ]
     for profile in ("lamellar", "blazed"):
         angles = angles_of(measured.default["keratin"].where(profile=profile))

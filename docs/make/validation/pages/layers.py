@@ -30,8 +30,8 @@ def _coat(measured: Measurements) -> str:
     return f"""## Under a coat
 
 Aluminium under polycarbonate (`coat_ior` {COAT:g}). Rigorous solutions are matrices between all
-orders inside the coat, whose faces transmit and return their powers
-(docs/make/validation/coated.py). Deviation of colours of the default:
+orders inside the coat, whose faces transmit and return their powers. Deviation of colours of the
+default:
 
 - *one passage*: light that is diffracted once, compared with the model without bounces.
 - *with bounces*: the whole series, with light that the face reflects totally.
@@ -39,8 +39,8 @@ orders inside the coat, whose faces transmit and return their powers
 
 {table(header, rows)}
 
-Walls deviate as they do without a coat. The model has the bounces between two mirrors, but not
-light that is diffracted twice, much of it beyond the critical angle."""
+Walls deviate as without a coat. The model lacks light that is diffracted twice, much of it beyond
+the critical angle."""
 
 
 def _film(measured: Measurements) -> str:
@@ -60,8 +60,7 @@ def _film(measured: Measurements) -> str:
     worst = max(film.default.max() for film in measured.films)
     return f"""## Under a film
 
-A film that follows the heights, beside Rayleigh's expansion at both faces
-(docs/make/validation/filmed.py). The steepest slopes are 0.03 to 0.1.
+Beside Rayleigh's expansion at both faces. The steepest slopes are 0.03 to 0.1.
 
 {table(["film", "`film_ior` + i `film_k`", "`film_thickness`"], sizes)}
 
@@ -71,9 +70,6 @@ Deviation of colours as Kirchhoff / small slope of first order / the default, wh
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 
 The goal was 10 %; the default deviates by at most {percent(float(worst))}.
-
-In a thick film (lacquer) light that is diffracted twice meets narrower fringes at the intermediate
-order; the mean second order corrects most of that.
 
 Thicker films and deeper gratings deviate more; the plugin warns of thick films on rough metals.
 Lacquer at {angle(ANGLES[-1])}:

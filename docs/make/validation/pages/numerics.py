@@ -17,7 +17,7 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# Closed forms and random surfaces
 
-These comparisons test the integral and the tables, not the physical model.
+Tests of the integral and the tables, not of the physical model.
 
 {_closed_forms(measured)}
 

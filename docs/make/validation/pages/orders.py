@@ -37,8 +37,8 @@ The shipped tables of `diffraction_orders` and the default model, beside indepen
 {", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. [Colours](../validation.md) are all orders
 but 0 within 75°; *sum* is the largest deviation of the sum over all orders.
 
-The tables come from a boundary integral method. The other solvers, which share no code or equations
-with it, are coupled waves (`cd`, `dvd`) and Chandezon's method (`blazed`, `sinusoidal`).
+The tables come from a boundary integral method. The other solvers are coupled waves (`cd`, `dvd`)
+and Chandezon's method (`blazed`, `sinusoidal`).
 
 ## Side by side
 
@@ -50,8 +50,8 @@ Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpo
 
 The tables beside their own solver, at {measured.diffuse_samples}
 random directions of diffuse light and wavelengths.
-*Absorbed* is the share of light that no order has, and *bias* the relative deviation
-of its mean; then the deviation of the absorbed share, as a share of the incident light.
+*Absorbed* is the share of light in no order, *bias* the relative deviation
+of its mean, followed by its deviation as a share of the incident light.
 
 {table(header, diffuse)}
 

@@ -17,9 +17,8 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# The second order of small slope
 
-`second_order=true` multiplies each order of a dielectric by the part of the second order
-(Voronovich 1994) that a table of powers can hold. Below, the factor and the exact second order
-beside rigorous solutions; [theory.md](../theory.md#the-second-order) has the equations.
+The factor of `second_order=true` ([equations](../theory.md#the-second-order)) and the exact second
+order (Voronovich 1994) beside rigorous solutions.
 
 {_exact(measured)}
 
@@ -37,16 +36,16 @@ def _exact(measured: Measurements) -> str:
     header = ["surface", "cases", *names, *(f"light, {name}" for name in names)]
     return f"""## The exact second order
 
-Small slope without the blend, summed over all intermediate waves
-(docs/make/validation/second_order.py). Deviation of colours, mean and worst; *light* is all
-reflected light over the rigorous. *Times the mean* is the first order times the mean second order
-of Gaussian heights of the same spectrum. Gratings have a depth/period up to {DEEPEST:g}.
+Small slope without the blend, summed over all intermediate waves. Deviation of colours, mean and
+worst; *light* is all reflected light over the rigorous. *Times the mean* is the first order times
+the mean second order of Gaussian heights of the same spectrum. Gratings have a depth/period up to
+{DEEPEST:g}.
 
 {table(header, _rows(cases, MODELS, MODELS))}
 
 Most of the first order's error on scales and on a CD is the second order. The mean corrects the
-total light on gentle walls but not the colours. The exact sum depends on every pair of directions,
-which no table of powers holds; on vertical walls it depends on where it is truncated."""
+total light on gentle walls but not the colours. On vertical walls the exact sum depends on where it
+is truncated."""
 
 
 def _factor(measured: Measurements) -> str:
@@ -56,9 +55,8 @@ def _factor(measured: Measurements) -> str:
     header = ["surface", "cases", *second_order_factor.MODELS, *(f"light, {name}" for name in lit)]
     return f"""## The factor of `second_order=true`
 
-The factor has two coefficients of directions and index, and two ratios of spectra of the heights,
-of each order on gratings. Cuts use the ratios of the patch around them, 20 to 65 µm wide; *own
-orders* uses each order of the cut. Deviation of colours on keratin, mean and worst, blend included.
+Cuts use the slope ratios of the patch around them, 20 to 65 µm wide; *own orders* uses each order
+of the cut. Deviation of colours on keratin, mean and worst, blend included.
 
 {table(header, _rows(cases, second_order_factor.MODELS, lit))}
 
@@ -102,13 +100,13 @@ Deviation of colours with `second_order=false` / `second_order=true`:
 
 {table(header, rows)}
 
-At the walls of lamellar and blazed gratings the squared slopes carry no information, and a gate
-switches the factor off. Of {len(every)} gratings and angles {len(worse)} are worse with the factor,
-by more than the solver's last refinement changed and a tenth of a point:
+At the walls of lamellar and blazed gratings a gate switches the factor off. Of {len(every)}
+gratings and angles {len(worse)} are worse with the factor, by more than the solver's last
+refinement changed and a tenth of a point:
 
 {table(["", "light from", *names], harmed)}
 
-The factor is fitted to all travelling waves of a plane; an order of a sinusoid has two."""
+The factor is fitted to all travelling waves; an order of a sinusoid has two."""
 
 
 def _rows(cases: Sequence[Case], names: Sequence[str], lit: Sequence[str]) -> list[list[str]]:

@@ -24,17 +24,15 @@ def _method() -> str:
 
 ## Efficiency of an order
 
-An order m of a grating has the power of its lobe of the BRDF. Through a window much wider than the
-period, the integral of $f \cos\theta_o$ over the lobe is
+The power of order m is the integral of $f \cos\theta_o$ over its lobe. Through a window much wider
+than the period it is
 
 $$
 \eta_m = \frac{4 \cos\theta_i \cos\theta_m N}{w^2} \, |a_m(k w)|^2, \qquad
 w = \cos\theta_i + \cos\theta_m ,
 $$
 
-because $d\omega_o = d\alpha \, d\beta / (k^2 \cos\theta_o)$ and
-$\iint e^{-\sigma^2 |q - q_m|^2} d\alpha \, d\beta = \pi/\sigma^2$. N is the mean power of the Jones
-matrix ([theory.md](../theory.md)). Comparisons have $\eta_m$ from `md.reference.brdf` at the
+with N of [theory.md](../theory.md). Comparisons have $\eta_m$ from `md.reference.brdf` at the
 centre of the lobe, before energy is conserved.
 
 `python -m docs.make.validation solve`, `patches`, `coated` and `films` (extra `validation`) compute
@@ -89,10 +87,10 @@ def _two_solvers() -> str:
     ]
     return f"""## Two solvers on gratings
 
-The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. Coupled waves on a
-staircase do not converge for TM light on metal. On metal the comparison is therefore of TE light,
-and of both polarisations on lamellar gratings, which need no staircase. Absolute differences of
-efficiencies, and how much the second solver changed when its orders and layers doubled:
+The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. On a staircase they
+do not converge for TM light on metal: there the comparison is of TE light, and of both
+polarisations on lamellar gratings. Absolute differences of efficiencies, and the second solver's
+change when its orders and layers doubled:
 
 {table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}"""
 
@@ -116,11 +114,11 @@ def _cells() -> str:
 Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the
 deviation of colours of one from the other. *Change* is what each solution still changed from
 {coarse} to {fine} and from {first} to {second} harmonics. All figures are the largest of all
-directions. The two solvers differ by less than coupled waves still change.
+directions.
 
 {table(header, rows)}
 
 On aluminium coupled waves do not converge. There Rayleigh's expansion agrees with the integral
 method on sinusoids within 3e-5 of an efficiency, up to a depth/period of 0.09. On keratin
-transmitted light, solved from equations of its own, adds up with reflected light to 1 within 1e-6
-(crossed grating) and 1e-3 (the CD's low pits); a test checks both."""
+transmitted and reflected light add up to 1 within 1e-6 (crossed grating) and 1e-3 (the CD's low
+pits)."""

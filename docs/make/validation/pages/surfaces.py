@@ -23,23 +23,23 @@ def write(measured: Measurements) -> str:
 
 Deviation of colours on small periodic cells: sinusoids in conical mounts, a crossed grating, and
 cuts of 2.6 µm of a measured scale (*Elaphe*), of its look-alike, and of 3.2 µm of a CD. The cuts
-are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's expansion
-(docs/make/validation/rayleigh.py), which does not converge on steeper metals than these.
+are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's expansion, which
+does not converge on steeper metals than these.
 
 ## Unpolarised light
 
 Mean over the planes of incidence, as Kirchhoff / small slope alone / `second_order=false` /
 `second_order=true`. *Change* is the largest change of the solution by more harmonics.
 
-Slope ratios are those of a table: of each order on gratings, of the whole patch, 20 to 65 µm wide,
-on cuts. Metals have no second order.
+Slope ratios are of each order on gratings, of the whole patch, 20 to 65 µm wide, on cuts. Metals
+have no second order.
 
 {table(header, list(_unpolarised(cells)))}
 
 ## Polarised light
 
 Light from 60°, mean over the planes of incidence, as Kirchhoff / `second_order=false` /
-`second_order=true`. The second order is one factor for both polarisations, computed for their mean.
+`second_order=true`, one factor for both polarisations.
 {_nearer(cells)}.
 
 {table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""

@@ -20,8 +20,6 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# Through a dielectric
 
-`diffraction_dielectric` reflects and transmits, at an interface or through a thin sheet.
-
 {_orders(measured)}
 
 {_surfaces(measured)}
@@ -68,9 +66,9 @@ def _surfaces(measured: Measurements) -> str:
     ]
     return f"""## Reflected and transmitted light
 
-A lossless dielectric reflects and transmits all light, R + T = 1. Least and largest R + T of 24
-azimuths at 450, 550 and 650 nm, for the index {transmitted.INDEX:g} and a coherence width of 20 µm,
-as `info --energy` prints them: model → `energy_conserving`, the default.
+A lossless dielectric has R + T = 1. Least and largest R + T of 24 azimuths at 450, 550 and 650 nm,
+for the index {transmitted.INDEX:g} and a coherence width of 20 µm, as `info --energy` prints them:
+model → `energy_conserving`, the default.
 
 {table(["surface", "light", *map(angle, PASSED)], rows)}
 
