@@ -60,7 +60,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         _replace(temporary, target)
     except OSError as error:
         raise DiffractionError(
-            f"cannot write '{target}': {error.strerror or error}; nothing was left behind"
+            f"cannot write '{target}': {error.strerror or error}; no file was left behind"
         ) from error
     finally:
         with contextlib.suppress(PermissionError):  # on Windows, a file that a writer left open

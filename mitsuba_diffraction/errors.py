@@ -14,7 +14,7 @@ _INTERNAL = ("mitsuba_diffraction", "mitsuba", "drjit")
 
 # Characters of a word or quotation, and of a message, at most.
 _WORD, _MESSAGE = 160, 500
-# a quotation begins after white space, "(" or "=": what lies between two of them is none
+# a quotation begins after white space, "(" or "="; text between two quotations is not quoted
 _LONG = re.compile(rf"(?<![^\s(=])'[^'\n]{{{_WORD - 1},}}'|[^\s']{{{_WORD + 1},}}")
 
 

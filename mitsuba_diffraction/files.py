@@ -1,6 +1,6 @@
 """Input files, looked at before they are opened: every reader of the package goes through here.
 
-`kind_of` alone decides what a file is.
+`kind_of` alone decides the kind of a file.
 
 Opening a pipe waits for somebody to write into it, and a device has no end. A name that is not
 UTF-8 cannot be handed to Mitsuba or OpenEXR.

@@ -2,6 +2,7 @@
 
 python -m docs.make.words             # pages, then docstrings and messages
 python -m docs.make.words --before COMMIT    # beside the counts of a commit
+python -m docs.make.words --sample SEED      # twenty docstrings, ten messages, five paragraphs
 
 Code blocks, tables, generated parts, formulas and pictures are left out. Pages of docs/validation
 and front.md are written by docs/make/validation; their prose counts.
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import random
 import re
 import subprocess
 import sys
@@ -95,11 +97,50 @@ def counts(texts: Mapping[str, str]) -> tuple[dict[str, int], Counter[str], Coun
     return {name: words(text) for name, text in pages.items()}, in_pages, in_code
 
 
+def public_docstrings(source: str) -> Iterator[str]:
+    """Yield the name and docstring of each public function, class and module of a source."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            name, text = getattr(node, "name", "module"), ast.get_docstring(node)
+            if text and not name.startswith("_"):
+                yield f"{name}: {text}"
+
+
+def messages(source: str) -> Iterator[str]:
+    """Yield the expressions that a source raises as errors, or warns of."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and re.search(r"Error$|warn", ast.unparse(node.func)):
+            call = ast.unparse(node)
+            if any(code_texts(call)):
+                yield call
+
+
+def sample(texts: Mapping[str, str], seed: int) -> Iterator[str]:
+    """Yield twenty docstrings, ten messages and five paragraphs, drawn without order."""
+    pages = sorted(name for name in texts if is_page(name))
+    modules = sorted(name for name in texts if not is_page(name))
+    paragraphs = (
+        f"{name}: {' '.join(text.split())}"
+        for name in pages
+        for text in re.split(r"\n\s*\n", prose(texts[name]))
+        if words(text) > 15
+    )
+    docstrings = (f"{name}: {t}" for name in modules for t in public_docstrings(texts[name]))
+    raised = (f"{name}: {t}" for name in modules for t in messages(texts[name]))
+    draw = random.Random(seed)
+    for count, kind in ((20, docstrings), (10, raised), (5, paragraphs)):
+        yield from draw.sample(list(kind), count)
+
+
 def main() -> int:
-    """Print the counts as Markdown tables."""
+    """Print the counts as Markdown tables, or a sample of texts."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.words", description=__doc__)
     parser.add_argument("--before", metavar="COMMIT", help="counts of a commit beside today's")
+    parser.add_argument("--sample", metavar="SEED", type=int, help="texts to read, drawn by a seed")
     args = parser.parse_args()
+    if args.sample is not None:
+        print("\n\n".join(sample(files(None), args.sample)))
+        return 0
     found = [counts(files(commit)) for commit in ([args.before] if args.before else []) + [None]]
     columns = (["before"] if args.before else []) + ["words"]
     print(f"| page | {' | '.join(columns)} |\n|---|{'---:|' * len(columns)}")

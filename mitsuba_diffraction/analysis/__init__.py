@@ -6,7 +6,7 @@ maps           BRDF maps over the hemisphere of view directions
 spectra        reflectance spectra as a spectrometer measures them
 spectra_files  CSV, colours and plot of spectra
 observers      eyes of animals: sensitivities, quantum catches, contrasts
-false_colour   pictures of what an eye catches
+false_colour   pictures of an eye's quantum catches
 spectral_variables  variables of spectra as biologists publish them
 known_wavelengths  wavelengths at which a material and a pigment are known
 crops          crops of one scan

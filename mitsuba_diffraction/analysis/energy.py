@@ -111,7 +111,7 @@ def _range(values: NDArray[np.floating]) -> list[float]:
 
 
 def energy_warnings(summary: dict[str, Any]) -> list[str]:
-    """Return a warning for each material that loses much, or loses what the model does not gain."""
+    """Return a warning for each material that loses much light, or loses it without a gain."""
     much = [
         f"with {name}, the model gains energy: up to {100 * energy['taken, largest']:.0f} % of the "
         "light is removed (up to 80° from the normal; energy_conserving=false keeps it)"

@@ -168,8 +168,8 @@ def eye_of(name: str) -> Eye:
     names, table = _columns(name)
     if len(names) < 2:
         raise DiffractionError(
-            f"'{name}' is no eye: give a header, wl and a name for each of two receptors or more, "
-            "and rows of wavelengths in nm, increasing, and sensitivities"
+            f"'{name}' is not a table of receptors: give a header, wl and a name for each of two "
+            "receptors or more, and rows of wavelengths in nm, increasing, and sensitivities"
         )
     if wrong := [n for n in names if names.count(n) > 1 or not n.isidentifier() or n in _TAKEN]:
         raise DiffractionError(
@@ -231,8 +231,8 @@ def illuminant_of(name: str) -> Reals:
     covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
     if not (covers and table[:, 1].min() >= 0.0 < table[:, 1].max()):
         raise DiffractionError(
-            f"'{name}' is no light: give a header, wl and a name, and rows of wavelengths from 300 "
-            "to 700 nm, increasing, and photons"
+            f"'{name}' is not a spectrum: give a header, wl and a name, and rows of wavelengths "
+            "from 300 to 700 nm, increasing, and photons"
         )
     return _of_mean_1(np.interp(GRID, table[:, 0], table[:, 1]))
 

@@ -4,16 +4,16 @@ Contents
 --------
 main                   the parser, and the boundary at which every error becomes one line
 precompute             from heights to a table
-info                   what is in a file
+info                   summary of a file
 tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
 orders                 efficiencies of solved orders as a CSV
 presets                the named looks of --preset
-plan                   what a plan says, and `render --plan`
+plan                   recipes of smaller tables, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 animation              options of `render --frames`, and reasons to render frames again
 studio                 light, material and camera of a mesh in a few words: `render --env`, …
-observed               `render --observer`: what the receptors of an animal catch
+observed               `render --observer`: quantum catches of an animal's receptors
 tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 spectrum               reflectance spectra as a spectrometer measures them

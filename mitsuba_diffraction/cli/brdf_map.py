@@ -37,7 +37,7 @@ _OF_THE_BSDF = (
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
-        subparsers, "brdf-map", run, "picture what a surface reflects in every direction",
+        subparsers, "brdf-map", run, "picture a surface's reflection in every direction",
         "Picture the BRDF over all view directions for one light direction, seen from above: "
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
@@ -57,7 +57,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     add_relative(group)
     options.add_heights(parser)
-    options.add_json(parser, "what was mapped")
+    options.add_json(parser, "settings and statistics of the map")
 
 
 def _add_map_options(group: argparse._ArgumentGroup) -> None:
@@ -76,7 +76,9 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
         help="light for the colours, daylight or equal energy; default: D65",
     )  # fmt: skip
     group.add_argument(
-        "--cosine", action="store_true", help="map f·cosθo, what a lit surface shows, instead of f"
+        "--cosine",
+        action="store_true",
+        help="map f·cosθo, the radiance of a lit surface, instead of f",
     )
     options.add_exposure(
         group, None,
@@ -134,7 +136,7 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
 
 
 def add_material(group: argparse._ArgumentGroup) -> None:
-    """Declare the options of what a surface consists of, by the plugin's names."""
+    """Declare the options of a surface's material and layers, by the plugin's names."""
     group.add_argument(
         "--material", metavar="MATERIAL",
         help=f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, gold or Au; or "

@@ -242,7 +242,7 @@ def ended_at_once() -> Iterator[None]:
 
 def say_interrupted() -> None:
     """Print the last line of an interrupted command."""
-    say("interrupted; nothing half-written was left behind")
+    say("interrupted; no half-written file was left behind")
 
 
 def _watch(reader: socket.socket, left: threading.Event) -> None:

@@ -33,7 +33,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_mode(parser)
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)
-    options.add_json(parser, "what was written")
+    options.add_json(parser, "the files and their settings")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`mitsuba-diffraction info`: what is in a file."""
+"""`mitsuba-diffraction info`: summary of a file."""
 
 from __future__ import annotations
 

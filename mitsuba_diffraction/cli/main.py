@@ -1,8 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
 A sub-command is two functions: one declares its parser by `options.add_command`, the other runs it
-and returns the exit code. The second imports what it needs (Mitsuba above all), so that `--help`
-and `--version` answer at once.
+and returns the exit code. The second imports its modules (Mitsuba above all) when called, so that
+`--help` and `--version` answer at once.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`mitsuba-diffraction plan`: recipes of only what a scene needs; and `render --plan`."""
+"""`mitsuba-diffraction plan`: recipes of smaller tables for a scene; and `render --plan`."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _planned(
 
 
 def recipe_file(text: str) -> Path:
-    """The recipe of a plan; what stands after a --plan without one may well be the scene."""
+    """Recipe of a plan. A scene after --plan without a recipe is refused with a hint."""
     if not text.lower().endswith(".toml"):
         raise argparse.ArgumentTypeError(
             f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"

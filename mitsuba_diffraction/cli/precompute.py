@@ -44,7 +44,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_table(group)
     options.add_wavelength_range(group)
     add_workers(parser)
-    options.add_json(parser, "what is in the table")
+    options.add_json(parser, "the table's summary")
 
 
 class _Job(NamedTuple):
@@ -197,5 +197,5 @@ def _report(
     yield "error", error
     if table.slope_ratios is not None:
         yield "", _second_order_line(table)
-    # of the whole process, which is what has to fit
+    # of the whole process, which has to fit
     yield "cost", f"{seconds:.1f} s, {peak_memory() / 1e9:.2g} GB of memory at most"

@@ -155,7 +155,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "--title", metavar="TEXT", help="title of the page; default: the scene's name"
     )
-    options.add_json(parser, "what the page shows")
+    options.add_json(parser, "contents of the page")
 
 
 def export_viewer(args: argparse.Namespace) -> int:
@@ -214,7 +214,7 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
     options.add_mode(parser)
     add_surface(parser.add_argument_group("the surface"), turned=False)
     options.add_heights(parser)
-    options.add_json(parser, "what was written")
+    options.add_json(parser, "the files and their settings")
 
 
 def export_shader(args: argparse.Namespace) -> int:

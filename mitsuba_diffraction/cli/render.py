@@ -71,7 +71,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     add_plan_options(parser)
     add_observer(parser)
-    options.add_json(parser, "what was rendered")
+    options.add_json(parser, "size, samples, time and files of the picture")
     add_animation(parser)
     add_studio(parser)
     add_workers(parser)

@@ -111,7 +111,7 @@ def _text(value: Any, joint: str = " x ") -> str:
 
 
 def check_writable(path: Path, *, make_folder: bool = False) -> None:
-    """Refuse an output that cannot be written; nothing is left behind.
+    """Refuse an output that cannot be written; no file is left behind.
 
     path : the output.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.

@@ -56,7 +56,7 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
         "--material", metavar="ID=FILE[,NAME=VALUE...]", type=definition, action="append",
         default=[], dest="materials",
         help="put a surface on the BSDF or shape of this id, e.g. mat-Skin=scale.exr,int_ior=1.56; "
-        "what the scene has there lies beneath it, unless `material` names a conductor; may be "
+        "the scene's BSDF there lies beneath it, unless `material` names a conductor; may be "
         "given several times",
     )  # fmt: skip
     add_mode(parser)

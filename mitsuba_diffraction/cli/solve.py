@@ -124,7 +124,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="processes here; default: 1",
     )  # fmt: skip
     add_workers(parser)
-    options.add_json(parser, "what is in the table")
+    options.add_json(parser, "the table's summary")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -164,7 +164,7 @@ def _check_import(args: argparse.Namespace) -> None:
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
-    """Return what to solve, from a recipe and the options that override it."""
+    """Return the problem of a recipe and of the options that override it."""
     from ..solve.orders import Settings
     from ..solve.recipes import SolvedRecipe, profile_of
 

@@ -24,7 +24,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "
         "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
         "a mesh without them gets some that carry only the direction. On a closed surface that "
-        "is no torus every field has singular points, around which the patch turns.",
+        "(a torus excepted) every field has singular points, around which the patch turns.",
     )  # fmt: skip
     parser.add_argument("mesh", metavar="MESH", type=Path, help="mesh to read")
     options.add_output(parser, "PLY to write", ".ply", required=True)
@@ -43,7 +43,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="distance within which the field may leave an axis or the body's direction to stay "
         "smooth, as a share of the mesh's size; default: 0.03",
     )  # fmt: skip
-    options.add_json(parser, "what the field is like")
+    options.add_json(parser, "quality of the field")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -89,10 +89,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _todo(along: str, report: TangentReport) -> str:
-    """Advise what to do about a field that breaks."""
+    """Return the remedy for a field that breaks."""
     others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
     todo = f"choose another guide, --along {others}"
-    if report.turns_fast:  # triangles are large beside what the field must turn
+    if report.turns_fast:  # triangles are too large for the field's rotation
         todo = f"use a finer mesh, or {todo}"
     return f"colours will show seams there; {todo}"
 

@@ -16,7 +16,7 @@ _CALL = re.compile(
 )
 _ARGUMENT = re.compile(r"(\w+)=(\([^()]*\)|[^,()]*)")
 _WORDS = {"the command '": "'mitsuba-diffraction ", "material:": "--material "}
-#: Parameters with which messages say what to do.
+#: Parameters that remedies in messages name.
 _REMEDIES = (
     "accept", "channel", "coherence_width", "crop", "fill", "height_unit", "level", "max_height",
     "method", "patch", "periodic", "pixel_size", "polarised", "windows",

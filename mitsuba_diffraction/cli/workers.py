@@ -87,7 +87,7 @@ def film_of(
 
 
 def say_report(film: Film) -> dict[str, Any]:
-    """Print what the workers did in a line, and return it as plain data."""
+    """Print the workers' statistics in a line, and return them as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} stored before" if report["kept"] else ""
     lost = f", {report['lost']} workers lost" if report["lost"] else ""

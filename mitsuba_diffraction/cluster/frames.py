@@ -1,4 +1,4 @@
-"""Frames of a scene from workers: what they have to render, and pictures of their sums."""
+"""Frames of a scene from workers: shares to render, and pictures of their sums."""
 
 from __future__ import annotations
 

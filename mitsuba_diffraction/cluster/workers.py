@@ -25,7 +25,7 @@ PATIENCE = 60.0
 COUNT_EVERY = 2.0
 GONE = (
     "the scheduler is gone; start it and its workers, and run the same command again, which goes "
-    "on from what is kept"
+    "on from the stored results"
 )
 
 

@@ -253,7 +253,7 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
         f"{points} of {heights.size} points clipped to {limit}, "
         f"the furthest by {moved.max():.3g} µm"
         if points
-        else f"nothing to clip: all points are within {limit}"
+        else f"no point is clipped: all are within {limit}"
     )
     return field.changed(heights, line + rms_change(field, heights))
 

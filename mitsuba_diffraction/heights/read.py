@@ -126,7 +126,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
 
 _READERS = {FileKind.IMAGE: read_image, FileKind.NPY: read_npy, FileKind.TEXT: read_text}
 
-# µm; what is a tilt for this wavelength is one for longer ones, nearly.
+# µm; a tilt at this wavelength is nearly one at longer wavelengths.
 _SHORTEST = 0.36
 _PIXELS = f"{SHORTEST_PIXEL:g} to {LONGEST_PIXEL:g} µm"
 

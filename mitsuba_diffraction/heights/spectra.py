@@ -235,7 +235,7 @@ class _Spectrum:
         )
 
     def fundamental(self, peak: _Peak) -> _Peak | None:
-        """Return the peak of which another is the second or third harmonic; None without one."""
+        """Return the fundamental of a peak that is its second or third harmonic, or None."""
         top = np.array([self.fx[peak.highest], self.fy[peak.highest]])
         along = (self.fx * top[0] + self.fy * top[1]) / (top @ top)
         bin_width = 1.0 / self.repeats[peak.highest]

@@ -75,7 +75,7 @@ class _Arrays:
 
     @staticmethod
     def is_complex(x: Number) -> bool:
-        return True  # roots of negative numbers then are what they are
+        return True  # roots of negative numbers are then well defined
 
     @staticmethod
     def reciprocal(x: Number) -> Number:

@@ -135,7 +135,7 @@ def material_named(value: str | float | complex, parameter: str = "material") ->
 
 
 def lets_light_through(value: str | float) -> bool:
-    """Return whether light that a material does not reflect goes on to what lies beneath."""
+    """Return whether light that a material does not reflect reaches a nested BSDF."""
     material = material_named(value)
     if isinstance(material, complex):
         return not material.imag

@@ -31,7 +31,7 @@ class Function:
     name : in the program.
     text : its definition.
     kinds : of the results.
-    record : makes what the formula returns of several results; None of a single one.
+    record : builds the formula's return value from several results; None for a single result.
     """
 
     name: str

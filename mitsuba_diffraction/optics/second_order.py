@@ -237,7 +237,7 @@ def factor(coefficients: ArrayLike, ratios: ArrayLike, small_slope_weight: Array
 
 @formula
 def added_power(c: Parts, r: Parts, weight: Number) -> Number:
-    """Return |1 + weight (c_l r_l + c_t r_t)|² − 1, where what is added is at most `LIMIT`.
+    """Return |1 + weight (c_l r_l + c_t r_t)|² − 1, with the added term limited to `LIMIT`.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ def kind_of(value: Any) -> str:
     if is_vector(value):
         return "vector"
     if not isinstance(value, int | float):
-        refuse(f"{value!r} is no number")
+        refuse(f"{value!r} is not a number")
     return "float"
 
 

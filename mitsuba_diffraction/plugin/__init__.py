@@ -6,7 +6,7 @@ diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/p
 transmission    the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, a table with factors, orientation and power
-description     what a surface is: the record that shaders, OSL, maps and plans read
+description     record of a surface that shaders, OSL, maps and plans read
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
 lifecycle       `PluginBSDF`, the base of all: answers, parameters and their changes, text
 nesting         `NestingBSDF`, a BSDF over a nested one
@@ -23,7 +23,7 @@ properties      words, flags and numbers from them, refused by name; what elemen
 materials       material, coat and film
 pigment         pigment beneath a structure, of a colour or a measured spectrum
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
-sources         from what a scene names to a table, built once
+sources         table of a scene's heights, recipe or file, built once
 factors         factors on heights and on lengths in the plane: numbers, textures, attributes
 textures        orientation that varies; whether a mesh has what its BSDF reads
 types           names of the types of arguments
@@ -38,10 +38,10 @@ window_positions  where on the patch the window sits at a point of the surface
 energy_factors  factors on heights and lengths for which scales of energy are tabulated
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
-boundary        what the material makes of the light, with its polarisation
+boundary        reflected amplitude of the material, with its polarisation
 second_order    what light diffracted twice makes of orders
 conductors      optical constants of conductors in Mitsuba's tables
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
-layers          a clear coat, a thin film, and how much light reaches what lies beneath
+layers          a clear coat, a thin film, and the light that reaches a nested BSDF
 memory          arrays in the variant's memory, and reading them
 """

@@ -269,7 +269,7 @@ def _weights(
     Raises
     ------
     DiffractionError
-        For names that do not fit, and for weights that are none.
+        For names that do not fit, and for invalid weights.
     """
     if len(names) < 2:
         raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")

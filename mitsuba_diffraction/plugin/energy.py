@@ -1,7 +1,7 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
-it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
+The reflected power is multiplied by s(ωi) s(ωo), reciprocal, where the model's albedo exceeds 1.
+T = 1 − a(ω) of a dielectric's own albedo a reaches a nested BSDF.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ THICKNESS_STEP = 1.0
 SLOPE_STEP = 2.0**-9
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
-#: What is taken beyond this share of a real material is warned of.
+#: Removed share of the albedo above which real materials cause a warning.
 WARNED_EXCESS = 0.05
 
 

@@ -49,7 +49,7 @@ class VaryingFactor:
 
     Attributes
     ----------
-    high : the largest factor; what is larger is taken for it.
+    high : the largest factor; larger ones are clamped to it.
     """
 
     def __init__(self, texture: Texture, largest: float | None, limits: FactorLimits) -> None:
@@ -57,7 +57,7 @@ class VaryingFactor:
         name = limits.name
         if not is_bitmap(texture) and largest is None:
             raise DiffractionError(
-                f"{name} of a texture that is no bitmap, or of a mesh attribute, needs "
+                f"{name} of a texture other than a bitmap, or of a mesh attribute, needs "
                 f"{name}_max, the largest factor that it has"
             )
         require_raw(texture, name, "factors")
@@ -218,6 +218,6 @@ def largest_of(factor: float | VaryingFactor) -> float:
 
 def _lateral_refusal(most: float, factor: float) -> str:
     return (
-        f"lateral_scale={factor:g} is outside what the table serves, {LATERAL.least:g} to "
+        f"lateral_scale={factor:g} is outside the table's range, {LATERAL.least:g} to "
         f"{most:g}; load the plugin anew with that lateral_scale_max"
     )

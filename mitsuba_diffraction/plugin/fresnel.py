@@ -138,7 +138,7 @@ class Conductor:
         self.name, self.changeable = name, (eta, k)
         #: Whether light that is not reflected is absorbed, and none goes beneath.
         self.absorbs = True
-        self.medium: Dielectric | None = None  #: what lies above, if not air
+        self.medium: Dielectric | None = None  #: medium above, if not air
         #: Index of the medium above over that of `medium`, which is one number; None if it is 1.
         self.dispersion: Texture | None = None
         self.above = ""  #: name of the medium whose dispersion it is

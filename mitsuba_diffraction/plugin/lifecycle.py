@@ -96,7 +96,7 @@ class PluginBSDF(mi.BSDF):
             parameter.traverse(callback)
 
     def parameters_changed(self, keys: list[str]) -> None:
-        """Take all changes, or none of them.
+        """Accept all changes, or reject all.
 
         Raises
         ------

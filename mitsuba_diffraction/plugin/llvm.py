@@ -20,12 +20,12 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 
-#: Environment variable through which Dr.Jit is told what to load.
+#: Environment variable that names the LLVM library for Dr.Jit.
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 #: The first whose x86 backend compiles Dr.Jit's minimum and maximum (tried: not 14, 15 or 16).
 OLDEST = 17
-#: What the tests run on, and so the first choice; they run kernels on every other that there is.
+#: Version that the tests run on, hence the first choice; kernels are tested on all other versions.
 TESTED = 19
 
 # libLLVM-19.so.1, libLLVM.so.19.1, libLLVM-14.0.6.so.1, libLLVM.dylib; not libLLVM-C.dylib,
@@ -157,7 +157,7 @@ def require_llvm() -> None:
     Raises
     ------
     DiffractionError
-        If it cannot: what there is, what would do, and how to get it.
+        If it cannot, with the versions found, the versions supported, and how to install one.
     """
     named = named_library()
     if "drjit" in sys.modules:

@@ -20,7 +20,7 @@ def sum_of(
     ----------
     add : function of the number of a term, the inputs and the total, which returns the total with
         that term added. All that derivatives are wanted for must come by `inputs`: Dr.Jit drops
-        derivatives of what a loop's body takes from elsewhere, without a word.
+        derivatives of captured variables in a loop's body, without a warning.
     """
     state = mi.UInt32(0), inputs, total
     # -1: Dr.Jit's reverse mode of sums, which stores nothing

@@ -33,7 +33,7 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
             f"{conductor[0]} makes a conductor and {dielectric[0]} a dielectric; give one of them"
         )
     if "material" in conductor and len(conductor) > 1:
-        raise DiffractionError("material and eta, k both say what the conductor is; give one")
+        raise DiffractionError("material and eta, k both define the conductor; give one")
     if "material" in conductor:
         return _named(props, coat)
     if conductor:
@@ -79,7 +79,7 @@ def _dielectric(props: Properties, index: float | str, coat: Dielectric | None) 
 
 
 def _medium(props: Properties, coat: Dielectric | None) -> Dielectric | None:
-    """Return what an index over wavelength is relative to: the coat, a medium, or None in air."""
+    """Return the medium that an index is relative to: the coat, a medium, or None in air."""
     if "ext_ior" not in props:
         return coat
     if coat is not None:

@@ -83,6 +83,6 @@ def packet_size(floats: int) -> int:
 def index_between(value: Float, low: float, high: float) -> Float:
     """The value clipped to an index's range; NaN, as from a degenerate mesh, becomes `low`.
 
-    `dr.clip` would keep the NaN, and what an integer makes of it reads far outside the table.
+    `dr.clip` would keep the NaN, whose integer would read far outside the table.
     """
     return dr.fmin(dr.fmax(value, low), high)

@@ -146,7 +146,7 @@ class Changing(Protocol):
 
 
 def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
-    """Take all changes of a BSDF's parameters, or none of them.
+    """Accept all changes of a BSDF's parameters, or reject all.
 
     Parameters
     ----------

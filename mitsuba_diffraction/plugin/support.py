@@ -46,7 +46,7 @@ DISPERSIVE = Support("a material whose index varies with the wavelength", second
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
 COAT = Support("coat_ior", film=False, thesis=False)
 FILM = Support("a thin film (film_ior)", second_order=False, coat=False, thesis=False)
-ABSORBING = Support("film_k, which absorbs the light for what lies beneath", nested=False)
+ABSORBING = Support("film_k, which absorbs the light for a nested BSDF", nested=False)
 THESIS = Support("layering='thesis'", second_order=False)
 PATCH = Support("coherence='patch'", second_order=False)
 PLACED = Support("coherence='surface'", second_order=False)
@@ -67,7 +67,7 @@ def check_combination(asked: Mapping[str, str], choices: Sequence[Support]) -> N
 
     Parameters
     ----------
-    asked : what the scene asks for, as messages call it, by the name of the feature.
+    asked : choices of the scene in the words of messages, by the name of the feature.
     choices : declarations of all choices of the scene.
 
     Raises

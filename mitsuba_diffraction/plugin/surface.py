@@ -162,7 +162,7 @@ class DiffractingSurface(NestingBSDF):
         return ScaleRange((lowest, largest), stretch, varies, differentiable)
 
     def freeze(self, holders: Iterable[Any], *constants: object) -> None:
-        """See `PluginBSDF.freeze`; adds what all surfaces have."""
+        """See `PluginBSDF.freeze`; adds the fields of all surfaces."""
         factors = self._varying, self.lateral_scale
         textures = str(self._varying), str(self.lateral_scale.varying)
         placed = str(self.window_positions)
@@ -242,6 +242,6 @@ def _described(material: Any) -> Material:
 
 def _scale_refusal(most: float, height_scale: float) -> str:
     return (
-        f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
+        f"height_scale={height_scale:g} is outside the table's range, above 0 and up to "
         f"{most:g}; load the plugin anew with that height_scale"
     )

@@ -72,7 +72,7 @@ def btdf(
     ]
     lobe = 4 * np.pi**2 * sigma**2 * sigma_0**2
     lobe = lobe * np.exp(-(sigma_0**2) * np.sum(frequency**2, axis=1))
-    # order 0 has what the flat surface transmits; speckle may be darker than it is on average
+    # order 0 has the flat surface's transmittance; speckle may be darker than its mean
     zeroth = np.minimum(np.abs([screen.mean() for screen in screens]) ** 2 * lobe, power)
     cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
     orders = cosines * boundary.unpolarised(jones) * (power - zeroth)

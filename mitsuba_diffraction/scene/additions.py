@@ -77,7 +77,7 @@ def fit_meshes(state: Any, folder: Path) -> None:
     state : `mi.parser.ParserState`.
     folder : where the files are written.
 
-    Raises a DiffractionError if a file is no mesh, or cannot be put on the stage.
+    Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
@@ -256,7 +256,7 @@ def _put_on_bsdf(state: Any, number: int, text: str) -> None:
     """Replace a BSDF by the surface over it; both sides, unless it is part of another BSDF."""
     props = state.nodes[number].props
     name, inside = props.id(), _inside(state, number)
-    if inside == number:  # the node is replaced, so what lies beneath needs one of its own
+    if inside == number:  # the node is replaced, so the nested BSDF needs its own
         inside = _append(state, _copy(props, props.plugin_name()))
     surface = _surface(state, text, inside)
     nested = any(

@@ -297,13 +297,13 @@ def _words(error: BaseException) -> str:
 
 
 def _no_ply(match: re.Match[str]) -> str:
-    """Say what to do about a mesh of another format where a PLY is expected."""
+    """Return the remedy for a mesh of another format where a PLY is expected."""
     file = PurePath(match["file"])
     todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
     if not match["why"].startswith("invalid PLY"):
         return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
-        return f"'{file}' is no undamaged PLY: {match['why']}; export the mesh again"
+        return f"'{file}' is a damaged PLY: {match['why']}; export the mesh again"
     if file.suffix.lower() not in (".obj", ".serialized"):
         todo = "convert it to PLY or OBJ"
     return f"'{file}' is not a PLY mesh, which the scene expects: {todo}"
@@ -315,7 +315,7 @@ def _unused(match: re.Match[str]) -> str:
     if not names:
         return match[0]
     return (
-        f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
+        f"no object of the scene uses {', '.join('$' + name for name in names)}, although it "
         f"declares it: write ${names[0]} where its value is to go, or leave "
         f"{', '.join(names)} out"
     )

@@ -32,7 +32,7 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
     """
     known = parameters_of(scene, values)
     if known is None:
-        return  # Mitsuba says what is wrong with the file
+        return  # Mitsuba's own error describes the file
     for name in values:
         if name in known:
             continue

@@ -20,7 +20,7 @@ _SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y
 def read_exr(path: Path) -> Any:
     """Read the colours of an EXR as `colours_of` returns them.
 
-    Raises a DiffractionError if the file is no EXR, or holds no colours that a screen can show.
+    Raises a DiffractionError if the file is not an EXR, or lacks colours that a screen can show.
     """
     import mitsuba as mi
 
@@ -108,5 +108,5 @@ def _write(bitmap: Any, path: Path) -> None:
         except RuntimeError as error:  # Mitsuba's exception for a full disk
             reason = one_line(str(error)).rpartition(": ")[2]
             raise DiffractionError(
-                f"cannot write '{path}': {reason}; nothing was left behind"
+                f"cannot write '{path}': {reason}; no file was left behind"
             ) from error

@@ -33,7 +33,9 @@ def films_of(
     )
     for number, film in enumerate(films, 1):
         if film.material.values is None:
-            raise DiffractionError(f"layer {number}: a perfect conductor is no film; give an index")
+            raise DiffractionError(
+                f"layer {number}: a film needs an index; a perfect conductor has none"
+            )
     if films and (thin or substance.values is None):
         raise DiffractionError(
             "layers: films lie on a material with an index, and not on thin sheets or perfect "

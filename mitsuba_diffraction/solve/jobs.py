@@ -274,7 +274,7 @@ def processes(count: int) -> Iterator[Executor]:
     except BrokenExecutor as error:
         raise DiffractionError(
             "a process that solves was killed, maybe for lack of memory; use fewer of them, and "
-            "run the same command again, which goes on from what is kept"
+            "run the same command again, which resumes from the stored results"
         ) from error
     except BaseException:
         # Ctrl-C does not wait for stations in progress

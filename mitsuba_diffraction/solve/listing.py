@@ -40,7 +40,7 @@ class Listing(NamedTuple):
         Raises
         ------
         DiffractionError
-            If the file cannot be written; nothing half-written is left.
+            If the file cannot be written; no half-written file is left.
         """
         shares = ["%.7g"] * (len(self.columns) - 4)
         with atomic_path(Path(path)) as temporary:

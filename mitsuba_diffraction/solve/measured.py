@@ -70,8 +70,8 @@ def read_orders(
     Directions that the file lacks, all but one perhaps, get the efficiencies of the nearest
     direction in it, order by order. A warning says either.
 
-    With T_s and T_p the table describes a thin sheet. What it transmits from below follows from
-    reciprocity; it reflects light from below as light from above, at most what is left.
+    With T_s and T_p the table describes a thin sheet. Its transmission from below follows from
+    reciprocity; it reflects light from below as light from above, at most the remaining power.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Precomputed series of diffraction orders: what the renderer looks up (NumPy only).
+"""Precomputed series of diffraction orders, which the renderer looks up (NumPy only).
 
 Contents
 --------

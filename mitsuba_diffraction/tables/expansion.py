@@ -10,7 +10,7 @@ next to it the colours may be a thousandth.
 
 **Chebyshev.** [0, κ_max] is cut into equal intervals, each with its own short Chebyshev series
 (after Boyd 2001, ch. 2): a look-up reads the terms of one interval only, so that its cost does not
-grow with the depth of the surface. In the first interval what is expanded is (|a_j|² − δ_j0)/κ̂²
+grow with the depth of the surface. The first interval expands (|a_j|² − δ_j0)/κ̂²
 (or (a_j − δ_j0)/κ̂, with κ̂ = κ over the interval's length): both are smooth, and the light that
 leaves the specular direction keeps its relative accuracy down to κ → 0, where it fades as κ².
 
@@ -214,7 +214,7 @@ def _sizes(values: NDArray[np.floating], power: bool) -> NDArray[np.float64]:
 def _covariance(scaled: NDArray[np.float64], power: bool) -> NDArray[np.float64]:
     """Σ over bins (nodes, bins) of products of their values at two nodes."""
     if power:
-        # What is measured is the sum of errors, not of their squares: this makes up for it as far
+        # The measure is the sum of errors, not of their squares: this corrects for it as far
         # as errors are in proportion to powers
         scaled = scaled / np.sqrt(np.sqrt(np.einsum("nb,nb->b", scaled, scaled)) + 1e-12)
     product: NDArray[np.float64] = scaled @ scaled.T

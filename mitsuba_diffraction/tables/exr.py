@@ -43,7 +43,7 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     DiffractionError
-        If it cannot be written; nothing half-written is left.
+        If it cannot be written; no half-written file is left.
     """
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")

@@ -117,7 +117,7 @@ def weighted_sum(
 
     Parameters
     ----------
-    qx, qy, kappa : (n,), rad/µm, within what the table covers.
+    qx, qy, kappa : (n,), rad/µm, within the table's range.
     kernels : weight of a bin by its distance in bins, along x and y.
     taps : bins to read along x and y; at most as many as the table was built for.
     place : (x, y) of the window's centre in µm, each (n,), of a table of `patch`.
@@ -136,7 +136,7 @@ def weighted_sum(
     row, distance_y = taps_at(y, grid.last[1], taps[1])
     weight_x: NDArray[Any] = kernels[0](distance_x)
     weight_y: NDArray[Any] = kernels[1](distance_y)
-    if place:  # what the table's phases, of a window on the patch's centre, are turned by
+    if place:  # rotates the table's phases, which belong to a window on the patch's centre
         weight_x = weight_x * _phases(column, taps[0], grid.last[0], place[0], table.spacing[0])
         weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])
 

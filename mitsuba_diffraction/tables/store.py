@@ -296,7 +296,7 @@ def loaded_once(
     try:
         status = os.stat(path)
     except OSError:
-        return load(path)  # which says what is wrong
+        return load(path)  # whose error names the damage
     key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
     value = in_use.get(key)
     return in_use.setdefault(key, load(path)) if value is None else value

@@ -22,7 +22,7 @@ from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid
 
-#: Raised whenever what the coefficients mean changes; tables of another version are refused.
+#: Raised whenever the meaning of the coefficients changes; tables of another version are refused.
 FORMAT_VERSION = 5
 
 
@@ -39,7 +39,7 @@ class DiffractionTable:
         is in the middle of (ny, nx), and zero.
     order_0 : (intervals, components, expansion.series_terms) float64, the series of that bin; not
         scaled.
-    scale : what the coefficients were multiplied with, to suit half floats.
+    scale : factor on the coefficients that suits half floats.
     expansion : which series in κ.
     grid : bins, window and taps.
     spacing : (dqx, dqy), rad/µm between bins.
@@ -47,7 +47,7 @@ class DiffractionTable:
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.
-    slope_ratios : what the second order needs of the heights, where `settings` ask for it.
+    slope_ratios : slope statistics for the second order, where `settings` ask for it.
     """
 
     coefficients: NDArray[np.floating]
@@ -62,7 +62,7 @@ class DiffractionTable:
     source: Mapping[str, Any] = field(default_factory=dict)
     slope_ratios: SlopeRatios | None = None
 
-    # Set by the package `tables`, since what they do builds on this class
+    # Assigned in the package `tables`, to avoid a circular import
     build: ClassVar[Callable[..., DiffractionTable]]  #: from heights: `build.build.build_table`
     load: ClassVar[Callable[..., DiffractionTable]]  #: from a file: `exr.load_table`
     save: ClassVar[Callable[..., None]]  #: to a file: `exr.save_table`

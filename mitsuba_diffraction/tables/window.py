@@ -2,7 +2,7 @@
 
 Around every order j the table's sum has a Gaussian of the distance Δ in bins: exp(−s²Δ²) when
 powers are added, exp(−s²Δ²/2) when amplitudes are, with s = σ·dq. A look-up reads the `taps` bins
-nearest to the asked frequency in each direction; what the taps leave out is an error to budget.
+nearest to the requested frequency in each direction; the omitted taps are an error to budget.
 """
 
 from __future__ import annotations

@@ -164,11 +164,11 @@ def test_templates_peak_at_their_wavelength():
     ("content", "named"),
     [
         ("", "is empty"),
-        ("wl,a,b\n300,1\n", "is no eye"),
+        ("wl,a,b\n300,1\n", "is not a table of receptors"),
         ("wl,a,b\n500,1,1\n600,1,1\n", "400"),
         ("wl,a,b\n300,1,-1\n700,1,1\n", "0 or more"),
         ("wl,a\n300,1\n700,1\n", "two receptors"),
-        ("wl,a,b\n300,1,nan\n700,1,1\n", "is no eye"),
+        ("wl,a,b\n300,1,nan\n700,1,1\n", "is not a table of receptors"),
         ("wl,a,b\n300,1,0\n700,1,0\n", "receptor b is 0"),
         ("wl,l,l\n300,1,1\n700,1,1\n", "'l' cannot name a receptor"),
         ("wl,a,\n300,1,1\n700,1,1\n", "cannot name a receptor"),
@@ -232,7 +232,7 @@ def test_shade_under_leaves_is_green_and_has_little_ultraviolet():
 def test_files_that_are_no_lights_are_one_line(tmp_path, content):
     file = tmp_path / "light.csv"
     file.write_text(content)
-    with pytest.raises(DiffractionError, match="is no light"):
+    with pytest.raises(DiffractionError, match="is not a spectrum"):
         illuminant_of(str(file))
     assert illuminant_of("D65") == pytest.approx(illuminant_of("d65"))
     with pytest.raises(DiffractionError, match="choose one of ideal, d55"):

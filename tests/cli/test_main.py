@@ -131,7 +131,7 @@ def test_ctrl_c_exits_with_130(run, command):
     ran = run(*command(raising(KeyboardInterrupt())))
     assert ran.code == 130
     assert ran.err.splitlines() == [
-        "mitsuba-diffraction: interrupted; nothing half-written was left behind"
+        "mitsuba-diffraction: interrupted; no half-written file was left behind"
     ]
 
 

@@ -295,7 +295,7 @@ def test_ctrl_c_leaves_the_folder_as_it_was(child, heights, tmp_path, interrupte
         (tmp_path / "out.exr").write_bytes(b"an older table")
     ran = child(["precompute", heights, *QUICK, "-o", "out.exr"], interrupted)
     assert ran.code == 130
-    assert ran.err == "mitsuba-diffraction: interrupted; nothing half-written was left behind\n"
+    assert ran.err == "mitsuba-diffraction: interrupted; no half-written file was left behind\n"
     assert sorted(os.listdir(tmp_path)) == ["in", *(["out.exr"] if before else [])]
     if before:
         assert (tmp_path / "out.exr").read_bytes() == b"an older table"

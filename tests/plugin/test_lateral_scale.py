@@ -170,7 +170,7 @@ def test_numbers_change_up_to_the_largest_loaded(mono):
     # two tables, of the same tolerance
     assert values == pytest.approx(expected, rel=0.05, abs=2e-3 * float(expected.max()))
     parameters["lateral_scale"] = 1.4
-    with pytest.raises(DiffractionError, match=r"outside what the table serves, 0\.01 to 1\.3"):
+    with pytest.raises(DiffractionError, match=r"outside the table.s range, 0\.01 to 1\.3"):
         parameters.update()
 
 

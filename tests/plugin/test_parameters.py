@@ -241,7 +241,7 @@ REFUSED = [
     ({"material": "Alu"}, "did you mean Al or Au?"),
     ({"material": "au"}, "did you mean Au"),
     ({"material": "Al", "int_ior": 1.5}, "material makes a conductor and int_ior a dielectric"),
-    ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both say what the conductor"),
+    ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both define the conductor"),
     ({"eta": 1.0}, "eta alone is not a conductor; give both eta and k"),
     ({"k": 1.0}, "k alone is not a conductor; give both eta and k"),
     ({"max_height": 0.3}, "max_height is for files; the heights in data"),

@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say_error(str(error))
         return 1
     except KeyboardInterrupt:
-        say_error("interrupted; nothing half-written was left behind")
+        say_error("interrupted; no half-written file was left behind")
         return 130
 
 

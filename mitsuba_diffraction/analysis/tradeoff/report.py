@@ -151,7 +151,7 @@ def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
     front = _front(drawn)
     axes.step(
         [r.relative for r in front], [r.error for r in front], where="post", color="0.5",
-        lw=1.0, label="nothing faster is as exact",
+        lw=1.0, label="no faster setting is as exact",
     )  # fmt: skip
     default = drawn[0]
     axes.annotate(

@@ -151,7 +151,7 @@ class OrderLookup:
     def port(
         row: Row, order: Float, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
-        """Return the port of an order, 0 or that below if it does not propagate, and whether."""
+        """Return an order's port and its validity; evanescent orders have port 0 or a lower one."""
         q = mi.Float(row.channel) - order
         propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
         q = mi.UInt32(dr.select(propagates, q, 0.0))

@@ -32,7 +32,7 @@ _KINDS = {
 def headless_context() -> Any:
     """Create a moderngl context without a window, on a graphics card or Mesa's software rasteriser.
 
-    Linux needs EGL for it; macOS and Windows bring what is needed.
+    Linux needs EGL; macOS and Windows bring their own context.
 
     Raises a DiffractionError if moderngl, EGL or a driver is missing, or the driver is older than
     OpenGL 3.3.

@@ -52,7 +52,7 @@ class Packed:
 
     @property
     def nbytes(self) -> int:
-        """Size of all textures."""
+        """Size of all textures in bytes."""
         return sum(texture.nbytes for texture in self.textures)
 
     def __or__(self, other: Packed) -> Packed:

@@ -177,6 +177,6 @@ def tangential(vectors: Floats, normals: Floats) -> Floats:
 
 
 def unit(vectors: Floats) -> Floats:
-    """Vectors (…, 3) of length 1; zero stays zero."""
+    """Normalise vectors (…, 3); zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)

@@ -26,7 +26,7 @@ class Lookups:
     wavelength: NDArray[np.float64]  # (n,) nm
     # (n, 3) light of the picture that each look-up adds, the whole picture's being 1
     xyz: NDArray[np.float64]
-    total: float  # light of all paths that meet the surfaces, what lies beneath included
+    total: float  # light of all paths that meet the surfaces, nested BSDFs included
 
     @property
     def light(self) -> NDArray[np.float64]:

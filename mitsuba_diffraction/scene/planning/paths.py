@@ -70,7 +70,7 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
     reaching = [np.zeros_like(wavelengths)]  # light at a vertex from all vertices after it
     for vertex, light in zip(vertices[::-1], emitted[::-1], strict=True):
         reaching.append(reaching[-1] + light + vertex.direct)
-    # emitted[d] is what the ray to vertex d finds there, so it counts before that vertex
+    # emitted[d] is the emission at vertex d, so it counts before that vertex
     whole = (reaching[-1] * colours.sum(axis=2)).sum(axis=1)
     lit = whole > 0.0
     if not lit.any():

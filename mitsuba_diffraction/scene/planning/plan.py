@@ -156,7 +156,7 @@ def _rounded(frequency: float) -> float:
 
 
 def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
-    """The recipe of a limited table, and a comment that says what it is for.
+    """The recipe of a limited table, with a comment on its purpose.
 
     Raises a DiffractionError if the heights come from no file.
     """

@@ -44,7 +44,7 @@ class Recorded:
     """Look-ups of one BSDF in one call; lanes without light are left out."""
 
     bsdf: int  # index among the session's BSDFs
-    lane: NDArray[np.int64]  # (n,) what the caller put into `si.time`
+    lane: NDArray[np.int64]  # (n,) value of `si.time` from the caller
     # u, v: (n,) tangential part of ωi + ωo in the patch's frame
     u: NDArray[np.float32]
     v: NDArray[np.float32]

@@ -11,5 +11,5 @@ spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can 
 coefficients  of the series, from transforms of the heights; as half floats
 error         the one error measure of the project
 slope_ratios  what tells hills from pits, for the second order
-describe      what a table remembers of its heights
+describe      statistics of the heights that a table stores
 """

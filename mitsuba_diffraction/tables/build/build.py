@@ -136,9 +136,9 @@ class _Ticks:
         self._tell(self.done, self.total, text)
 
 
-#: What series may use up of what the taps leave of the tolerance.
+#: Share of the tolerance that the taps leave which the series may use.
 SERIES_SHARE = 0.8
-#: What the taps may use up, if leaving out corners then still meets the tolerance.
+#: Share of the tolerance that the taps may use if trimmed corners still meet the tolerance.
 TRIMMED_SHARE = 0.8
 #: Half floats (rounding 2⁻¹², a few of them added) are tried from this tolerance on.
 HALF_FROM = 7e-4

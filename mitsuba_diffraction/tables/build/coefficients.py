@@ -17,7 +17,7 @@ from .error import alternate
 from .powers import Spectra
 from .spectrum import GLOSSY_RADIUS, Spectrum
 
-#: Fills an array (nodes, …) with what is expanded, of all bins at the nodes of an interval, one
+#: Fills an array (nodes, …) with the expanded values of all bins at the nodes of an interval, one
 #: after the other; gives order 0's.
 ValuesAt = Callable[[int, NDArray[np.float32]], Iterable[Sequence[float]]]
 

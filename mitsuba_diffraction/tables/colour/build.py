@@ -100,7 +100,7 @@ class PolarGrid:
                 first = ring
 
 
-#: Wavelengths that the eye sees (nm): what is cut off is 1e-4 of the white.
+#: Wavelengths that the eye sees (nm): the cut-off tails hold 1e-4 of the white.
 VISIBLE = (376.0, 744.0)
 
 _FINE = 0.0004  # of ln λ, for the integrals of s̄

@@ -184,7 +184,7 @@ class Surface:
         aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
         c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
         c = np.where(zeroth > MIN_ORDER_0, c, np.float32(1.0))
-        # what lies within one row, as a lobe at the critical angle, is left to itself
+        # a lobe within one row, as at the critical angle, is not adjusted
         return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
     def _lowered(self, light: ScatteredLight, c: Array, s: Array) -> tuple[Array, Array]:

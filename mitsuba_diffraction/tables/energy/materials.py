@@ -47,7 +47,7 @@ class Reflector:
         return [[Path(indices[n], self.model, side, side)] for n in range(len(wavelengths))]
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
-        """Return what tells this material from another over a range of wavelengths (nm)."""
+        """Return the material's part of the cache key over a range of wavelengths (nm)."""
         index = rounded(self.index(np.geomspace(*wavelength_range, PROBES)))
         return [self.model, index, self.coat]
 

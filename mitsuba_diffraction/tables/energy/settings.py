@@ -29,10 +29,10 @@ class EnergySettings:
     scale_fringe_step : likewise from one wavelength of a scale to the next.
     sweeps : of Sinkhorn and Knopp's iteration.
     threshold : an albedo that is nowhere above needs no scale.
-    target : albedos above are scaled to this; what is left to 1 is for what lies between nodes.
+    target : albedos above are scaled to this; the margin to 1 is for directions between nodes.
     ceiling : most that is left between nodes.
     largest : of a scale; of all light at most 1 from 80° on, since part of a lobe is below the
-        horizon there, and what is above reaches across directions of very different scales.
+        horizon there, and the rest reaches across directions of very different scales.
     close : R + T that differs from 1 by less needs no scale.
     tolerated : R + T between nodes above this is attenuated.
     passes : how often scales are lowered where an albedo between nodes is above the ceiling.

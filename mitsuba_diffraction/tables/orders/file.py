@@ -29,7 +29,7 @@ from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
-#: Raised whenever what the numbers mean changes; files of another version are refused.
+#: Raised whenever the meaning of the numbers changes; files of another version are refused.
 FORMAT_VERSION = 1
 SUFFIX = ".nc"
 #: Step of the packed efficiencies: 16 bits reach 1.092.
@@ -45,7 +45,7 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     DiffractionError
-        If it cannot be written; nothing half-written is left.
+        If it cannot be written; no half-written file is left.
     """
     if Path(path).suffix.lower() != SUFFIX:
         raise DiffractionError(

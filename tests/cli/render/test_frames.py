@@ -244,7 +244,7 @@ def test_what_the_scene_does_not_use_is_said_and_leaves_no_folder(render, scene,
     scene.write_text(SCENE.replace('"word"/>', '"word"/><default name="idle" value="3"/>'))
     more = ("--turn", "idle") if option == "--turn" else ("-D", "idle=1", *LIGHT)
     line = render("--frames", "2", *more, "-o", "deep/out").failed_in_one_line()
-    assert "nothing in the scene uses $idle, although it declares it: write $idle where" in line
+    assert "no object of the scene uses $idle, although it declares it: write $idle where" in line
     assert os.listdir() == ["room.xml"]
 
 
