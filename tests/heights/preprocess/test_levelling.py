@@ -64,7 +64,7 @@ def test_nothing_to_clip_changes_nothing_and_says_so():
     for heights in (np.zeros((4, 4)), ROUGH):
         same = clip_outliers(HeightField(heights, 0.1), 8)
         assert np.array_equal(same.heights, heights)
-        assert same.history[0].startswith("no point is clipped: all points are within 8 robust")
+        assert same.history[0].startswith("no point is clipped: all are within 8 robust")
 
 
 @pytest.mark.parametrize("sigmas", [0, -1, 0.5, float("nan"), float("inf")])
