@@ -28,10 +28,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.
 
-    Raises
-    ------
-    DiffractionError
-        If the folder is missing or cannot be written, if `path` is a folder, or the disk is full.
+    Raises a DiffractionError if the folder is missing or cannot be written, if `path` is a folder,
+    or the disk is full.
     """
     target = Path(path)
     if target.is_dir():

@@ -40,10 +40,7 @@ def optional(module: str, subject: str = "") -> Any:
 
     subject : file or option at which the need arose, for the message.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot be imported; the message names the extra.
+    Raises a DiffractionError if it cannot be imported; the message names the extra.
     """
     need = _NEEDS[module.partition(".")[0]]
     try:

@@ -97,11 +97,8 @@ def _tiff_tags(file: Path) -> list[int]:
 def readable_file(path: str | os.PathLike[str]) -> Path:
     """Return the path of a regular file that can be read and has content.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing, a folder, a pipe or a device, unreadable or empty, or if its name
-        is not UTF-8.
+    Raises a DiffractionError if the file is missing, a folder, a pipe or a device, unreadable or
+    empty, or if its name is not UTF-8.
     """
     _beginning(path, 1)
     return Path(path)
@@ -134,10 +131,7 @@ def _beginning(path: str | os.PathLike[str], count: int) -> bytes:
 def path_within(file: Path, name: str) -> Path:
     """Return the path of an output that a file names, relative to the file's folder.
 
-    Raises
-    ------
-    DiffractionError
-        If it leads out of the folder: absolute, by "..", or by a link.
+    Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
     """
     path = file.parent / name
     if not path.resolve().is_relative_to(file.parent.resolve()):
@@ -150,10 +144,7 @@ def path_within(file: Path, name: str) -> Path:
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """Return the content of a file.
 
-    Raises
-    ------
-    DiffractionError
-        As `readable_file`.
+    Raises a DiffractionError as `readable_file` does.
     """
     file = readable_file(path)
     try:
@@ -165,10 +156,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
     """Return the content of a text file in UTF-8 of at most `largest` bytes.
 
-    Raises
-    ------
-    DiffractionError
-        As `readable_file`, or if the file is larger, or not text.
+    Raises a DiffractionError as `readable_file` does, or if the file is larger, or not text.
     """
     file = readable_file(path)
     size = file.stat().st_size

@@ -134,6 +134,8 @@ class TableSettings:
 
     The constructor checks values and converts their types; it accepts numbers as text.
 
+    Raises a DiffractionError with the setting, its value and the allowed values.
+
     Attributes
     ----------
     coherence_width : µm over which the light is coherent, 4σ₀ of order 0's amplitude window; "auto"
@@ -154,11 +156,6 @@ class TableSettings:
         table holds the slope ratios. "auto" is False for coherence "patch" and basis "taylor".
     window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
         (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
-
-    Raises
-    ------
-    DiffractionError
-        With the setting, its value and the allowed values.
     """
 
     coherence_width: str | float = _setting(
@@ -251,10 +248,7 @@ RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range", "height_scale_max", "fre
 def checked(name: str, value: Any) -> Any:
     """Return a setting's value in the setting's type.
 
-    Raises
-    ------
-    DiffractionError
-        If it is not allowed.
+    Raises a DiffractionError if it is not allowed.
     """
     described = _BY_NAME[name].metadata
     try:

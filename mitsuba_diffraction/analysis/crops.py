@@ -23,6 +23,9 @@ def crops_of(
 ) -> list[HeightField]:
     """Return crops of equal size, side by side, each treated as a scan of its own.
 
+    Raises a DiffractionError if the file is a recipe, or the crops have fewer than `FEWEST_PIXELS`
+    a side.
+
     Parameters
     ----------
     path : heights of any format.
@@ -30,11 +33,6 @@ def crops_of(
     count : crops, at least 1.
     side : of square crops, µm, of which as many as fit are returned, spread over the scan; whole
         scans that are narrower. Without, `count` crops share the scan.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is a recipe, or the crops have fewer than `FEWEST_PIXELS` a side.
     """
     if kind_of(path) is FileKind.RECIPE:
         raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")

@@ -51,10 +51,7 @@ class Views:
         `coherence="ensemble"` and `model="kirchhoff"`; n pairs in all. A gradient requires some 50
         bytes for each pixel and pair.
 
-    Raises
-    ------
-    DiffractionError
-        As `reference.brdf`.
+    Raises a DiffractionError as `reference.brdf` does.
     """
 
     def __init__(
@@ -146,18 +143,15 @@ def recover(
     1982), gives weight to dim directions beside the mirror direction's lobe. From a distant start,
     the result may be another local minimum: compare its `views.brdf`, and try another start.
 
+    Raises a DiffractionError if `brdf` is not n values, finite and at least 0, the start has other
+    pixels than the views, or a number is out of range.
+
     Parameters
     ----------
     brdf : (n,), 1/sr, measured values in the views.
     start : initial heights; not flat, where the gradient is 0.
     smoothing : µm, standard deviation of the Gaussian that filters the heights.
     iterations : largest number of steps.
-
-    Raises
-    ------
-    DiffractionError
-        If `brdf` is not n values, finite and at least 0, the start has other pixels than the views,
-        or a number is out of range.
     """
     measured = np.asarray(brdf, np.float64)
     if measured.shape != (len(views),) or not np.all((measured >= 0) & (measured < np.inf)):
@@ -267,6 +261,9 @@ def relief(
 
     Minimises the squared difference between `shown` and the colours, from random heights.
 
+    Raises a DiffractionError if colours and directions differ in number, or a number is out of
+    range.
+
     Parameters
     ----------
     wi, wo : (m, 3) or (3,), as in `reference.brdf`.
@@ -280,11 +277,6 @@ def relief(
     wavelengths : (k,), nm, evenly spaced, which represent the spectrum.
     seed : seed of the initial heights; equal arguments give equal reliefs.
     iterations : largest number of steps.
-
-    Raises
-    ------
-    DiffractionError
-        If colours and directions differ in number, or a number is out of range.
     """
     for name, value in (("max_height", max_height), ("max_slope", max_slope)):
         if not 0.0 < value < np.inf:

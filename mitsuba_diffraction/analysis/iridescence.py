@@ -130,10 +130,7 @@ def diffracted_light(
     speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its
         frequency, which replaces its own.
 
-    Raises
-    ------
-    DiffractionError
-        If the table lacks orders, or wavelengths from 380 nm on.
+    Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
     """
     if table.wavelength_range[0] > SHORTEST:
         raise DiffractionError(

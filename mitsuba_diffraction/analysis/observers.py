@@ -153,10 +153,8 @@ EYES: dict[str, Callable[[], Eye]] = {
 def eye_of(name: str) -> Eye:
     """Return an eye by name, or from a CSV: wavelengths in nm and a column for each receptor.
 
-    Raises
-    ------
-    DiffractionError
-        If the animal is unknown, or the file has no sensitivities from 400 to 700 nm.
+    Raises a DiffractionError if the animal is unknown, or the file has no sensitivities from 400 to
+    700 nm.
     """
     if name.lower() in EYES:
         return EYES[name.lower()]()
@@ -211,10 +209,7 @@ def illuminant_of(name: str) -> Reals:
 
     name : one of `ILLUMINANTS`, or a CSV of wavelengths in nm and relative photons.
 
-    Raises
-    ------
-    DiffractionError
-        If the light is unknown, or the file does not cover 300 to 700 nm.
+    Raises a DiffractionError if the light is unknown, or the file does not cover 300 to 700 nm.
     """
     light = name.lower()
     if light == "leaves":
@@ -277,16 +272,13 @@ def quantum_catches(
 ) -> Reals:
     """Return the catches Q = ∫ R S I dλ (spectra, receptors), over nanometres; pavo's `Qi`.
 
+    Raises a DiffractionError if the wavelengths do not cover the eye's range.
+
     Parameters
     ----------
     wavelengths : (n,), nm, which cover 300 to 700.
     value : (n, spectra), reflectance, 1 is white.
     illuminant : of `GRID`, quanta; 1 without.
-
-    Raises
-    ------
-    DiffractionError
-        If the wavelengths do not cover the eye's range.
     """
     lam, spectra = np.asarray(wavelengths, np.float64), np.asarray(value, np.float64)
     seen = GRID[eye.sensitivity.max(axis=0) > 1e-3 * eye.sensitivity.max()]

@@ -37,10 +37,7 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
 
     Folders are not searched deeper; hidden files, and files of documents, are left out of them.
 
-    Raises
-    ------
-    DiffractionError
-        If a folder holds no file, or no file matches a pattern.
+    Raises a DiffractionError if a folder holds no file, or no file matches a pattern.
     """
     files: dict[Path, None] = {}
     for name in names:

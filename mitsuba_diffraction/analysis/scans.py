@@ -35,16 +35,13 @@ class Scan(NamedTuple):
 def read_scan(path: Path, options: LoadOptions, settings: Mapping[str, Any]) -> Scan:
     """Read a file of heights or a recipe.
 
+    Raises a DiffractionError if the file cannot be read, or a setting is not allowed.
+
     Parameters
     ----------
     path : heights of any format, or a recipe.
     options : how heights are read.
     settings : settings of the table by name, which precede the recipe's.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or a setting is not allowed.
     """
     if kind_of(path) is not FileKind.RECIPE:
         return Scan([load_heights(path, options)], TableSettings(**settings))

@@ -60,17 +60,15 @@ _MOST_NODES = 1 << 22
 class Geometry:
     """Angles of a measurement, degrees.
 
+    Raises a DiffractionError if an angle is out of range, there is no detector, or a cone reaches
+    below the surface.
+
     Parameters
     ----------
     light : angle of the lamp from the normal, 0 to 89.
     detectors : angles of the detectors in the plane of incidence; the mirror's is +`light`.
     azimuth : of the lamp, from the patch's x axis towards its y axis, −360 to 360.
     acceptance : full angle of the cone that a detector collects.
-
-    Raises
-    ------
-    DiffractionError
-        If an angle is out of range, there is no detector, or a cone reaches below the surface.
     """
 
     light: float = 30.0
@@ -163,6 +161,9 @@ def spectrum(
 ) -> Spectra:
     """Return the reflectance spectra of a surface in a spectrometer.
 
+    Raises a DiffractionError if an argument is out of range, or the variant is neither spectral nor
+    vectorised.
+
     Parameters
     ----------
     bsdf : a Mitsuba BSDF of the current variant, spectral and vectorised. In a polarised variant
@@ -176,11 +177,6 @@ def spectrum(
         that enters the detector.
     wavelengths : nm; default: 360 to 830 in steps of 5.
     progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If an argument is out of range, or the variant is neither spectral nor vectorised.
     """
     geometry = Geometry(light, tuple(float(d) for d in detectors), light_azimuth, acceptance)
     check_relative(relative)

@@ -200,6 +200,9 @@ def run_survey(
     map (.png) and a row (.json) of each scan. They are named by the content of the scan and its
     treatment.
 
+    Raises a DiffractionError if there are no files, a folder or a pattern yields none, or the
+    folder cannot be written.
+
     Parameters
     ----------
     files : scans of any format, recipes, folders of them, or patterns as in "scans/*.spm".
@@ -220,11 +223,6 @@ def run_survey(
     Returns
     -------
     The rows, in the order of the files; rows of failed scans have a `reason`.
-
-    Raises
-    ------
-    DiffractionError
-        If there are no files, a folder or a pattern yields none, or the folder cannot be written.
     """
     files = scan_files(files)
     if not files:

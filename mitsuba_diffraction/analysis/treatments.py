@@ -45,10 +45,8 @@ def load_treatments(
 ) -> Sequence[tuple[str, Treatment]]:
     """Read patterns and their treatments from a TOML file, in its order; none if path is `None`.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or a pattern has an option without a valid value.
+    Raises a DiffractionError if the file cannot be read, or a pattern has an option without a valid
+    value.
     """
     if path is None:
         return []

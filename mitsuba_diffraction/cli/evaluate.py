@@ -220,8 +220,6 @@ def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
 class FollowedRidge(NamedTuple):
     """Ridge of maxima and the fit of its period; an empty ridge and None if no period fits.
 
-    Attributes
-    ----------
     line : label and text for people.
     """
 

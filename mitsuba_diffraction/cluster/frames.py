@@ -47,6 +47,9 @@ def render(
     thread on the same kind of processor. With several threads, passes agree within 1e-6 of the
     film's largest value.
 
+    Raises a DiffractionError if a worker is of no use, or a task fails: with frame, passes and
+    worker.
+
     Parameters
     ----------
     scene : XML file.
@@ -65,11 +68,6 @@ def render(
     Returns
     -------
     `scene.passes.Result`, with the picture as a `mi.Bitmap`.
-
-    Raises
-    ------
-    DiffractionError
-        If a worker is of no use, or a task fails: with frame, passes and worker.
     """
     name = set_variant(variant)
     with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
@@ -96,6 +94,8 @@ class FrameRequest:
 class Film:
     """Frames of one scene, from workers.
 
+    Raises a DiffractionError if the scene cannot be loaded, or a worker is of no use.
+
     Attributes
     ----------
     scene, sensor : of frame 0.
@@ -112,11 +112,6 @@ class Film:
     sensor, preview, threads : as in `cluster.render`.
     keep : folder of sums that wait for their picture.
     warn : called with lines that are worth one.
-
-    Raises
-    ------
-    DiffractionError
-        If the scene cannot be loaded, or a worker is of no use.
     """
 
     def __init__(
@@ -168,10 +163,8 @@ class Film:
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
         """Yield frame after frame; end early once asked to stop.
 
-        Raises
-        ------
-        DiffractionError
-            Naming frame, passes and worker, if a task fails; finished work is stored.
+        Raises a DiffractionError that names frame, passes and worker, if a task fails; finished
+        work is stored.
         """
         start = time.perf_counter()
         groups = Groups(

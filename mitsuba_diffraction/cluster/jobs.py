@@ -36,6 +36,9 @@ def build(
     adds up in the order of the windows: the table equals `DiffractionTable.build`, to the last
     bit, on such a processor, with any number of workers.
 
+    Raises a DiffractionError if there are no `windows`, a worker is of no use, or the table cannot
+    be built.
+
     Parameters
     ----------
     heights : one scan or several.
@@ -43,11 +46,6 @@ def build(
     progress : called as progress(done, total, text).
     settings : of `DiffractionTable.build`, `windows` among them. A scan not wider than a
         window is built here.
-
-    Raises
-    ------
-    DiffractionError
-        If there are no `windows`, a worker is of no use, or the table cannot be built.
     """
     return build_on_workers(heights, TableSettings(**settings), client, progress)[0]
 
@@ -81,6 +79,8 @@ def run_jobs(
 ) -> Iterator[tuple[int, Any]]:
     """Do `work(job, contents)` for each job, and yield its number and result.
 
+    Raises a DiffractionError if the scheduler is gone, and does not come back.
+
     Parameters
     ----------
     client : `distributed.Client`, or None to do all here.
@@ -90,11 +90,6 @@ def run_jobs(
     Returns
     -------
     Numbers and results; `Failed` where a worker died of a job, again and again.
-
-    Raises
-    ------
-    DiffractionError
-        If the scheduler is gone, and does not come back.
     """
     if client is None:
         for n, job in enumerate(jobs):
@@ -145,10 +140,7 @@ class OrderedMap:
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
         """Yield the results of `work` for each of the arguments.
 
-        Raises
-        ------
-        DiffractionError
-            Naming the worker, if one fails; or if the scheduler is gone.
+        Raises a DiffractionError that names the worker, if one fails; or if the scheduler is gone.
         """
         waiting: deque[tuple[Any, Any]] = deque()
         left = iter(arguments)

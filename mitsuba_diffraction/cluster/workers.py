@@ -38,17 +38,14 @@ def connect(
 ) -> Iterator[Any]:
     """Yield a `distributed.Client`: of `count` processes started here, or of a running cluster.
 
+    Raises a DiffractionError if Dask is not installed, or nobody answers at the address.
+
     Parameters
     ----------
     count : processes, of one Dask thread each.
     scheduler : address, or the name of a scheduler file (.json); by default
         $DASK_SCHEDULER_ADDRESS.
     patience : seconds for the scheduler to answer.
-
-    Raises
-    ------
-    DiffractionError
-        If Dask is not installed, or nobody answers at the address.
     """
     distributed = optional("distributed")
     for name in ("distributed", "distributed.client", "tornado.application"):
@@ -96,15 +93,13 @@ def connect(
 def check_workers(client: Any, variant: str | None) -> list[str]:
     """Refuse workers that cannot serve, by name, and return the addresses of all.
 
+    Raises a DiffractionError if there are none, or one has several Dask threads, other versions, or
+    no LLVM or GPU.
+
     Parameters
     ----------
     client : `distributed.Client`.
     variant : of Mitsuba that they have to work in; None where that does not matter.
-
-    Raises
-    ------
-    DiffractionError
-        If there are none, or one has several Dask threads, other versions, or no LLVM or GPU.
     """
     distributed = optional("distributed")
     try:
@@ -141,10 +136,7 @@ def workers_of(client: Any) -> dict[str, Any]:
 def executor_of(client: Any) -> Iterator[Executor]:
     """Yield the client's workers as an executor, whose tasks another worker repeats if one dies.
 
-    Raises
-    ------
-    DiffractionError
-        If several workers die of the same task, or the scheduler is gone.
+    Raises a DiffractionError if several workers die of the same task, or the scheduler is gone.
     """
     distributed = optional("distributed")
     try:

@@ -27,6 +27,9 @@ LARGE, ROWS = 2**25, 256
 class HeightField:
     """Heights of one patch of surface, which tiles the plane.
 
+    Raises a DiffractionError if the heights are not a two-dimensional array of finite real numbers,
+    too small or too large, or the pixel size is not one or two positive lengths.
+
     Parameters
     ----------
     heights
@@ -45,12 +48,6 @@ class HeightField:
     periodic
         Whether the patch is whole periods of a surface that repeats exactly, as a grating by a
         formula. Any other patch limits the coherence width (`heights.coherence`).
-
-    Raises
-    ------
-    DiffractionError
-        If the heights are not a two-dimensional array of finite real numbers, too small or too
-        large, or the pixel size is not one or two positive lengths.
     """
 
     heights: FloatArray

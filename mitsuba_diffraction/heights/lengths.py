@@ -34,10 +34,7 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
 
     `None` and "auto" give `None`: the file has to state it.
 
-    Raises
-    ------
-    DiffractionError
-        If the value is not one of these; `where` names the parameter.
+    Raises a DiffractionError if the value is not one of these; `where` names the parameter.
     """
     if is_auto(value):
         return None

@@ -31,6 +31,9 @@ def load(
 ) -> HeightField:
     """Read a height field from an image, an array, text, an instrument file or a recipe.
 
+    Raises a DiffractionError if the file cannot be read as heights, a length is missing or
+    contradicts the file, or an option has no valid value.
+
     Parameters
     ----------
     path
@@ -65,12 +68,6 @@ def load(
         patch is whole periods of a surface that repeats; "none". By default "trend" where seams of
         waves longer than the patch show (`validity.seam_defects`). The treatments are applied in
         the order crop, fill, level, clip, periodic, and each leaves a line in `history`.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read as heights, a length is missing or contradicts the file, or
-        an option has no valid value.
     """
     options = LoadOptions.parse(
         pixel_size=pixel_size, max_height=max_height, height_unit=height_unit, channel=channel,
@@ -131,9 +128,7 @@ def treated(
 
     Points without data are filled while loading, since a HeightField has none.
 
-    Raises
-    ------
-    DiffractionError
-        If an option has no valid value, or `clip` finds more than half of the heights equal.
+    Raises a DiffractionError if an option has no valid value, or `clip` finds more than half of the
+    heights equal.
     """
     return treat(field, LoadOptions.parse(crop=crop, level=level, clip=clip, periodic=periodic))

@@ -45,17 +45,15 @@ def central_slices(
 ) -> tuple[slice, slice]:
     """Return the slices of rows and columns of the central region of a patch.
 
+    Raises a DiffractionError if the region is larger than the patch, or less than two pixels wide
+    or high.
+
     Parameters
     ----------
     shape : (ny, nx) of the patch.
     pixel_size : (dx, dy), µm.
     size : (width, height) of the region, µm, met to half a pixel.
     name : name of the patch in errors.
-
-    Raises
-    ------
-    DiffractionError
-        If the region is larger than the patch, or less than two pixels wide or high.
     """
     slices = []
     for count, pixel, length in zip(shape, pixel_size[::-1], size[::-1], strict=True):
@@ -95,6 +93,9 @@ def crop(field: HeightField, size: Size) -> HeightField:
 def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
     """Replace NaN by heights interpolated or extended from the points around.
 
+    Raises a DiffractionError if points are missing and `method` is `None`, or more than half of
+    them are.
+
     Parameters
     ----------
     heights
@@ -109,11 +110,6 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
     -------
     FloatArray, str
         The filled heights, and a line that says how many points were filled; "" if none were.
-
-    Raises
-    ------
-    DiffractionError
-        If points are missing and `method` is `None`, or more than half of them are.
     """
     missing = np.isnan(heights)
     count = int(np.count_nonzero(missing))
@@ -229,10 +225,8 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
     The robust standard deviation is 1.4826 times the median absolute deviation, which a few points
     of dust do not change.
 
-    Raises
-    ------
-    DiffractionError
-        If `sigmas` is below 1, or more than half of the heights are equal: the deviation is 0 then.
+    Raises a DiffractionError if `sigmas` is below 1, or more than half of the heights are equal:
+    the deviation is 0 then.
     """
     if not 1 <= sigmas < math.inf:
         raise DiffractionError(

@@ -60,10 +60,8 @@ class LoadOptions:
     def parse(cls, **options: Any) -> LoadOptions:
         """Check options as users write them (see `load.load`) and convert their types.
 
-        Raises
-        ------
-        DiffractionError
-            If a value is not valid; the message names the parameter and the choices.
+        Raises a DiffractionError if a value is not valid; the message names the parameter and the
+        choices.
         """
         return cls(**{name: _CHECKS[name](value) for name, value in options.items()})
 

@@ -60,12 +60,9 @@ class Recipe:
     def load(cls, path: str | os.PathLike[str]) -> Recipe:
         """Read and check a recipe; heights are neither read nor generated yet.
 
-        Raises
-        ------
-        DiffractionError
-            If the file cannot be read, is not TOML, has a key that is unknown, of the wrong type or
-            contradicted by another, or names a generator that does not exist; if it is a recipe of
-            solved orders, which the room `solve` reads.
+        Raises a DiffractionError if the file cannot be read, is not TOML, has a key that is
+        unknown, of the wrong type or contradicted by another, or names a generator that does not
+        exist; if it is a recipe of solved orders, which the room `solve` reads.
         """
         file = Path(path)
         shown = repr(str(file))
@@ -120,10 +117,7 @@ class Recipe:
     def save(self, path: Path, comment: str) -> None:
         """Write the recipe, with paths relative to the file; `comment` stands above it.
 
-        Raises
-        ------
-        DiffractionError
-            If the file cannot be written.
+        Raises a DiffractionError if the file cannot be written.
         """
         content: dict[str, Any] = {}
         arguments = [dict(values) for values in self.arguments]
@@ -146,10 +140,7 @@ class Recipe:
     def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
         """Read or generate all patches; `options` take precedence over the recipe's options.
 
-        Raises
-        ------
-        DiffractionError
-            If a source cannot be read, or the generator refuses an argument.
+        Raises a DiffractionError if a source cannot be read, or the generator refuses an argument.
         """
         overrides = options or LoadOptions()
         merged = self.options.updated(overrides)
@@ -167,10 +158,7 @@ class Recipe:
     def field(self, options: LoadOptions | None = None) -> HeightField:
         """Read or generate the only patch of the recipe.
 
-        Raises
-        ------
-        DiffractionError
-            As `fields`, and if the recipe has several patches.
+        Raises a DiffractionError as `fields` does, and if the recipe has several patches.
         """
         count = len(self.sources) or len(self.arguments)
         if count > 1:

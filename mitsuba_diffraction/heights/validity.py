@@ -49,8 +49,6 @@ TREND_SHARE = 0.5
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
     """Return warnings where a patch leaves the model or its own resolution; empty if it does not.
 
-    Parameters
-    ----------
     wavelength_range : shortest and longest wavelength, nm.
 
     Returns

@@ -125,8 +125,6 @@ _KINDS: list[tuple[Callable[[Any], bool], Any]] = [
 def register(is_kind: Callable[[Any], bool], arithmetic: Any) -> None:
     """Add an `Arithmetic` of another kind of numbers.
 
-    Parameters
-    ----------
     is_kind : whether a number is of this kind.
     """
     _KINDS.append((is_kind, arithmetic))

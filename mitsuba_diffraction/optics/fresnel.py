@@ -95,8 +95,6 @@ def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
 
     Films follow Born and Wolf, Principles of Optics, section 1.6.4.
 
-    Parameters
-    ----------
     cosine, square : of the angle of incidence, and of its sine the square.
     """
     if not isinstance(index, Filmed):

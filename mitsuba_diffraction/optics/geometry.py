@@ -24,15 +24,12 @@ def sigma_of(coherence_width: float) -> float:
 def check_angles(theta: float, phi: float) -> None:
     """Refuse a light's direction that is not above the horizon.
 
+    Raises a DiffractionError if an angle is out of range.
+
     Parameters
     ----------
     theta : degrees from the normal, 0 to below 90.
     phi : azimuth in degrees, −360 to 360.
-
-    Raises
-    ------
-    DiffractionError
-        If an angle is out of range.
     """
     if not 0.0 <= theta < 90.0:
         raise DiffractionError(

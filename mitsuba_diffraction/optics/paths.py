@@ -188,8 +188,6 @@ class Returned(Path):
 
     It passes the structure twice, which to first order in κ² is one passage of κ = √(κi² + κo²).
 
-    Attributes
-    ----------
     sheet : index of the sheet.
     """
 

@@ -54,25 +54,24 @@ class Program:
     def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> Function:
         """Write a formula, and the formulas that it calls, as functions.
 
+        Raises a DiffractionError if the formula cannot be written, with its line, or if the shader
+        declares the name.
+
         Parameters
         ----------
         formula : function of this folder.
         arguments : of each parameter its kind ("float", "complex", "vector": three components), a
             tuple of kinds, or else a value that is constant in the program.
         name : of the function; the formula's by default.
-
-        Raises
-        ------
-        DiffractionError
-            If the formula cannot be written, with its line, or if the shader declares the name.
         """
         name = name or formula.__name__.lstrip("_")
         self._check_name(formula, name)
-        return self._add(formula, arguments, name)
+        return self.function_of(formula, arguments, name)
 
-    def _add(
+    def function_of(
         self, formula: Callable[..., Any], arguments: tuple[Any, ...], name: str = ""
     ) -> Function:
+        """Return the function of a formula for kinds of arguments, written at its first use."""
         formula = getattr(formula, "__wrapped__", formula)
         key = (formula, name, *map(_key, arguments))
         if key not in self.functions:
@@ -157,7 +156,7 @@ class Scope:
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Return the results of a call of another formula, which is written if it is new."""
-        function = self.program._add(formula, tuple(map(kind_of, values)))
+        function = self.program.function_of(formula, tuple(map(kind_of, values)))
         self.callees.add(function.name)
         parts, kinds = (function.name, *map(argument_of, values)), function.kinds
         if function.record is None:

@@ -121,8 +121,6 @@ def order_0(geometry: Geometry, came: Powers, left: Powers) -> Jones:
     The entries are products of √√T of either direction and polarisation, turned from one plane of
     incidence to the other. The matrix is symmetric, and √T in the refracted direction.
 
-    Parameters
-    ----------
     came, left : `flat_transmittances` of ωi and of ωo.
     """
     xp = of(*came, *left)
@@ -158,8 +156,6 @@ def out_of_sheet(jones: Jones, n: Number, above: Number, below: Number) -> Jones
 
         J'_ab = √(T_a(ωo) / (1 − R_a(ωo) R_b(ωi))) J_ab.
 
-    Parameters
-    ----------
     above, below : cosines of the directions outside of the sheet, on its two sides.
     """
     came, left = transmittances(above, n), transmittances(below, n)

@@ -75,10 +75,7 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
 def check_blender() -> None:
     """Check that this is a Blender that runs the shader.
 
-    Raises
-    ------
-    MaterialError
-        Outside Blender, in an older Blender, and in a Blender without OSL.
+    Raises a MaterialError outside Blender, in an older Blender, and in a Blender without OSL.
     """
     if bpy is None:
         raise MaterialError(

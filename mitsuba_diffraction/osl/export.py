@@ -129,17 +129,15 @@ class Shader:
 def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction") -> Exported:
     """Write `NAME.osl`, its textures (EXR), `NAME.json` and `blender_material.py` into a folder.
 
+    Raises a DiffractionError if the surface has features that the shader lacks, or the folder
+    cannot be written.
+
     Parameters
     ----------
     bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`, without
         coat, film or nested BSDF.
     folder : made if it is missing.
     name : of the shader and its files; letters, digits and underscores.
-
-    Raises
-    ------
-    DiffractionError
-        If the surface has features that the shader lacks, or the folder cannot be written.
     """
     shader = shader_of(OSL.described(bsdf))
     check_name(name, shader)
@@ -183,10 +181,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
 def check_name(name: str, shader: Shader) -> None:
     """Refuse a name that a shader cannot have.
 
-    Raises
-    ------
-    DiffractionError
-        If it is no identifier, or a word of OSL or of the shader's source.
+    Raises a DiffractionError if it is no identifier, or a word of OSL or of the shader's source.
     """
     allowed = "letters, digits and underscores, a letter first"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):

@@ -70,8 +70,6 @@ class HeightStatistic:
 class Boundary:
     """A model of the boundary of a material.
 
-    Attributes
-    ----------
     statistic : of the heights; None where the model does not depend on them.
     """
 

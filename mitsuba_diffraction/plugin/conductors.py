@@ -52,10 +52,7 @@ def tabulated_range(material: str) -> tuple[float, float] | None:
 def tabulated_index(material: str) -> tuple[Array, Array]:
     """Return wavelengths in nm and n + ik of a conductor or tissue, (n,) each.
 
-    Raises
-    ------
-    DiffractionError
-        If no table has that name.
+    Raises a DiffractionError if no table has that name.
     """
     if tabulated_range(material) is None:
         raise DiffractionError(unknown_conductor(material))

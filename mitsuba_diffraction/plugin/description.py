@@ -345,10 +345,7 @@ class Consumer:
     def check(self, described: Description, what: str = "the surface") -> None:
         """Refuse a surface with a feature that is not shown; warn of those that are left out.
 
-        Raises
-        ------
-        DiffractionError
-            With the feature, the consumer, the choices and a remedy.
+        Raises a DiffractionError with the feature, the consumer, the choices and a remedy.
         """
         if refusal := self.refusal(described, what):
             raise DiffractionError(refusal)

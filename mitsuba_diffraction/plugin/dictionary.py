@@ -41,6 +41,8 @@ def bsdf_dict(
 ) -> dict[str, Any]:
     """Return the dictionary of a BSDF for a height field or a table of orders, or for a file.
 
+    Raises a DiffractionError if `field` is neither heights nor a path, or the plugin is unknown.
+
     Parameters
     ----------
     field : heights in µm; or the path of a file, as for the parameter `heightfield`. Or a table of
@@ -53,11 +55,6 @@ def bsdf_dict(
     Returns
     -------
     dict for `mi.load_dict`, alone or inside a shape.
-
-    Raises
-    ------
-    DiffractionError
-        If `field` is neither heights nor a path, or the plugin is unknown.
     """
     if plugin not in PLUGINS:
         raise DiffractionError(

@@ -266,10 +266,7 @@ def _weights(
 ) -> dict[str, Bounded | Texture | None]:
     """Return the weight of each surface; None for the surface that gets the rest.
 
-    Raises
-    ------
-    DiffractionError
-        For names that do not fit, and for invalid weights.
+    Raises a DiffractionError for names that do not fit, and for invalid weights.
     """
     if len(names) < 2:
         raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")

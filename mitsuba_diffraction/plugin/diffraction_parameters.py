@@ -63,10 +63,7 @@ class Parameters:
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     """Read and check everything, and get the table: loaded, or from `provider`.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the choices.
+    Raises a DiffractionError with the parameter, its value and the choices.
     """
     for name in OPTIONAL:  # so that a scene can have a parameter for them
         if name in props and props.get(name) == "none":

@@ -47,8 +47,6 @@ class VaryingFactor:
         for a bitmap's own.
     limits : name and bounds of the factor.
 
-    Attributes
-    ----------
     high : the largest factor; larger ones are clamped to it.
     """
 
@@ -170,10 +168,7 @@ class LateralScale:
 def read_factor(props: Properties, limits: FactorLimits) -> float | VaryingFactor:
     """Return a scene's factor, 1 by default, or the texture of factors.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the allowed values.
+    Raises a DiffractionError with the parameter, its value and the allowed values.
     """
     name, largest = limits.name, f"{limits.name}_max"
     texture = dict(props.objects()).get(name)
@@ -192,10 +187,7 @@ def read_factor(props: Properties, limits: FactorLimits) -> float | VaryingFacto
 def read_lateral(props: Properties) -> LateralScale:
     """Return a scene's lateral_scale; without it, kernels have no operation for it.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the allowed values.
+    Raises a DiffractionError with the parameter, its value and the allowed values.
     """
     name, largest = LATERAL.name, f"{LATERAL.name}_max"
     factor = read_factor(props, LATERAL) if name in props else None

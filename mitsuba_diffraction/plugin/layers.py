@@ -33,8 +33,6 @@ class CoatedPair(Pair):
     `uv` and `w` are optical, for k in vacuum: `w` is n times the sum of the cosines. All else
     belongs to the refracted directions.
 
-    Attributes
-    ----------
     n : index of the coat relative to the medium above it.
     """
 
@@ -94,8 +92,6 @@ _ENDS, _PER_FRINGE, _LEAST_NODES = (390.0, 710.0), 4, 6
 class Channels:
     """Weights (3, n) by which RGB variants sum a film's colours at n wavelengths.
 
-    Attributes
-    ----------
     wavelengths : (n,) nm.
     """
 

@@ -98,11 +98,8 @@ class PluginBSDF(mi.BSDF):
     def parameters_changed(self, keys: list[str]) -> None:
         """Accept all changes, or reject all.
 
-        Raises
-        ------
-        DiffractionError
-            If a parameter is out of bounds, as a height_scale that the table does not serve. All
-            parameters then have their last values.
+        Raises a DiffractionError if a parameter is out of bounds, as a height_scale that the table
+        does not serve. All parameters then have their last values.
         """
         mix = self.mix and self.mix()
         take_changes(self, (mix or self).together)

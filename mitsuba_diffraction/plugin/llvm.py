@@ -154,10 +154,8 @@ def loaded_llvm_version() -> tuple[int, int, int] | None:
 def require_llvm() -> None:
     """Make sure that this process can compile with LLVM.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot, with the versions found, the versions supported, and how to install one.
+    Raises a DiffractionError if it cannot, with the versions found, the versions supported, and how
+    to install one.
     """
     named = named_library()
     if "drjit" in sys.modules:

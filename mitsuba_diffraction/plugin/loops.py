@@ -16,8 +16,6 @@ def sum_of(
 ) -> Any:
     """Return a total of `count` terms.
 
-    Parameters
-    ----------
     add : function of the number of a term, the inputs and the total, which returns the total with
         that term added. All that derivatives are wanted for must come by `inputs`: Dr.Jit drops
         derivatives of captured variables in a loop's body, without a warning.

@@ -32,8 +32,6 @@ from .types import (
 class NestingBSDF(PluginBSDF):
     """Diffraction over another BSDF, or over none.
 
-    Attributes
-    ----------
     nested : the BSDF beneath, or None.
     """
 

@@ -51,8 +51,6 @@ class Bounded:
     low, high : the smallest and the largest value allowed.
     message : the text of a refusal, from the value refused.
 
-    Attributes
-    ----------
     value : mi.Float, always the same object: Mitsuba assigns to it.
     """
 
@@ -131,8 +129,6 @@ class ObjectValues:
 class Changing(Protocol):
     """A BSDF whose parameters change.
 
-    Attributes
-    ----------
     parameters : everything that its `traverse` exposes.
     """
 
@@ -148,15 +144,12 @@ class Changing(Protocol):
 def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
     """Accept all changes of a BSDF's parameters, or reject all.
 
+    Raises a DiffractionError with all that is refused. Everything is then as it was before.
+
     Parameters
     ----------
     changed : the BSDF, whose derived quantities are computed.
     together : all BSDFs that are refused together, this one among them: the surfaces of a mix.
-
-    Raises
-    ------
-    DiffractionError
-        With all that is refused. Everything is then as it was before.
     """
     try:
         check_parameters(together)
@@ -174,10 +167,7 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
 def check_parameters(together: Sequence[Changing]) -> None:
     """Refuse parameters that are not allowed, each by itself or with each other.
 
-    Raises
-    ------
-    DiffractionError
-        With all that is refused.
+    Raises a DiffractionError with all that is refused.
     """
     if refused := [line for each in together for line in _refused(each)]:
         raise DiffractionError("; ".join(refused))

@@ -34,10 +34,8 @@ def pigment_bsdf(text: str | float) -> BSDF:
         "sienna", a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
         cent, or a picture.
 
-    Raises
-    ------
-    DiffractionError
-        If the text is not one of these, or the spectrum is not one or ends within 400 to 700 nm.
+    Raises a DiffractionError if the text is not one of these, or the spectrum is not one or ends
+    within 400 to 700 nm.
     """
     return mi.load_dict({"type": "diffuse", "reflectance": _reflectance(str(text))})
 
@@ -55,10 +53,7 @@ def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64
 
     A header is skipped; numbers are separated by commas, semicolons, tabs or spaces.
 
-    Raises
-    ------
-    DiffractionError
-        If the file has no such columns, or its reflectances are out of range.
+    Raises a DiffractionError if the file has no such columns, or its reflectances are out of range.
     """
     rows = []
     for line in read_text(path).splitlines():

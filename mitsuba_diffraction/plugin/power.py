@@ -61,8 +61,6 @@ class SpectralPower:
     wavelength : nm, for mono variants.
     places : positions of windows; None for the table's own window.
 
-    Attributes
-    ----------
     device : the table in the variant's memory.
     """
 

@@ -73,10 +73,7 @@ def _of_record(name: str, record: dict[str, Any]) -> Preset:
 def find_preset(name: str) -> Preset:
     """Return the look of this name.
 
-    Raises
-    ------
-    DiffractionError
-        If the name is unknown; the text names the nearest.
+    Raises a DiffractionError if the name is unknown; the text names the nearest.
     """
     known = presets()
     if name in known:
@@ -91,16 +88,13 @@ def find_preset(name: str) -> Preset:
 def preset(name: str, **changes: Any) -> dict[str, Any]:
     """Return the dictionary of a named look's BSDF for `mi.load_dict`.
 
+    Raises a DiffractionError if the look is unknown; the text names the nearest.
+
     Parameters
     ----------
     name : a look that `mitsuba-diffraction presets` lists, e.g. "cd".
     changes : parameters of the BSDF in place of the record's, e.g. orientation=90; None is the
         same as leaving it out.
-
-    Raises
-    ------
-    DiffractionError
-        If the look is unknown; the text names the nearest.
     """
     given = {key: value for key, value in changes.items() if value is not None}
     return find_preset(name).changed(given)
@@ -109,10 +103,7 @@ def preset(name: str, **changes: Any) -> dict[str, Any]:
 def diffraction_preset(props: Properties) -> BSDF:
     """Return the BSDF of the look that the parameter `preset` names, with further parameters.
 
-    Raises
-    ------
-    DiffractionError
-        If the look is unknown, or a parameter does not fit its BSDF.
+    Raises a DiffractionError if the look is unknown, or a parameter does not fit its BSDF.
     """
     if PARAMETER not in props:
         raise DiffractionError(f"{PLUGIN}: the parameter {PARAMETER} is missing; e.g. cd")

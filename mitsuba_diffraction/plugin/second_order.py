@@ -40,10 +40,7 @@ def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeR
     The scene's `second_order` wins over the table's; "auto" decides by the table's change of
     colours.
 
-    Raises
-    ------
-    DiffractionError
-        If the scene says true and the table has no slope ratios.
+    Raises a DiffractionError if the scene says true and the table has no slope ratios.
     """
     ratios, asked = table.slope_ratios, table.settings.second_order
     if "second_order" in props:
@@ -67,8 +64,6 @@ class SecondOrder:
     boundary : its model, which sees the heights.
     ratios : slope ratios of its heights.
 
-    Attributes
-    ----------
     index : index of the coefficients c, rounded to `INDEX_STEP`.
     """
 

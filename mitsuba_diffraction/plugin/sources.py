@@ -149,10 +149,7 @@ def table_of_file(
 def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> HeightField:
     """Return the heights that a scene names; the first of a recipe's several.
 
-    Raises
-    ------
-    DiffractionError
-        If it names a table, which does not hold them.
+    Raises a DiffractionError if it names a table, which does not hold them.
     """
     kind = kind_of(path)
     if must_be_table or kind is FileKind.TABLE:
@@ -168,10 +165,8 @@ def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> He
 def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     """Return heights (ny, nx) in µm from an array, or from `bsdf_dict`'s HeightField.
 
-    Raises
-    ------
-    DiffractionError
-        If pixel_size is missing, max_height is given, or the array holds no heights.
+    Raises a DiffractionError if pixel_size is missing, max_height is given, or the array holds no
+    heights.
     """
     for name in ("max_height", "height_unit"):
         if getattr(options, name) is not None:

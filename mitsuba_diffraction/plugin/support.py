@@ -65,15 +65,12 @@ def without_second_order(model: str) -> Support:
 def check_combination(asked: Mapping[str, str], choices: Sequence[Support]) -> None:
     """Refuse a feature that one of a scene's choices does not support.
 
+    Raises a DiffractionError with the feature and the choice.
+
     Parameters
     ----------
     asked : choices of the scene in the words of messages, by the name of the feature.
     choices : declarations of all choices of the scene.
-
-    Raises
-    ------
-    DiffractionError
-        With the feature and the choice.
     """
     for feature, phrase in asked.items():
         for support in choices:

@@ -118,16 +118,13 @@ def read_surface(
 ) -> SurfaceParameters:
     """Read and check the parameters that both plugins have, and get the table.
 
+    Raises a DiffractionError with the parameter, its value and the choices.
+
     Parameters
     ----------
     provider : gets the tables of heights.
     optical : index of the medium that heights are in, relative to the medium above.
     second_order : whether the table may need slope ratios.
-
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the choices.
     """
     height_scale = read_factor(props, HEIGHT)
     lateral = read_lateral(props)
@@ -150,10 +147,8 @@ def read_surface(
 def nested_of(props: Properties, plugin: str) -> BSDF | None:
     """Return the nested BSDF or pigment, or None; refuse parameters that the plugin lacks.
 
-    Raises
-    ------
-    DiffractionError
-        If a name is unknown, there are several nested BSDFs, or it lets light through.
+    Raises a DiffractionError if a name is unknown, there are several nested BSDFs, or it lets light
+    through.
     """
     require_loaded_llvm()
     nested = {name: value for name, value in props.objects() if isinstance(value, mi.BSDF)}
@@ -187,10 +182,7 @@ def coherence_of(props: Properties) -> str:
 def read_index(props: Properties, name: str, default: float = 1.0) -> float | str:
     """Return a refractive index, also of a tissue, or a medium that Mitsuba knows by name.
 
-    Raises
-    ------
-    DiffractionError
-        If it is below 1, or no number.
+    Raises a DiffractionError if it is below 1, or no number.
     """
     value = props.get(name, default)
     if isinstance(value, str):
@@ -287,10 +279,7 @@ def _window_positions(props: Properties, table: DiffractionTable) -> WindowPosit
 def resolved_path(name: str, parameter: str) -> Path:
     """Return the file of this name: as it is, or in a folder where Mitsuba looks for files.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing, with the folders.
+    Raises a DiffractionError if the file is missing, with the folders.
     """
     resolver = mi.file_resolver()
     path = Path(str(resolver.resolve(name)))
@@ -325,10 +314,7 @@ def mono_wavelength(props: Properties, wavelength_range: tuple[float, float]) ->
 def orientation_of(props: Properties) -> Orientation:
     """Return the angle, or the texture of angles, from the first tangent to the patch's x axis.
 
-    Raises
-    ------
-    DiffractionError
-        If the element is not a texture, or the number not an angle.
+    Raises a DiffractionError if the element is not a texture, or the number not an angle.
     """
     objects = dict(props.objects())
     if "orientation" in objects:

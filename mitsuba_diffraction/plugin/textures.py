@@ -45,10 +45,7 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     shape : `mi.Shape` of the variant that is set.
     number : its place among the scene's shapes, counted from 0, to name one without an id.
 
-    Raises
-    ------
-    DiffractionError
-        Which names the attribute, and how to get one of directions.
+    Raises a DiffractionError that names the attribute, and the way to get one of directions.
     """
     if PLACED in str(shape.bsdf()) and shape.is_mesh() and not has_texcoords(shape):
         raise DiffractionError(
@@ -115,10 +112,7 @@ def uv_square() -> Iterator[Interaction]:
 def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
     """Refuse a picture whose numbers Mitsuba would take for colours.
 
-    Raises
-    ------
-    DiffractionError
-        With the remedy.
+    Raises a DiffractionError with the remedy.
     """
     if is_bitmap(texture) and "raw = 1" not in str(texture):
         raise DiffractionError(
@@ -193,10 +187,8 @@ class OrientationTexture:
 def _check(texture: Texture) -> None:
     """Refuse a texture whose values are not the directions that were saved.
 
-    Raises
-    ------
-    DiffractionError
-        If it has one channel, is taken for colours, or cannot hold negative numbers.
+    Raises a DiffractionError if it has one channel, is taken for colours, or cannot hold negative
+    numbers.
     """
     if not is_bitmap(texture):
         return  # attributes of meshes are checked where there is a mesh

@@ -75,6 +75,9 @@ def brdf(
     Equations (1) to (10) of `reference.model`; defaults as in the BSDF `diffraction`.
     Below the surface the BRDF is 0.
 
+    Raises a DiffractionError for an unknown coherence or model, a width that is not positive and
+    finite, an index or a place that is missing or superfluous, or arrays whose shapes do not fit.
+
     Parameters
     ----------
     field : HeightField, heights in µm.
@@ -99,12 +102,6 @@ def brdf(
         True, False, or "auto" for where it changes the colours of these heights by 5 % or more
         (`optics.second_order_change`). It is known for a dielectric, bare or under a coat, by model
         "small_slope", in an ensemble; True is refused elsewhere.
-
-    Raises
-    ------
-    DiffractionError
-        For an unknown coherence or model, a width that is not positive and finite, an index or a
-        place that is missing or superfluous, or arrays whose shapes do not fit.
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))

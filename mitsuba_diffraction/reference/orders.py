@@ -41,6 +41,9 @@ def orders_brdf(
 ) -> Real:
     """BRDF of a grating that repeats along x, for unpolarised light, in 1/sr, shape (n,).
 
+    Raises a DiffractionError for a period or width that is not positive, or arrays whose shapes do
+    not fit.
+
     Parameters
     ----------
     efficiency : of an order, for light within the layer, for example `OrderTable.efficiency`.
@@ -49,11 +52,6 @@ def orders_brdf(
     wavelength : (n,) or scalar, vacuum wavelength in nm.
     coherence_width : 4σ of the amplitude window, µm.
     superstrate : index of a flat clear layer over the grating; 1 for none.
-
-    Raises
-    ------
-    DiffractionError
-        For a period or width that is not positive, or arrays whose shapes do not fit.
     """
     if not (period > 0.0 and coherence_width > 0.0):
         raise DiffractionError(

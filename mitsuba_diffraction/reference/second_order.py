@@ -28,10 +28,7 @@ def resolved(
 ) -> bool:
     """Whether "auto", True or False applies the second order to this surface.
 
-    Raises
-    ------
-    DiffractionError
-        If True is asked where the second order is not known.
+    Raises a DiffractionError if True is asked where the second order is not known.
     """
     asked = checked("second_order", second_order)
     if asked is False:

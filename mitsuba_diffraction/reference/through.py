@@ -65,8 +65,6 @@ def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -
     The entries are products of √√T of either direction and polarisation, turned from one plane of
     incidence to the other. The matrix is symmetric, and √T in the refracted direction.
 
-    Parameters
-    ----------
     wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric or,
         if `thin`, beyond the flat other side of a sheet.
     """
@@ -109,8 +107,6 @@ def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -
 
         J'_ab = √(T_a(ωo) / (1 − R_a(ωo) R_b(ωi))) J_ab.
 
-    Parameters
-    ----------
     wi, wo : outside of the sheet, above and below, (..., 3).
     """
     came, left = (

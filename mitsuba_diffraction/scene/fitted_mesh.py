@@ -62,16 +62,14 @@ class Fit(NamedTuple):
 def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
     """Compute how a mesh is put on the stage.
 
+    Raises a DiffractionError if `up` is not one of these, a vertex is not finite, or the mesh has
+    no volume.
+
     Parameters
     ----------
     positions : (n, 3) vertices.
     file : file of the mesh, whose format suggests an axis and whose name is quoted in errors.
     up : one of `UPS`; `auto` takes y or z, whichever the mesh stands on more firmly.
-
-    Raises
-    ------
-    DiffractionError
-        If `up` is not one of these, a vertex is not finite, or the mesh has no volume.
     """
     if up not in UPS:
         raise DiffractionError(f"up={up!r} is unknown; choose one of {', '.join(UPS)}")
@@ -106,10 +104,7 @@ def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMe
     The direction is the file's `vertex_orientation`; else ∂p/∂u where texture coordinates suit a
     patch; else the smoothest field of directions.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is not a mesh, or the mesh does not fit.
+    Raises a DiffractionError if the file is not a mesh, or the mesh does not fit.
     """
     positions, normals, uv, faces = load_mesh(file)
     placed = fit_of(positions, file, up)

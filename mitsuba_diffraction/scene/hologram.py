@@ -80,10 +80,7 @@ class Hologram:
     def write(self, folder: str | os.PathLike[str], stem: str = "hologram") -> Files:
         """Write the textures as STEM_orientation.exr, STEM_lateral_scale.exr and STEM_weight.png.
 
-        Raises
-        ------
-        DiffractionError
-            If the folder does not exist or cannot be written to.
+        Raises a DiffractionError if the folder does not exist or cannot be written to.
         """
         names = "orientation.exr", "lateral_scale.exr", "weight.png"
         files = Files(*(Path(folder) / f"{stem}_{name}" for name in names))
@@ -105,6 +102,9 @@ def hologram(
     dot: int = 1,
 ) -> Hologram:
     """Make the textures of a dot-matrix hologram from a picture; each of its pixels is a dot.
+
+    Raises a DiffractionError if the picture cannot be read, a period or angle is not allowed, or no
+    dot has a grating.
 
     Parameters
     ----------
@@ -128,11 +128,6 @@ def hologram(
     Hologram
         Its weight is 0 where a mapping has no entry for a label, where a picture of brightness is
         black, where an array is NaN, and between round dots.
-
-    Raises
-    ------
-    DiffractionError
-        If the picture cannot be read, a period or angle is not allowed, or no dot has a grating.
     """
     values, full_scale = _picture(image)
     labels = isinstance(periods, Mapping) or isinstance(orientations, Mapping)

@@ -48,6 +48,9 @@ def solve_beam(
 ) -> OrderTable:
     """Solve the orders of light from some directions.
 
+    Raises a DiffractionError if an argument is out of its range, polarised or too many lights are
+    asked for, or the solver is not installed or does not converge.
+
     Parameters
     ----------
     theta, phi : directions to the light, degrees, within the superstrate: from the normal, and from
@@ -55,12 +58,6 @@ def solve_beam(
     step : between wavelengths, nm; the ends of the settings' wavelengths are solved exactly.
     profile, material, superstrate, layers, settings, jobs, announce : as for `solve_orders`; the
         tolerance bounds the solver's error.
-
-    Raises
-    ------
-    DiffractionError
-        If an argument is out of its range, polarised or too many lights are asked for, or the
-        solver is not installed or does not converge.
     """
     how, work = settings or Settings(), jobs or Jobs()
     low, high = how.wavelengths
@@ -108,8 +105,6 @@ def solve_beam(
 class _Lights:
     """Grid of light (a wavelengths, b θ, c φ) in the coordinates of stations.
 
-    Attributes
-    ----------
     places : of each light, in the order of the grid.
     """
 

@@ -41,15 +41,13 @@ _MOST_SIDES = 32
 class Chandezon:
     """Chandezon's method for one profile; a `solve.stations.Solver`.
 
+    Raises a DiffractionError if grooves have vertical walls on both sides, are undercut, or have
+    too many edges.
+
     Parameters
     ----------
     profile : one period of the grooves: smooth, or of few straight sides.
     harmonics : spatial frequencies on either side of the middle one.
-
-    Raises
-    ------
-    DiffractionError
-        If grooves have vertical walls on both sides, are undercut, or have too many edges.
     """
 
     def __init__(self, profile: Profile, harmonics: int) -> None:
@@ -75,10 +73,7 @@ class Chandezon:
     def amplitudes(self, station: Station) -> Complex:
         """Return the amplitudes between all channels; see `stations.Solver`.
 
-        Raises
-        ------
-        DiffractionError
-            If the material is a perfect conductor, or a thin sheet.
+        Raises a DiffractionError if the material is a perfect conductor, or a thin sheet.
         """
         if station.indices is None or station.thin:
             raise DiffractionError(

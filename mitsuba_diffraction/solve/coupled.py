@@ -32,17 +32,14 @@ _DIGITS = 9
 class CoupledWaves:
     """Coupled waves for one profile.
 
+    Raises a DiffractionError if the profile is undercut.
+
     Parameters
     ----------
     profile : one period of the grooves; no undercut.
     harmonics : spatial frequencies on either side of the middle one. Slopes are cut into as many
         layers.
     films : thicknesses of films on the profile, from the material upwards, along z, µm.
-
-    Raises
-    ------
-    DiffractionError
-        If the profile is undercut.
     """
 
     def __init__(self, profile: Profile, harmonics: int, films: Sequence[float] = ()) -> None:

@@ -84,11 +84,8 @@ class Variable(NamedTuple):
 def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     """Read a file of efficiencies; see the module.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, lacks a column or variable, has an unknown unit, a hole in its
-        grid, an order twice, or numbers out of range.
+    Raises a DiffractionError if the file cannot be read, lacks a column or variable, has an unknown
+    unit, a hole in its grid, an order twice, or numbers out of range.
     """
     shown = repr(os.fspath(path))
     head = read_bytes(path)[: len(_BEGINS_HDF5)]

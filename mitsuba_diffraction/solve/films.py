@@ -18,11 +18,8 @@ def films_of(
 ) -> tuple[Film, ...]:
     """Return the films of layers.
 
-    Raises
-    ------
-    DiffractionError
-        If a thickness or material is out of its range, or films lie on a perfect conductor or a
-        thin sheet.
+    Raises a DiffractionError if a thickness or material is out of its range, or films lie on a
+    perfect conductor or a thin sheet.
     """
     films = tuple(
         Film(

@@ -42,15 +42,12 @@ GRADING = 4
 class IntegralSolver:
     """Boundary integral method for one profile; the mesh is kept for all stations.
 
+    Raises a DiffractionError if gratinglab is not installed.
+
     Parameters
     ----------
     profile : one period of the grooves.
     points : nodes on the boundary.
-
-    Raises
-    ------
-    DiffractionError
-        If gratinglab is not installed.
     """
 
     def __init__(self, profile: Profile, points: int) -> None:
@@ -218,8 +215,6 @@ class _Waves:
 class _InnerWaves:
     """Plane waves within the material, on the boundary; channels are columns.
 
-    Attributes
-    ----------
     trace, normal, tangential : waves that come up from within, and their derivatives along the
         normal n and the tangent (n_y, −n_x).
     """

@@ -48,10 +48,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 class Problem:
     """Grating, solver and its resolution; `digest` identifies the grating and the solver.
 
-    Raises
-    ------
-    DiffractionError
-        If the resolution is above `MOST_RESOLUTION`.
+    Raises a DiffractionError if the resolution is above `MOST_RESOLUTION`.
     """
 
     grating: Grating = field(compare=False)
@@ -83,10 +80,7 @@ def method_for(grating: Grating) -> str:
 def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     """Return a problem with its digest.
 
-    Raises
-    ------
-    DiffractionError
-        If the method is unknown.
+    Raises a DiffractionError if the method is unknown.
     """
     if method == AUTO:
         method = method_for(grating)
@@ -141,10 +135,7 @@ def solve_place(problem: Problem, place: Place) -> Solved:
     Values are rounded as they are stored, so that a table is the same whether or not it was
     interrupted.
 
-    Raises
-    ------
-    DiffractionError
-        If the solver fails on the profile.
+    Raises a DiffractionError if the solver fails on the profile.
     """
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
@@ -194,10 +185,7 @@ class Jobs:
 
         An exception or Ctrl-C leaves finished stations in the folder.
 
-        Raises
-        ------
-        DiffractionError
-            If the folder cannot be written.
+        Raises a DiffractionError if the folder cannot be written.
         """
         files = {place: self._file(problem, place) for place in places}
         results = {place: _read(file) for place, file in files.items()}
@@ -261,10 +249,7 @@ def timed(problem: Problem, place: Place) -> float:
 def processes(count: int) -> Iterator[Executor]:
     """Yield a pool of processes with one thread of linear algebra each.
 
-    Raises
-    ------
-    DiffractionError
-        If one of them is killed.
+    Raises a DiffractionError if one of them is killed.
     """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))

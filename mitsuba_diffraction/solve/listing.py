@@ -37,10 +37,7 @@ class Listing(NamedTuple):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a CSV; numbers have 7 digits.
 
-        Raises
-        ------
-        DiffractionError
-            If the file cannot be written; no half-written file is left.
+        Raises a DiffractionError if the file cannot be written; no half-written file is left.
         """
         shares = ["%.7g"] * (len(self.columns) - 4)
         with atomic_path(Path(path)) as temporary:
@@ -60,6 +57,9 @@ def list_orders(
 ) -> Listing:
     """List the efficiencies of all propagating orders, with the conventions of `efficiencies`.
 
+    Raises a DiffractionError if an angle or wavelength is out of its range, there are over two
+    million lines, or the table has no s and p of conical light (`OrderTable.polarised_efficiency`).
+
     Parameters
     ----------
     wavelengths : in vacuum, nm, within the table's.
@@ -67,12 +67,6 @@ def list_orders(
         x towards y.
     polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
         unpolarised light.
-
-    Raises
-    ------
-    DiffractionError
-        If an angle or wavelength is out of its range, there are over two million lines, or the
-        table has no s and p of conical light (`OrderTable.polarised_efficiency`).
     """
     lights = [np.unique(np.asarray(values, np.float64)) for values in (wavelengths, theta, phi)]
     low, high = table.wavelengths

@@ -43,15 +43,13 @@ def material_of(
 ) -> Material:
     """Return a material from a name of `optics.materials`, an index, or "none" (R = 1).
 
+    Raises a DiffractionError if the name is unknown, the index impossible, or its table ends within
+    the wavelengths.
+
     Parameters
     ----------
     material : name such as "Al", number such as 1.5 or 0.6+5.6j, or their text.
     wavelengths : shortest and longest, nm, for which the index must be known.
-
-    Raises
-    ------
-    DiffractionError
-        If the name is unknown, the index impossible, or its table ends within the wavelengths.
     """
     if isinstance(material, Material):
         return material

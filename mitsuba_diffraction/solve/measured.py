@@ -73,17 +73,15 @@ def read_orders(
     With T_s and T_p the table describes a thin sheet. Its transmission from below follows from
     reciprocity; it reflects light from below as light from above, at most the remaining power.
 
+    Raises a DiffractionError if the file cannot be read, or its grid has holes; if it has orders
+    that do not propagate, lacks one that does, or has efficiencies that are negative or sum to
+    above 1.001.
+
     Parameters
     ----------
     path : long CSV, or NetCDF.
     period : µm.
     superstrate : index of the medium above, to which θ and φ belong.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or its grid has holes; if it has orders that do not propagate,
-        lacks one that does, or has efficiencies that are negative or sum to above 1.001.
     """
     header: dict[str, Any] = {
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",

@@ -97,6 +97,10 @@ def solve_orders(
 ) -> OrderTable:
     """Solve the orders of a grating for all directions and wavelengths.
 
+    Raises a DiffractionError if an argument is out of its range, the solver is not installed or
+    does not converge, or the measured error of the table is above the tolerance after two
+    refinements.
+
     Parameters
     ----------
     profile : one period of the grooves, from `solve.profiles`.
@@ -109,12 +113,6 @@ def solve_orders(
     settings : wavelengths, tolerance, method.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
-
-    Raises
-    ------
-    DiffractionError
-        If an argument is out of its range, the solver is not installed or does not converge, or the
-        measured error of the table is above the tolerance after two refinements.
     """
     if not isinstance(profile, Profile):
         raise DiffractionError(

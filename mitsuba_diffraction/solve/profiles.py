@@ -34,18 +34,15 @@ class Profile:
     It continues at (x[0] + period, z[0]), and the material lies below it. Undercut profiles, whose
     x turns back, are allowed.
 
+    Raises a DiffractionError if there are fewer than two vertices, a number is not finite, the
+    polygon does not fit into the period, crosses itself, or turns back on itself.
+
     Attributes
     ----------
     x, z : (n,) µm, from left to right; x begins at 0 or above and ends at `period` at most. Points
         beyond, of ridges that lean over the next period, are shifted by `_begun_elsewhere`.
     period : µm.
     name : for people.
-
-    Raises
-    ------
-    DiffractionError
-        If there are fewer than two vertices, a number is not finite, the polygon does not fit into
-        the period, crosses itself, or turns back on itself.
     """
 
     x: Real
@@ -174,11 +171,8 @@ GENERATORS: dict[str, Callable[..., Profile]] = {
 def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     """Read a line: CSV with two columns x and z in µm, with or without a header line.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, a line has no two numbers, or the line is no `Profile`, or less
-        than half a period.
+    Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
+    no `Profile`, or less than half a period.
     """
     rows: list[list[float]] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):

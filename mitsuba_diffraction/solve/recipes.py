@@ -66,10 +66,8 @@ class SolvedRecipe:
     def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
         """Read and check a recipe.
 
-        Raises
-        ------
-        DiffractionError
-            If the file cannot be read, is not TOML, or has a key or value that is not allowed.
+        Raises a DiffractionError if the file cannot be read, is not TOML, or has a key or value
+        that is not allowed.
         """
         file, shown = Path(path), repr(os.fspath(path))
         try:
@@ -113,10 +111,8 @@ class SolvedRecipe:
 def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -> Profile:
     """Return the profile of a generator, or of a file (CSV) whose `arguments` hold the period.
 
-    Raises
-    ------
-    DiffractionError
-        If the generator or file is unknown, or an argument is missing, unknown or out of range.
+    Raises a DiffractionError if the generator or file is unknown, or an argument is missing,
+    unknown or out of range.
     """
     names = ", ".join(GENERATORS)
     if not isinstance(name, str) or (name not in GENERATORS and "." not in name):

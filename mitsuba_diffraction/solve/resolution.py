@@ -41,10 +41,7 @@ def chosen_resolution(
 
     places : where resolutions are compared, such as `test_places`.
 
-    Raises
-    ------
-    DiffractionError
-        If it does not converge.
+    Raises a DiffractionError if it does not converge.
     """
     coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")

@@ -37,10 +37,7 @@ def check_clear(material: Material, wavelengths: tuple[float, float]) -> None:
 
     wavelengths : shortest and longest, in vacuum, nm.
 
-    Raises
-    ------
-    DiffractionError
-        If the material absorbs, or has an index below `LEAST_INDEX`.
+    Raises a DiffractionError if the material absorbs, or has an index below `LEAST_INDEX`.
     """
     index = material.index(wavelengths)
     if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:

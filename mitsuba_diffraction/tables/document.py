@@ -87,8 +87,6 @@ def _present(record: Expansion | Grid) -> dict[str, Any]:
 class TableDescription:
     """Table without its coefficients.
 
-    Attributes
-    ----------
     fields : arguments of `DiffractionTable`.
     """
 
@@ -104,10 +102,7 @@ class TableDescription:
     def table(self, coefficients: NDArray[Any]) -> DiffractionTable:
         """Return the table with its coefficients.
 
-        Raises
-        ------
-        ValueError
-            If they are not finite, or larger than any surface's.
+        Raises a ValueError if they are not finite, or larger than any surface's.
         """
         _check_sizes(coefficients, self.fields["expansion"], self.fields["scale"])
         return DiffractionTable(coefficients=coefficients, **self.fields)
@@ -116,10 +111,7 @@ class TableDescription:
 def parse_document(document: Any) -> TableDescription:
     """Read the result of `document_of`, checked field by field and against each other.
 
-    Raises
-    ------
-    ValueError
-        With the field that does not fit.
+    Raises a ValueError with the field that does not fit.
     """
     fields = _mapping(document, "the description")
     settings = _settings(fields)

@@ -40,10 +40,7 @@ _SMALL, _BEST_COMPRESSION = 1 << 26, 200
 def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     """Write an EXR file: named float channels and one JSON attribute with all the rest.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written; no half-written file is left.
+    Raises a DiffractionError if it cannot be written; no half-written file is left.
     """
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")
@@ -70,10 +67,8 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
 def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     """Read a table that `save_table` wrote.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing, no table, damaged, or of another format version.
+    Raises a DiffractionError if the file is missing, no table, damaged, or of another format
+    version.
     """
     headers = _headers(path)
     text = headers[0].get(TABLE_ATTRIBUTE)
@@ -106,10 +101,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     """Return the JSON attribute of a table's file; None for an EXR image without one.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing, a folder, or cannot be read as EXR.
+    Raises a DiffractionError if the file is missing, a folder, or cannot be read as EXR.
     """
     return _parsed(_headers(path)[0].get(TABLE_ATTRIBUTE), path)
 

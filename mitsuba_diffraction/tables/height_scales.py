@@ -21,8 +21,6 @@ _FLAT = 1e-3
 class HeightScales:
     """Height scales of a table for which something is made when asked for.
 
-    Attributes
-    ----------
     table : the table.
     """
 

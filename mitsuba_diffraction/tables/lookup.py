@@ -32,6 +32,8 @@ def window_sum(
 
     Either is ⟨|P|²⟩ / 4π²σ⁴, dimensionless, at most about `table.order_0_ratio`.
 
+    Raises a DiffractionError for a place in a table that holds no amplitudes of `patch`.
+
     Parameters
     ----------
     qx, qy : spatial frequencies k·u and k·v, rad/µm, any common shape.
@@ -43,11 +45,6 @@ def window_sum(
     -------
     Array of that shape; NaN beyond κ_max or the reach of the shortest wavelength, since a table
     never extrapolates; 0 beyond the table's `frequency_limit`.
-
-    Raises
-    ------
-    DiffractionError
-        For a place in a table that holds no amplitudes of `patch`.
     """
     coordinates = [qx, qy, kappa]
     if place is not None:

@@ -200,10 +200,7 @@ def _keep(path: Path, title: str, record: Record) -> None:
 def write_record(path: Path, title: str, record: Record) -> None:
     """Write a record in one piece: a line with title and SHA-256, JSON, and the arrays.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written.
+    Raises a DiffractionError if it cannot be written.
     """
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
     shapes = [[array.dtype.str, array.shape] for array in arrays]

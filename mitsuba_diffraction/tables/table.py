@@ -183,10 +183,7 @@ class DiffractionTable:
 
         what : names what needs them, with its verb.
 
-        Raises
-        ------
-        DiffractionError
-            If the table has a `frequency_limit`.
+        Raises a DiffractionError if the table has a `frequency_limit`.
         """
         if self.limited:
             x, y = self.frequency_limit

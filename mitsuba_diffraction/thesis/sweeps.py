@@ -103,6 +103,8 @@ def sweep(
 ) -> Sweep:
     """Evaluate a BRDF map for every value of a parameter and compare them.
 
+    Raises a DiffractionError if a name or value is not valid.
+
     Parameters
     ----------
     kind : one of `SWEEPS`.
@@ -114,11 +116,6 @@ def sweep(
     progress : called as progress(done, total, text).
     settings : parameters of `methods.make_all`; coherence is "patch" by default in a sweep over
         methods.
-
-    Raises
-    ------
-    DiffractionError
-        If a name or value is not valid.
     """
     if kind not in SWEEPS:
         raise DiffractionError(f"sweep '{kind}' is unknown; choose one of {', '.join(SWEEPS)}")
@@ -304,10 +301,7 @@ def time_compiled(
     The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or the CUDA variants
     if one is current, and leaves the spectral one set.
 
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of range or a table cannot be built.
+    Raises a DiffractionError if a parameter is out of range or a table cannot be built.
     """
     import mitsuba as mi
 

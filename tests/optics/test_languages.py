@@ -68,9 +68,10 @@ def agree(jones, expected, kernel):
         assert error < (1e-5 if kernel else 1e-12), (place, error)
     powers = np.asarray(powers, np.float64)
     want = judge.unpolarised(expected)
-    assert np.abs(powers - want).max() < (1e-3 if kernel else 1e-11) * want.max()
+    # of the largest, and of each that is not lost in the largest's rounding
+    assert np.abs(powers - want).max() < (1e-5 if kernel else 1e-12) * want.max()
     seen = want > 1e-6 * want.max()
-    assert np.abs(powers[seen] / want[seen] - 1.0).max() < (1e-3 if kernel else 1e-10)
+    assert np.abs(powers[seen] / want[seen] - 1.0).max() < (1e-3 if kernel else 1e-12)
 
 
 @pytest.fixture(params=["numpy", "kernel"])

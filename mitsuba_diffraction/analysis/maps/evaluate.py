@@ -56,6 +56,10 @@ def brdf_map(
     In an RGB variant the map has the BSDF's colours under daylight's whole spectrum: one look-up
     per direction, in the table with which such variants render.
 
+    Raises a DiffractionError if a parameter is out of range; if the variant is scalar, or neither
+    spectral nor RGB; or if it is RGB and the parameters do not describe the whole spectrum in
+    daylight.
+
     Parameters
     ----------
     bsdf : a Mitsuba BSDF of the current variant, `diffraction` or any other without textures.
@@ -69,12 +73,6 @@ def brdf_map(
     cosine : map f·cosθo instead of f.
     spectral : store the bands, too.
     progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of range; if the variant is scalar, or neither spectral nor RGB; or if
-        it is RGB and the parameters do not describe the whole spectrum in daylight.
     """
     light = Light(theta, phi)
     bands = Bands.choose(wavelength_range, step, wavelength)

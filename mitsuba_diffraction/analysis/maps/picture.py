@@ -202,15 +202,12 @@ def save_png(
 ) -> None:
     """Write a picture with axes, a title and a caption.
 
+    Raises a DiffractionError if the file cannot be written; no half-written file is left.
+
     Parameters
     ----------
     exposure : stops; by default `brdf_map.exposure()`.
     title, notes : see `figure`.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written; no half-written file is left.
     """
     with atomic_path(path) as temporary:
         figure(brdf_map, exposure, title=title, notes=notes).savefig(temporary, format="png")
@@ -226,14 +223,9 @@ def save_exr(
     Bands have the names of reflectances in spectral EXR files (Fichet, Pacanowski and Wilkie 2021):
     `T.550,0nm` is the band around 550 nm. The first row is the largest y.
 
-    Parameters
-    ----------
-    notes : further entries of the JSON attribute `brdf_map`.
+    Raises a DiffractionError if the file cannot be written; no half-written file is left.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written; no half-written file is left.
+    notes : further entries of the JSON attribute `brdf_map`.
     """
     channels = {"A": brdf_map.coverage}
     if brdf_map.xyz is None:

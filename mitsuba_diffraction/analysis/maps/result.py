@@ -28,15 +28,12 @@ _CLIPPED, _CLIPPED_FROM = 1e-3, 8.0
 class Light:
     """Direction to the light.
 
+    Raises a DiffractionError if an angle is out of range.
+
     Parameters
     ----------
     theta : degrees from the normal, 0 to below 90.
     phi : degrees from the patch's x axis towards its y axis, −360 to 360.
-
-    Raises
-    ------
-    DiffractionError
-        If an angle is out of range.
     """
 
     theta: float = 0.0
@@ -65,15 +62,13 @@ class Light:
 class Bands:
     """Range of wavelengths, divided into equal bands no wider than a step.
 
+    Raises a DiffractionError if the range is empty or the step is too small or longer than the
+    range.
+
     Parameters
     ----------
     low, high : nm, above 0; equal values are a single wavelength.
     step : nm.
-
-    Raises
-    ------
-    DiffractionError
-        If the range is empty or the step is too small or longer than the range.
     """
 
     low: float
@@ -208,8 +203,6 @@ class BrdfMap:
     def srgb(self, exposure: float) -> NDArray[np.float64]:
         """Encode f × 2^exposure in sRGB: (n, n, 4) from 0 to 1, alpha not premultiplied.
 
-        Parameters
-        ----------
         exposure : stops.
         """
         covered = np.maximum(self.coverage, np.float32(1e-6))[..., None]

@@ -116,6 +116,8 @@ def measure(
 ) -> list[Measured]:
     """Measure all settings for one patch, in the current (spectral) variant.
 
+    Raises a DiffractionError if the patch is flat, or the first table cannot be built.
+
     Parameters
     ----------
     field : the patch.
@@ -124,11 +126,6 @@ def measure(
     pairs : number of pairs of directions and wavelengths for errors.
     lanes, rounds : queries per call, and number of timed calls.
     progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If the patch is flat, or the first table cannot be built.
     """
     modes = {str(setting.arguments.get("coherence", "ensemble")) for setting in chosen}
     samples = {

@@ -46,10 +46,7 @@ def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
     The smallest of equally fast settings is chosen. Only settings of coherence `ensemble` that
     users can build are candidates.
 
-    Raises
-    ------
-    DiffractionError
-        If no measured setting stays within the budget.
+    Raises a DiffractionError if no measured setting stays within the budget.
     """
     candidates = [
         result

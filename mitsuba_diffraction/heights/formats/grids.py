@@ -31,10 +31,8 @@ def read_npy(path: Path) -> RawHeights:
     The file is memory-mapped, so that a header with too large a shape allocates nothing; pickled
     objects, which could run code, are refused.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is not NPY, is truncated, or holds anything but a real two-dimensional array.
+    Raises a DiffractionError if the file is not NPY, is truncated, or holds anything but a real
+    two-dimensional array.
     """
     shown = repr(str(path))
     try:
@@ -83,10 +81,8 @@ def read_text(path: Path) -> RawHeights:
     Three columns are x, y (µm) and height, which have to form a regular grid. With semicolons or
     tabs between numbers, a comma is a decimal comma.
 
-    Raises
-    ------
-    DiffractionError
-        If a cell is not a number, rows differ in length, or a unit is not a length.
+    Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
+    length.
     """
     shown = repr(str(path))
     try:

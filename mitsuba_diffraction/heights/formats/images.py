@@ -41,10 +41,8 @@ def read_image(path: Path) -> RawHeights:
     Eight-bit colours are read if red, green and blue are equal and no pixel is transparent. The
     image's top row is the largest y, so rows are flipped.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is not such an image, is damaged, has colours or several pages.
+    Raises a DiffractionError if the file is not such an image, is damaged, has colours or several
+    pages.
     """
     shown = repr(str(path))
     try:
@@ -116,11 +114,8 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     `channel` names one of several channels. OpenEXR decodes all channels and parts, so files of
     several parts and files that need too much memory are refused.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is not an EXR, is damaged, has no pixels, several parts, or several channels
-        while `channel` is `None`.
+    Raises a DiffractionError if the file is not an EXR, is damaged, has no pixels, several parts,
+    or several channels while `channel` is `None`.
     """
     shown = repr(str(path))
     try:

@@ -27,6 +27,10 @@ _MICROMETRE = "µm"
 def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     """Read the topography of an instrument file, in the units that the file states.
 
+    Raises a DiffractionError if SurfaceTopography is missing, the format is unknown, the file is
+    damaged, the units are unknown or not lengths, no channel holds heights, or the data is a line
+    scan or not on a uniform grid.
+
     Parameters
     ----------
     path
@@ -39,13 +43,6 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     -------
     RawHeights
         Heights in µm, rows upwards as in an image; points without data are NaN.
-
-    Raises
-    ------
-    DiffractionError
-        If SurfaceTopography is missing, the format is unknown, the file is damaged, the units are
-        unknown or not lengths, no channel holds heights, or the data is a line scan or not on a
-        uniform grid.
     """
     shown = repr(str(path))
     with warnings.catch_warnings():

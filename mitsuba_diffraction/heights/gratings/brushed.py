@@ -24,6 +24,8 @@ def brushed(
     Heights are white noise blurred by Gaussians of the widths `width` and `length`. With a period
     two such fields modulate a cosine and a sine along x, which makes a band of spatial frequencies.
 
+    Raises a DiffractionError if a parameter is out of its range.
+
     Parameters
     ----------
     extent
@@ -39,11 +41,6 @@ def brushed(
         which lines keep step; and the length of a line.
     period
         Mean distance of lines, µm, adjusted so that whole numbers of them fit; None for no period.
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of its range.
     """
     size = length_pair(extent, "brushed: extent", 4.0, 500.0)
     nx, ny = count_pair(pixels, "brushed: pixels", 8, 8192)

@@ -70,6 +70,8 @@ def cd(
 ) -> HeightField:
     """Generate a patch of a pressed compact disc: tracks along x, colours spread along y.
 
+    Raises a DiffractionError if a parameter is out of its range.
+
     Parameters
     ----------
     extent
@@ -87,11 +89,6 @@ def cd(
     irregularity
         Factor of the jitter of pits' ends, the wander of tracks and the roughness; 1 is a good
         disc, 0 a perfect one.
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of its range.
     """
     return _disc(CD, extent, pixels, seed, depth, track_pitch, irregularity)
 

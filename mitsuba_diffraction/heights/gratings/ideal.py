@@ -35,6 +35,9 @@ def sinusoidal(
 ) -> HeightField:
     """Generate a sinusoidal grating of height depth/2·(1 + cos(2πx/period)).
 
+    Raises a DiffractionError if a length is not positive, a count not a whole number, or the patch
+    too large.
+
     Parameters
     ----------
     period
@@ -49,11 +52,6 @@ def sinusoidal(
         Samples per period; pixels are square.
     rows
         Samples along the grooves; by default the patch is square.
-
-    Raises
-    ------
-    DiffractionError
-        If a length is not positive, a count not a whole number, or the patch too large.
     """
     n = _samples(pixels_per_period, "sinusoidal")
     profile = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(n) / n)

@@ -108,6 +108,8 @@ def elaphe_like(
     along y and point to +y, upwards in an image of the patch. A finger's crest is 0.065 to 0.13 µm
     above the floor beside it; the whole patch spans some 0.35 µm.
 
+    Raises a DiffractionError if a parameter is out of its range.
+
     Parameters
     ----------
     extent
@@ -129,11 +131,6 @@ def elaphe_like(
         Frayed edges, streaks, pores and noise; 1 as measured, 0 none.
     dirt
         Number of beads, crumbs, flakes and scratches; 1 as measured, 0 none.
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of its range.
     """
     amounts = (irregularity, bending, roughness, dirt)
     return _patch(ELAPHE, extent, pixels, seed, depth, amounts)

@@ -45,10 +45,7 @@ class Parameters:
 def read_parameters(props: Properties) -> Parameters:
     """Read and check everything, and load the table.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the choices.
+    Raises a DiffractionError with the parameter, its value and the choices.
     """
     nested = nested_of(props, ORDERS)
     table = _table(props)

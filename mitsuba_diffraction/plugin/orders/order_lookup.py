@@ -82,12 +82,8 @@ class Drawn(NamedTuple):
 class OrderLookup:
     """Rows of efficiencies for directions in the patch's frame and wavelengths.
 
-    Parameters
-    ----------
     table : the table; its superstrate is a coat with a flat face.
 
-    Attributes
-    ----------
     index : of the superstrate.
     """
 

@@ -79,10 +79,7 @@ def _requested(ctx: Context, passed: Mask) -> Mask:
 def diffraction_orders(props: Properties) -> DiffractionOrders:
     """Return the BSDF of the plugin: a sheet if the table has one.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the choices.
+    Raises a DiffractionError with the parameter, its value and the choices.
     """
     read = read_parameters(props)
     return (OrdersSheet if read.table.thin else DiffractionOrders)(props, read)

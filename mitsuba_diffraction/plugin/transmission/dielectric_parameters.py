@@ -50,10 +50,7 @@ class Parameters:
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     """Read and check everything, and get the table: loaded, or from `provider`.
 
-    Raises
-    ------
-    DiffractionError
-        With the parameter, its value and the choices.
+    Raises a DiffractionError with the parameter, its value and the choices.
     """
     nested = nested_of(props, TRANSMITTING)
     asked = {} if nested is None else {"nested": f"the nested BSDF {kind_of(nested)}"}

@@ -112,17 +112,14 @@ class Shader:
 def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     """Build the shader of a surface.
 
+    Raises a DiffractionError if the BSDF does not diffract or has features that the shaders lack, a
+    method is unknown, or a method does not support the table.
+
     Parameters
     ----------
     bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`; the base
         beneath it and its orientation are left to the program that draws.
     methods : methods of `EXPORTED`, each at most once.
-
-    Raises
-    ------
-    DiffractionError
-        If the BSDF does not diffract or has features that the shaders lack, a method is unknown, or
-        a method does not support the table.
     """
     described = SHADER.described(bsdf)
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
@@ -151,10 +148,7 @@ def export_shader(
 
     The folder is created if it does not exist; existing files are replaced.
 
-    Raises
-    ------
-    DiffractionError
-        As in `make_shader`, or if the folder cannot be written.
+    Raises a DiffractionError as `make_shader` does, or if the folder cannot be written.
     """
     folder = Path(folder)
     try:

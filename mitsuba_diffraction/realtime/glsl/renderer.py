@@ -43,18 +43,15 @@ class Renderer:
     has all emitters, shadows and the lens. Light between surfaces is left out. Unsupported parts of
     the scene are listed in a warning, and in `scene.omissions`.
 
+    Raises a DiffractionError if OpenGL 3.3 is missing, nothing diffracts, the camera is not a
+    perspective one, or the view is unknown.
+
     Parameters
     ----------
     scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
     context : a moderngl context; by default one without a window, through EGL.
     view : view of pictures for a screen, one of `optics.display.VIEWS`.
-
-    Raises
-    ------
-    DiffractionError
-        If OpenGL 3.3 is missing, nothing diffracts, the camera is not a perspective one, or the
-        view is unknown.
     """
 
     def __init__(
@@ -189,6 +186,8 @@ class Renderer:
     ) -> ProgressiveLight:
         """Return a picture that accumulates frames of all direct light with shadows.
 
+        Raises a DiffractionError if no emitter lights the scene, or as of `prepared`.
+
         Parameters
         ----------
         method : one of `source.METHODS`.
@@ -196,11 +195,6 @@ class Renderer:
         camera : by default the scene's camera.
         lights : lights to draw instead of the scene's emitters.
         shadow_size : texels a side of a shadow map.
-
-        Raises
-        ------
-        DiffractionError
-            If no emitter lights the scene, or as of `prepared`.
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
@@ -305,10 +299,7 @@ class Renderer:
     def prepared(self, method: str) -> Prepared:
         """Return a method's tables and programs, uploaded at the first call.
 
-        Raises
-        ------
-        DiffractionError
-            If the method is unknown, or does not support a table.
+        Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._methods:
             self._methods[method] = Prepared(

@@ -49,15 +49,12 @@ def exposure_of(reference: Image) -> float:
 def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.float32]:
     """Return the error by FLIP, 0 to 1, (height, width).
 
+    Raises a DiffractionError if flip-evaluator is not installed.
+
     Parameters
     ----------
     reference, other : (height, width, 3) linear sRGB.
     exposure : factor on both pictures.
-
-    Raises
-    ------
-    DiffractionError
-        If flip-evaluator is not installed.
     """
     flip_evaluator = optional("flip_evaluator")
     encoded = [

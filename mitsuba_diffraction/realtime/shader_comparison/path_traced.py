@@ -170,8 +170,6 @@ def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
 class PathTracing:
     """Path-traced direct light of a scene under some lights (`with_lights`), pass by pass.
 
-    Parameters
-    ----------
     spp : samples per pixel in all passes.
     """
 

@@ -41,6 +41,8 @@ def write_sheet(
 ) -> None:
     """Write a sheet: both pictures, their difference, and full transport.
 
+    Raises a DiffractionError if the file cannot be written.
+
     Parameters
     ----------
     path : image file.
@@ -50,11 +52,6 @@ def write_sheet(
     errors : difference over the compared pixels.
     compared : compared pixels; the map is pale elsewhere. None for all.
     exposure : factor on all pictures.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -90,8 +87,6 @@ def write_sheet(
 def markdown(document: dict[str, Any]) -> str:
     """Return the methods' tables over all pixels and under points and directions, with notes.
 
-    Parameters
-    ----------
     document : content of compare.json.
     """
     methods = document["methods"]

@@ -44,6 +44,9 @@ class SameLights:
     Both renderers replace lights with an extent by points and directions: the sun of a sky by its
     direction. The rest of the sky is left out of both.
 
+    Raises a DiffractionError if the scene has no light with a direction or position, or as of
+    `glsl.Renderer`.
+
     Parameters
     ----------
     scene : a `mi.Scene` of the current variant, or an XML file.
@@ -54,11 +57,6 @@ class SameLights:
     ----------
     renderer : renderer by shaders.
     scene : scene for the path tracer; its one sensor averages evenly over each pixel.
-
-    Raises
-    ------
-    DiffractionError
-        If the scene has no light with a direction or position, or as of `glsl.Renderer`.
     """
 
     def __init__(self, scene: Any, *, sensor: int = 0, name: str = "the scene") -> None:
@@ -156,8 +154,6 @@ class Comparison:
     def run(self, methods: Sequence[str], *, leave_out: bool = False) -> dict[str, Any]:
         """Draw with these methods of the shaders, path-trace, and measure.
 
-        Parameters
-        ----------
         leave_out : warn of methods that do not support the surfaces, instead of raising errors.
 
         Raises

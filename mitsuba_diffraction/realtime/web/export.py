@@ -86,6 +86,9 @@ def make_page(
 ) -> Page:
     """Build the page of a scene.
 
+    Raises a DiffractionError if nothing in the scene diffracts, a method or the view is unknown, or
+    the page would be too large.
+
     Parameters
     ----------
     scene : a `mi.Scene` of the current variant, or an XML file.
@@ -95,12 +98,6 @@ def make_page(
     sensor : index of the camera.
     view : view of the page's picture, one of `optics.display.VIEWS`.
     progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If nothing in the scene diffracts, a method or the view is unknown, or the page would
-        be too large.
     """
     unknown = [method for method in methods if method not in WEB_METHODS]
     if unknown or not methods or len(set(methods)) < len(methods):

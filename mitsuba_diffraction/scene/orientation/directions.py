@@ -171,6 +171,9 @@ def direction_field(
 ) -> DirectionField:
     """A smooth field of tangent directions.
 
+    Raises a DiffractionError if `along` or `smoothing` is not one of these, or the mesh has no area
+    or is not finite.
+
     Parameters
     ----------
     positions, normals : (n, 3); vertices at one place are one, so seams of textures do not matter.
@@ -179,11 +182,6 @@ def direction_field(
         `smooth`: the field that turns least. `x`, `y`, `z`: that axis, laid onto the surface.
         `body`: from one end of each part to the other, the way a current flows from tip to tip.
     smoothing : distance within which a field may leave its guide, as a share of the mesh's size.
-
-    Raises
-    ------
-    DiffractionError
-        If `along` or `smoothing` is not one of these, or the mesh has no area or is not finite.
     """
     if along not in GUIDES:
         raise DiffractionError(f"along={along!r} is unknown; choose one of {', '.join(GUIDES)}")

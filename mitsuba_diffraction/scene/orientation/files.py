@@ -44,10 +44,7 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons. Normals of an OBJ
     file are rebuilt, with a warning, if one has length 0.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or is not a mesh of these kinds.
+    Raises a DiffractionError if the file cannot be read, or is not a mesh of these kinds.
     """
     file = Path(path)
     kind = KINDS.get(file.suffix.lower())
@@ -129,10 +126,7 @@ def write_ply(
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
     Mitsuba 3.9 reads attributes of one or three channels and ignores attributes of two.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
+    Raises a DiffractionError if the file cannot be written.
     """
     blocks = {"x y z": mesh.positions, "nx ny nz": mesh.normals}
     if with_uv:

@@ -215,6 +215,9 @@ def build_table(
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
 
+    Raises a DiffractionError if a parameter is out of range, or the tolerance cannot be met: the
+    text names the error to expect and what would meet it.
+
     Parameters
     ----------
     heights : the patch, which tiles the plane; or several of one size, whose powers are
@@ -222,12 +225,6 @@ def build_table(
     coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
     frequency_limit, windows, second_order : see `settings.TableSettings`.
     progress : called as progress(done, total, text) while it works.
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of range, or the tolerance cannot be met: the text names the
-        error to expect and what would meet it.
     """
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,

@@ -68,10 +68,7 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
 
     extent : µm, along x and y.
 
-    Raises
-    ------
-    DiffractionError
-        If no table of such a patch could be rendered with.
+    Raises a DiffractionError if no table of such a patch could be rendered with.
     """
     width = settings.width
     # The longer side: a grating is a few pixels high, and constant along them

@@ -250,10 +250,7 @@ def windows_of(
 
     run : what does their work.
 
-    Raises
-    ------
-    DiffractionError
-        If their powers cannot be averaged.
+    Raises a DiffractionError if their powers cannot be averaged.
     """
     if settings.windows is None or not scans:
         return scans

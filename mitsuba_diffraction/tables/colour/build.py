@@ -243,8 +243,6 @@ def _run(used: NDArray[np.bool_]) -> slice:
 class _Source:
     """Window sums of a table's series in κ at any spatial frequency, without order 0.
 
-    Attributes
-    ----------
     expansion : the series of the *power* in κ, whatever the table stores.
     """
 

@@ -42,10 +42,7 @@ _AGAIN = "solve it again with solve_orders"
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
     """Write a NetCDF file; efficiencies are rounded to 1/30000 of the incident light.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written; no half-written file is left.
+    Raises a DiffractionError if it cannot be written; no half-written file is left.
     """
     if Path(path).suffix.lower() != SUFFIX:
         raise DiffractionError(
@@ -97,10 +94,8 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     """Read a file that `save_orders` wrote.
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing, no table of orders, damaged, or of another version.
+    Raises a DiffractionError if the file is missing, no table of orders, damaged, or of another
+    version.
     """
     data = read_bytes(path)
     if kind_of(path) is not FileKind.ORDERS:

@@ -33,6 +33,8 @@ def efficiency(
 ) -> Array:
     """Return the efficiency of an order for unpolarised light, from the table's polynomials.
 
+    Raises a DiffractionError if light below is asked for, and the table is not of a sheet.
+
     Parameters
     ----------
     x, y : direction cosines within the superstrate of the mirror direction of the incident
@@ -46,11 +48,6 @@ def efficiency(
     Returns
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
-
-    Raises
-    ------
-    DiffractionError
-        If light below is asked for, and the table is not of a sheet.
     """
     light = (table, x, y, wavelength, order, from_below, transmitted)
     return np.asarray(_stored(*light).mean(axis=-1))
@@ -70,11 +67,9 @@ def polarised_efficiency(
 
     s light has its E across the plane of incidence. Other arguments as for `efficiency`.
 
-    Raises
-    ------
-    DiffractionError
-        Off the planes across and along the grooves, where s and p are coherent sums of the table's
-        components, if a solved table has no Mueller matrices; or as for `efficiency`.
+    Raises a DiffractionError off the planes across and along the grooves, where s and p are
+    coherent sums of the table's components, if a solved table has no Mueller matrices; or as
+    `efficiency` does.
     """
     stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
     if table.components == S_AND_P:
@@ -110,11 +105,8 @@ def groove_efficiency(
     As far as it can: see the axes of `polarised`. In the plane across the grooves they are s and p
     (TE and TM). Other arguments as for `efficiency`.
 
-    Raises
-    ------
-    DiffractionError
-        For conical light, if the table is imported from efficiencies of s and p; or as for
-        `efficiency`.
+    Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
+    p; or as for `efficiency`.
     """
     stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
     if table.components == GROOVES:
@@ -173,10 +165,7 @@ def mueller(
 
     M₀₀ is `efficiency`. Arguments as for `efficiency`.
 
-    Raises
-    ------
-    DiffractionError
-        If the table has no Mueller matrices.
+    Raises a DiffractionError if the table has no Mueller matrices.
     """
     if not table.polarised:
         raise DiffractionError(

@@ -68,10 +68,7 @@ class Band:
     def kind(self, kind: int) -> NDArray[np.float32]:
         """Return the efficiencies of a kind, `cells.A` or `cells.B`.
 
-        Raises
-        ------
-        DiffractionError
-            For kind B of band 0, which has no directions.
+        Raises a DiffractionError for kind B of band 0, which has no directions.
         """
         if kind == B and self.b is None:
             raise DiffractionError("kind B of band 0 has no propagating order; ask for kind A")
@@ -97,6 +94,9 @@ class OrderTable:
     x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
     are defined in `cells`.
 
+    Raises a DiffractionError if sizes do not fit, or numbers are not efficiencies: negative, not
+    finite, or of a sum over orders above 1.001.
+
     Attributes
     ----------
     period : µm.
@@ -112,12 +112,6 @@ class OrderTable:
     thin : whether the profile is the upper side of a thin sheet, whose lower side is flat. The
         table then has the light on both sides, at the ports of `cells`.
     components : of the incident light that efficiencies belong to: `GROOVES`, or `S_AND_P`.
-
-    Raises
-    ------
-    DiffractionError
-        If sizes do not fit, or numbers are not efficiencies: negative, not finite, or of a sum over
-        orders above 1.001.
     """
 
     period: float
@@ -282,10 +276,7 @@ def check_outline(
 ) -> None:
     """Refuse a period, wavelengths or index of which there can be no table.
 
-    Raises
-    ------
-    DiffractionError
-        With the allowed values.
+    Raises a DiffractionError with the allowed values.
     """
     if not PERIODS[0] <= period <= PERIODS[1]:  # also refuses NaN
         raise DiffractionError(f"period={period:g} µm must be {PERIODS[0]:g} to {PERIODS[1]:g} µm")

@@ -88,6 +88,9 @@ def make_all(
 ) -> dict[str, Method]:
     """Build methods by name, for one patch, with shared tables.
 
+    Raises a DiffractionError if a name is unknown, a parameter is not valid, a table cannot be
+    built, or the patch has no period and the method needs one.
+
     Parameters
     ----------
     names : names of `NAMES`.
@@ -95,12 +98,6 @@ def make_all(
     progress : called as progress(done, total, text) while tables are built.
     build : function to call instead of `DiffractionTable.build`, for instance with a cache.
     settings : fields of `MethodSettings`.
-
-    Raises
-    ------
-    DiffractionError
-        If a name is unknown, a parameter is not valid, a table cannot be built, or the patch has no
-        period and the method needs one.
     """
     for name in names:
         if name not in NAMES:
@@ -208,6 +205,9 @@ def method_map(
 ) -> BrdfMap:
     """Evaluate a method's BRDF for one light direction over the hemisphere of view directions.
 
+    Raises a DiffractionError if a parameter is out of range, or the method has no relative
+    reflectance.
+
     Parameters
     ----------
     method : method, which sums over its wavelengths under D65.
@@ -220,11 +220,6 @@ def method_map(
     cosine : map f·cosθo instead of f.
     gain : map the thesis' relative reflectance with this gain factor instead of f.
     progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of range, or the method has no relative reflectance.
     """
     hemisphere.check_resolution(resolution)
     hemisphere.check_samples(samples)

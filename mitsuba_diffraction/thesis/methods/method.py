@@ -47,15 +47,12 @@ _PAIRS = 4096  # direction pairs that a thread evaluates at a time
 class Gain:
     """Gain factor C of the thesis' relative reflectance.
 
+    Raises a DiffractionError if a parameter is out of range.
+
     Parameters
     ----------
     int_ior : index of refraction of the material against air, above 1; 1.5 for shed snake skin.
     shadowing : "vcavity", as in the thesis, or "none".
-
-    Raises
-    ------
-    DiffractionError
-        If a parameter is out of range.
     """
 
     int_ior: float = 1.5
@@ -247,8 +244,6 @@ class Method(ABC):
 class UniformMethod(Method):
     """Method that sums over one uniform grid of wavelengths for all pairs.
 
-    Attributes
-    ----------
     wavelengths, weights : nodes and weights of the trapezoidal rule, (n,), nm.
     """
 
@@ -274,10 +269,8 @@ def trapezoid_rule(
 
     The last interval may be shorter than `step`.
 
-    Raises
-    ------
-    DiffractionError
-        If the range is empty or the step is too small or longer than the range.
+    Raises a DiffractionError if the range is empty or the step is too small or longer than the
+    range.
     """
     low, high = wavelength_range
     if not (0.0 < low < high < np.inf):
@@ -325,16 +318,14 @@ class FullSpectrum(UniformMethod):
 
     `default` reads |a_j|² (or a_j) from the series in κ of `tables.expansion` instead.
 
+    Raises a DiffractionError if the step is longer than the range, or the range begins below the
+    table's.
+
     Parameters
     ----------
     name : name in messages.
     table : series of S, over at least the wavelength range.
     wavelength_range, step : nm.
-
-    Raises
-    ------
-    DiffractionError
-        If the step is longer than the range, or the range begins below the table's.
     """
 
     def __init__(

@@ -33,8 +33,6 @@ def draw(
 ) -> ScalarMappable:
     """Draw a response, its ridge if any, and the grating equation for a period in µm if any.
 
-    Parameters
-    ----------
     largest : 1/sr, value of the brightest colour; by default the maximum of the response.
 
     Returns

@@ -98,10 +98,8 @@ def measure(
 ) -> Response:
     """Evaluate a BRDF for every wavelength (nm) at every viewing angle (degrees).
 
-    Raises
-    ------
-    DiffractionError
-        If there are too few or too many wavelengths or angles, or an angle is beyond ±90°.
+    Raises a DiffractionError if there are too few or too many wavelengths or angles, or an angle is
+    beyond ±90°.
     """
     check_axes(wavelengths, angles)
     views = beam.views(angles)
@@ -177,10 +175,7 @@ def ridge_of(
     brightest remaining sample is the maximum; a parabola through the logarithms of three neighbours
     refines it, which is exact for a Gaussian lobe. Maxima at the end of the range do not count.
 
-    Raises
-    ------
-    DiffractionError
-        If `order` is 0.
+    Raises a DiffractionError if `order` is 0.
     """
     u = _frequencies(response, order)
     lobe = _ORDER_0 / (response.sigma * wavenumber(response.wavelengths))[:, None]
@@ -217,16 +212,11 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     wavelengths at each u/λ. The ridge is the u/λ with the largest share of the light on the order's
     side, among those whose lobe is brighter than its surroundings.
 
-    Parameters
-    ----------
+    Raises a DiffractionError if `order` is 0.
+
     expected : periods in µm along the plane of incidence that the heights hold, as
         `heights.spectra.dominant_periods` finds them. The light alone does not tell: the few orders
         of a small rough patch obey the equation, too, and one of them is the brightest.
-
-    Raises
-    ------
-    DiffractionError
-        If `order` is 0.
     """
     u = _frequencies(response, order)
     wavelengths = response.wavelengths * 1e-3
@@ -298,10 +288,7 @@ def fit_period(ridge: Ridge) -> Fit:
     The fit is by least squares in u, soft L1 beyond the width of a lobe, since the ridge of an
     irregular patch may jump between speckles at some wavelengths.
 
-    Raises
-    ------
-    DiffractionError
-        If there are fewer than `FEWEST` maxima.
+    Raises a DiffractionError if there are fewer than `FEWEST` maxima.
     """
     fitted = ridge.has_maximum
     response = ridge.response

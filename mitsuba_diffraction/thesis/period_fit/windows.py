@@ -69,15 +69,12 @@ def window_fits(
 ) -> WindowFits:
     """Fit a period to each of `count` windows, spread over the patch with one offset (fixed seed).
 
+    Raises a DiffractionError if `count` is out of range, or no window gives a period.
+
     Parameters
     ----------
     table : table with coherence="patch".
     period : µm; ridges are searched at periods up to 1.5 times larger or smaller.
-
-    Raises
-    ------
-    DiffractionError
-        If `count` is out of range, or no window gives a period.
     """
     if not 1 <= count <= MOST_WINDOWS:
         raise DiffractionError(f"windows={count} must be from 1 to {MOST_WINDOWS}")
