@@ -53,7 +53,7 @@ def _integrator() -> type[Any]:
         ) -> Any:
             spectrum, valid, others = self.nested.sample(scene, sampler, ray, medium, active)
             largest = dr.max(mi.unpolarized_spectrum(spectrum))
-            scale = dr.select(largest > self.limit, self.limit / largest, 1.0)
+            scale = self.limit / dr.maximum(largest, self.limit)
             return spectrum * scale, valid, others
 
         def aov_names(self) -> Any:

@@ -12,15 +12,17 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.additions import CLAMP
 from mitsuba_diffraction.scene.load import load_scene
 
-# Two halves of a wall that shine: 0.5 on the left, 4 on the right.
+# Two halves of a wall that shine: 0.5 on the left, 4 on the right. 8 pixels see their 4 m; above
+# and below the left half is darkness.
 SCENE = """<scene version="3.0.0">
     <integrator type="{integrator}"/>
-    <sensor type="perspective"><transform name="to_world"><translate z="-4"/></transform>
+    <sensor type="perspective"><float name="fov" value="53.130102"/>
+        <transform name="to_world"><translate z="-4"/></transform>
         <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="4"/>
             <rfilter type="box"/></film>
         <sampler type="independent"><integer name="sample_count" value="4"/></sampler></sensor>
     <shape type="rectangle"><transform name="to_world"><rotate y="1" angle="180"/>
-        <translate x="1"/></transform>
+        <translate x="1"/><scale y="0.5"/></transform>
         <emitter type="area"><rgb name="radiance" value="0.5"/></emitter></shape>
     <shape type="rectangle"><transform name="to_world"><rotate y="1" angle="180"/>
         <translate x="-1"/></transform>
@@ -41,6 +43,7 @@ def test_bright_samples_keep_their_colour_and_others_are_as_they_were(scene):
     )
     bright = whole.max(axis=-1) > 2
     assert 0 < bright.sum() < bright.size
+    assert (whole == 0).any()
     assert limited[~bright] == pytest.approx(whole[~bright])
     assert limited[bright] == pytest.approx(whole[bright] / 2)  # 4, 2, 1 becomes 2, 1, 0.5
 

@@ -21,15 +21,18 @@ def small_clone(folder: Path) -> Path:
         for name, value in SMALL.items():
             text = re.sub(f'(<default name="{name}" value=)"[^"]*"', rf'\1"{value}"', text)
         (folder / "scenes" / scene.name).write_text(text, encoding="utf-8")
-    (folder / "precompute").mkdir()
+    (folder / "precompute" / "looks").mkdir(parents=True)
     (folder / "precompute" / "orders").symlink_to(ROOT / "precompute" / "orders")
-    for recipe in (ROOT / "precompute").glob("*.toml"):
+    for recipe in [*ROOT.glob("precompute/*.toml"), *ROOT.glob("precompute/looks/*.toml")]:
         text = recipe.read_text(encoding="utf-8")
         if recipe.stem.endswith("_like"):  # a coarser and smaller patch of its kind
             text = re.sub(r"extent = .*", "extent = 4.0", text)
             text = re.sub(r"pixels = .*", "pixels = 80", text)
             text = f"coherence_width = 4.0\n{text}"
+        elif recipe.parent.name == "looks":  # coarser
+            text = re.sub(r"pixels = .*\n", "", text)
+            text = f"coherence_width = 4.0\n{text}pixels = 96\n"
         elif recipe.stem == "blazed":
             text = f"{text}periods = 4\nrows = 16\n"
-        (folder / "precompute" / recipe.name).write_text(text, encoding="utf-8")
+        (folder / recipe.relative_to(ROOT)).write_text(text, encoding="utf-8")
     return folder

@@ -7,12 +7,15 @@ import gc
 import shutil
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.plugin.dictionary import ORDERS
+from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
 from tests.support.clone import small_clone
 from tests.support.instruments import nanoscope
@@ -68,7 +71,8 @@ def run(words: list[str]) -> None:
     """Run a command, smaller than it stands there."""
     gc.collect()  # as in a process of its own, without the BSDFs of the command before
     if words[1] == "-m":
-        assert make_mesh(words[3:]) == 0
+        coarse = ["--detail", "1"] if "snake" in words else []
+        assert make_mesh([*words[3:], *coarse]) == 0
         return
     _, command, *rest = words
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
@@ -77,8 +81,11 @@ def run(words: list[str]) -> None:
     for option in {"--workers", "--jobs"} & set(rest):  # tests/cluster starts processes
         at = rest.index(option)
         del rest[at : at + 2]
-    if command == "render" and "--patch" in rest:  # on the package's own stage
-        rest += ["-D", "resx=24", "-D", "resy=20"]
+    if command == "render" and not rest[0].endswith(".xml"):  # on the package's own stage
+        rest += ["-D", "resx=12", "-D", "resy=10"]
+    if "--preset" in rest and command in ("render", "export-viewer"):
+        at = rest.index("--preset") + 1
+        rest[at] = small_look(rest[at])
     if command == "render" and "--frames" in rest:
         rest += ["--frames", "2"]
     assert main([command, *rest]) == 0, words
@@ -100,8 +107,18 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if any(word.startswith("--theta") for word in rest) and command == "solve":
         return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
+    if "--preset" in rest and command in ("brdf-map", "export-osl"):
+        small = [*small, "--coherence-width", "4", "--tolerance", "0.05"]
     # a sheet has a material that light goes through
     return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
+
+
+def small_look(value: str) -> str:
+    """Value of --preset, with the small tree's patch of that name."""
+    look = find_preset(value.partition(",")[0].rpartition("=")[2])
+    if look.plugin == ORDERS:
+        return value
+    return f"{value},heightfield={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
 
 
 def without_size(rest: list[str]) -> list[str]:
@@ -132,6 +149,8 @@ def small_tree(folder: Path) -> Path:
         shutil.copy(folder / "scan.spm", folder / name)
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
+    Image.fromarray(grey).save(folder / "cow.png")
+    mi.Bitmap(np.full((4, 8, 3), 0.4, np.float32)).write(str(folder / "sky.hdr"))
     (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
