@@ -31,7 +31,7 @@ def small_clone(folder: Path) -> Path:
             text = f"coherence_width = 4.0\n{text}"
         elif recipe.parent.name == "looks":  # coarser
             text = re.sub(r"pixels = .*\n", "", text)
-            text = f"coherence_width = 4.0\n{text}pixels = 96\n"
+            text = f"coherence_width = 4.0\n{text}pixels = 160\n"
         elif recipe.stem == "blazed":
             text = f"{text}periods = 4\nrows = 16\n"
         (folder / recipe.relative_to(ROOT)).write_text(text, encoding="utf-8")
