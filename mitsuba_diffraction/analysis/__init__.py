@@ -2,6 +2,7 @@
 
 Contents
 --------
+export         files of a BRDF for other programs
 maps           BRDF maps over the hemisphere of view directions
 spectra        reflectance spectra as a spectrometer measures them
 spectra_files  CSV, colours and plot of spectra

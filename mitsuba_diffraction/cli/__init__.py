@@ -22,6 +22,7 @@ evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
+export_bsdf            a surface's BRDF for other programs
 export_osl             a surface as a shader for Blender's Cycles
 options                options that several commands share, declared once, and their types
 scene_options          the scene, its parameters and materials; a mesh on a stage

@@ -21,6 +21,7 @@ from ..streams import own_program
 from . import (
     brdf_map,
     evaluate,
+    export_bsdf,
     export_osl,
     info,
     orders,
@@ -56,7 +57,7 @@ COMMANDS = (
     brdf_map.add_parser, spectrum.add_parser,
     evaluate.add_parser, survey.add_parser, sweep.add_parser, tradeoff.add_parser,
     realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,
-    export_osl.add_parser,
+    export_osl.add_parser, export_bsdf.add_parser,
 )  # fmt: skip
 
 FAILED = 1

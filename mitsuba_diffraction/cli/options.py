@@ -364,6 +364,11 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
         raise DiffractionError(
             f"'{source}' is a table; this needs the heights it was made of, or their recipe"
         )
+    if kind_of(source) is FileKind.ORDERS:
+        raise DiffractionError(
+            f"'{source}' has solved orders, which leave where the grating equation says, and no "
+            "heights; 'mitsuba-diffraction orders', 'spectrum' and 'brdf-map' show it"
+        )
     settings = table_options(args)
     if kind_of(source) is FileKind.RECIPE:
         recipe = Recipe.load(source)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, warn
-from ..files import read_text
+from ..files import FileKind, kind_of, read_text
 from ..heights.lengths import number_between
 
 Real = NDArray[np.float64]
@@ -174,6 +174,11 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
     no `Profile`, or less than half a period.
     """
+    if (kind := kind_of(path)) in (FileKind.IMAGE, FileKind.EXR, FileKind.NPY, FileKind.JPEG):
+        raise DiffractionError(
+            f"'{path}' ({kind}): expected one period of a line, CSV of x, z in µm; heights over "
+            "an area (crossed gratings) are not solved: render them with the BSDF 'diffraction'"
+        )
     rows: list[list[float]] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):
         text = line.partition("#")[0].strip()

@@ -103,6 +103,7 @@ class SolvedRecipe:
                 _flag(content, "thin"),
                 _settings(content),
                 path_within(file, output),
+                _layers(content.get("layers", [])),
             )
         except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error

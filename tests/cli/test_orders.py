@@ -45,3 +45,16 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
     assert 420 <= first < last <= 680
     refused = run("spectrum", "grating.nc", "--wavelength-range", 300, 400)
     assert "420 to 680 nm" in refused.err
+
+
+def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    thin_grating(0.6, counts=(2, 2, 1)).save("grating.nc")
+    grid = ("--theta", "0,40", "--phi", 0, "--wavelength", 550, "--resolution", 8)
+    assert run("export-bsdf", "grating.nc", *grid, "--format", "zemax").code == 0
+    assert run("export-bsdf", "grating.nc", *grid, "-o", "grating.brdf").code == 0
+    assert (tmp_path / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
+    assert json.loads((tmp_path / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
+    refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
+    assert ".json or .brdf" in refused.err
+    assert "no heights" in run("evaluate", "grating.nc").err

@@ -20,7 +20,7 @@ from mitsuba_diffraction.tables.orders import OrderTable
 RECIPE = {
     "method": '"solved"', "profile": '"blazed"', "material": '"Al"', "superstrate": "1.5",
     "wavelengths": "[400, 700]", "tolerance": "0.02", "solver": '"coupled"', "resolution": "20",
-    "output": '"groove.nc"',
+    "output": '"groove.nc"', "layers": '[["SiO2", 0.1], ["2.3", 0.05]]',
 }  # fmt: skip
 ARGUMENTS = {"period": "1.2", "depth": "0.2", "direction": '"ascending"'}
 #: TOML of values that hardly fit.
@@ -41,6 +41,7 @@ def test_a_recipe_is_read(tmp_path):
     file.write_text(text_of(RECIPE, ARGUMENTS))
     recipe = SolvedRecipe.load(file)
     assert (recipe.profile.period, recipe.superstrate) == (1.2, 1.5)
+    assert recipe.layers == (("SiO2", 0.1), ("2.3", 0.05))
     assert recipe.settings.wavelengths == (400.0, 700.0)
     assert recipe.output == tmp_path / "groove.nc"
 

@@ -1,0 +1,90 @@
+"""RGL's tensors of a BRDF, which Mitsuba's BSDF `measured` reads (Dupuy and Jakob 2018, ACM
+Transactions on Graphics 37, 274; layout: Mitsuba's src/core/tensor.cpp and src/bsdfs/measured.cpp).
+
+f cosθo is stored over the half vector m, at u = √(2θ_m/π) and v = (φ_m + π)/2π, for some directions
+to the light. Without `jacobian` and with an even `vndf` the tensors are f cosθo itself.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...atomic import atomic_path
+from ...progress import Progress, silent
+from .cells import Grid, Sample, means, polar
+
+#: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
+DEFAULT = Grid(
+    np.arange(0.0, 86.0, 8.5), np.linspace(-180.0, 180.0, 25), np.arange(360.0, 831.0, 20.0), 64
+)
+# Numbers of Mitsuba's `Struct::Type`.
+_TYPES = {"uint8": 1, "float32": 10}
+
+
+def save_rgl(
+    bsdf: Any, path: Path, grid: Grid = DEFAULT, text: str = "", progress: Progress = silent
+) -> None:
+    """Write a BSDF of the current variant for `measured`.
+
+    grid : φ from −180 to 180; its resolution is the number of nodes of u and of v. text : a
+    description.
+    """
+    n = grid.resolution
+    grid.checked(n * n)
+    theta, phi = np.radians(grid.theta), np.radians(grid.phi)
+    nodes = np.linspace(0.0, 1.0, n)
+    azimuth, elevation, v, u = (
+        axis.ravel() for axis in np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
+    )
+    wi = polar(elevation, azimuth)
+
+    def samples(a: float, b: float) -> Sample:
+        place = np.minimum(np.abs(u + a / (n - 1)), 1.0)
+        theta_m, phi_m = 0.5 * np.pi * place**2, np.pi * (2.0 * (v + b / (n - 1)) - 1.0)
+        half = polar(theta_m, phi_m)
+        cosine = (wi * half).sum(axis=1)
+        solid = place * np.sin(theta_m) * np.maximum(cosine, 0.0)
+        return Sample(wi, 2.0 * cosine[:, None] * half - wi, solid)
+
+    values = means(bsdf, samples, grid.wavelengths, np.pi / (n - 1), True, progress)
+    shape = len(phi), len(theta), n, n
+    # density in u and v by which light is drawn: f cosθo times dω/(du dv), and an even share
+    density = (values.mean(axis=1) * samples(0.0, 0.0).weight).reshape(shape)
+    density += 1e-2 * density.mean(axis=(2, 3), keepdims=True) + 1e-9
+    ones = np.ones((2, 2))
+    spectra = np.moveaxis(values.reshape(*shape, -1), -1, 2)
+    write_tensors(
+        path,
+        {
+            "description": np.frombuffer(text.encode() or b"-", np.uint8),
+            "phi_i": np.float32(phi), "theta_i": np.float32(theta),
+            "wavelengths": np.float32(grid.wavelengths), "ndf": np.float32(ones),
+            "sigma": np.float32(ones), "vndf": np.ones((*shape[:2], 2, 2), np.float32),
+            "luminance": np.float32(density), "spectra": np.ascontiguousarray(spectra),
+            "jacobian": np.zeros(1, np.uint8),
+        },
+    )  # fmt: skip
+
+
+def write_tensors(path: Path, tensors: dict[str, NDArray[Any]]) -> None:
+    """Write a file of tensors by name, of type uint8 or float32."""
+    heads = [
+        (struct.pack("<H", len(name)) + name.encode() + struct.pack("<HB", array.ndim, kind),
+         struct.pack(f"<{array.ndim}Q", *array.shape))
+        for name, array in tensors.items()
+        for kind in [_TYPES[array.dtype.name]]
+    ]  # fmt: skip
+    start = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(tensors))
+    offset = len(start) + sum(len(head) + 8 + len(tail) for head, tail in heads)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        file.write(start)
+        for (head, tail), array in zip(heads, tensors.values(), strict=True):
+            file.write(head + struct.pack("<Q", offset) + tail)
+            offset += array.nbytes
+        for array in tensors.values():
+            file.write(array.tobytes())

@@ -1,0 +1,104 @@
+"""`export-bsdf`: a surface's BRDF as a file for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError
+from . import options
+from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
+from .console import Bar, mitsuba_warnings
+from .options import whole_number
+from .report import check_outputs, save_report
+
+# Formats, and the suffixes of their files; the first format of a suffix is the default.
+_SUFFIXES = {"rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf")}
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "export-bsdf", run, "write a surface's BRDF for other programs",
+        "Write the reflected light on a grid of directions, for programs that have no diffraction: "
+        "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
+        "the BiRD project. Lobes narrower than the grid become as wide as it.",
+    )  # fmt: skip
+    add_surface_source(parser)
+    options.add_output(
+        parser, "the file; default: SOURCE's name with .bsdf in the current folder", ".bsdf",
+        ".json", ".brdf",
+    )  # fmt: skip
+    options.add_mode(parser)
+    group = parser.add_argument_group("the file")
+    group.add_argument(
+        "--format", choices=tuple(_SUFFIXES),
+        help="default: rgl for .bsdf, bird for .json and .brdf",
+    )  # fmt: skip
+    for name, text in (
+        ("theta", "angles of the light from the normal, e.g. 0:80:10"),
+        ("phi", "azimuths of the light from x towards y; of zemax, the mirror direction's"),
+        ("wavelength", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default 550"),
+    ):
+        group.add_argument(
+            f"--{name}", metavar="NM" if name == "wavelength" else "DEG", type=options.numbers,
+            help=f"{text}; default: by format",
+        )  # fmt: skip
+    group.add_argument(
+        "--resolution", metavar="N", type=whole_number(8),
+        help="nodes of outgoing directions along an axis; default: 64 for rgl, 86 for zemax, 18 "
+        "for bird",
+    )  # fmt: skip
+    add_surface(parser.add_argument_group("the surface"))
+    options.add_heights(parser)
+    options.add_json(parser, "what was written")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the file, and return the exit code."""
+    take_source(args)
+    start = time.perf_counter()
+    output = args.output or Path(f"{args.source.stem}.{_default_suffix(args.format)}")
+    name = args.format or ("rgl" if output.suffix.lower() == ".bsdf" else "bird")
+    if output.suffix.lower() not in _SUFFIXES[name]:
+        raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
+    check_outputs([output], [args.source], "BRDF")
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
+
+    from ..scene.load import set_variant
+
+    set_variant(args.mode)
+    from ..analysis.export import bird, rgl, zemax
+
+    module: Any = {"rgl": rgl, "zemax": zemax, "bird": bird}[name]
+    changed = {
+        field: np.asarray(value, np.float64)
+        for field in ("theta", "phi")
+        if (value := getattr(args, field)) is not None
+    }
+    if args.wavelength is not None:
+        changed["wavelengths"] = np.asarray(args.wavelength, np.float64)
+    grid = module.DEFAULT._replace(**changed)
+    if args.resolution is not None:
+        grid = grid._replace(resolution=args.resolution)
+    with mitsuba_warnings(), Bar(args) as bar:
+        bsdf = surface_bsdf(args)
+        text = f"{args.source.name}: {bsdf.describe().text}"
+        getattr(module, f"save_{name}")(bsdf, output, grid, text, bar)
+    size = output.stat().st_size
+    print(
+        f"{args.source} -> {output}: {name}, {size / 1e6:.1f} MB, {grid.theta.size} x "
+        f"{grid.phi.size} directions of light, {grid.wavelengths.size} wavelengths, "
+        f"{time.perf_counter() - start:.1f} s"
+    )
+    save_report(args, {"source": args.source, "file": output, "format": name, "bytes": size,
+                       "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
+                       "wavelengths": grid.wavelengths.tolist()})  # fmt: skip
+    return 0
+
+
+def _default_suffix(name: str | None) -> str:
+    return "json" if name == "bird" else "bsdf"
