@@ -156,7 +156,7 @@ def _values(
     si.sh_frame = mi.Frame3f(si.n)
     wo = np.where(lit[:, None], wo, [0.0, 0.0, 1.0])
     si.wi, out = (
-        mi.Vector3f(*(upload(mi.Float, column) for column in np.float32(each.T)))
+        mi.Vector3f(*(upload(mi.Float, column) for column in each.T.astype(np.float32)))
         for each in (wi, wo)
     )
     context, packet = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())

@@ -62,10 +62,10 @@ def save_rgl(
         path,
         {
             "description": np.frombuffer(text.encode() or b"-", np.uint8),
-            "phi_i": np.float32(phi), "theta_i": np.float32(theta),
-            "wavelengths": np.float32(grid.wavelengths), "ndf": np.float32(ones),
-            "sigma": np.float32(ones), "vndf": np.ones((*shape[:2], 2, 2), np.float32),
-            "luminance": np.float32(density), "spectra": np.ascontiguousarray(spectra),
+            "phi_i": phi.astype(np.float32), "theta_i": theta.astype(np.float32),
+            "wavelengths": grid.wavelengths.astype(np.float32), "ndf": ones.astype(np.float32),
+            "sigma": ones.astype(np.float32), "vndf": np.ones((*shape[:2], 2, 2), np.float32),
+            "luminance": density.astype(np.float32), "spectra": np.ascontiguousarray(spectra),
             "jacobian": np.zeros(1, np.uint8),
         },
     )  # fmt: skip
