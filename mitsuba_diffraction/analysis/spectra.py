@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
+from ..optics.colour import LONGEST, SHORTEST
 from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.llvm import require_loaded_llvm
@@ -120,6 +121,7 @@ class Spectra:
     s, p : the same for light polarised across and in the plane of incidence, or None.
     error : standard errors of `value` where it is a mean over several surfaces, or None.
     band : least and largest values over treatments of the heights, or None.
+    angular : `angular_variables` of each surface, or empty.
     geometry : angles.
     relative : one of `RELATIVE`.
     """
@@ -132,6 +134,7 @@ class Spectra:
     p: Reals | None = None
     error: Reals | None = None
     band: tuple[Reals, Reals] | None = None
+    angular: tuple[dict[str, float], ...] = ()
 
     def names(self, group: str = "") -> list[str]:
         """Return names of the detectors' columns, with a group's name before them."""
@@ -252,7 +255,35 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
         error=values.std(axis=0, ddof=1) / math.sqrt(len(spectra)),
         s=mean_of([each.s for each in spectra]),
         p=mean_of([each.p for each in spectra]),
+        angular=tuple(row for each in spectra for row in each.angular),
     )
+
+
+def table_range(wavelengths: Reals) -> tuple[float, float]:
+    """Return the range of a table, nm, for wavelengths (n,) and the light that Mitsuba renders."""
+    # Mitsuba loads no table that begins later
+    return min(wavelengths[0], SHORTEST), max(wavelengths[-1], LONGEST)
+
+
+def brdf_values(bsdf: Any, wi: Reals, wo: Reals, wavelength: Reals) -> Reals:
+    """Return f (n,), 1/sr, of a BSDF at unit vectors (n, 3) and wavelengths (n,) in nm.
+
+    bsdf : of the current variant, spectral and vectorised.
+    """
+    light, view = (mi.Vector3f(*(upload(mi.Float, c) for c in d.T)) for d in (wi, wo))
+    si = _interaction(view)
+    si.wavelengths = mi.UnpolarizedSpectrum(upload(mi.Float, wavelength))
+    f = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, light))[0]
+    return np.asarray(f, np.float64) / wi[:, 2]
+
+
+def _interaction(view: Any) -> Any:
+    """Return points of a flat surface in air, seen from directions (mi.Vector3f)."""
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(view))
+    si.n = mi.Normal3f(0.0, 0.0, 1.0)
+    si.sh_frame = mi.Frame3f(si.n)
+    si.wi = view
+    return si
 
 
 def _signals(
@@ -334,10 +365,7 @@ def _integrals(
     Mueller matrix is for light that goes from the lamp to the detector.
     """
     light = _light(geometry)
-    si = dr.zeros(mi.SurfaceInteraction3f, len(directions))
-    si.n = mi.Normal3f(0.0, 0.0, 1.0)
-    si.sh_frame = mi.Frame3f(si.n)
-    si.wi = mi.Vector3f(*(upload(mi.Float, column) for column in directions.T))
+    si = _interaction(mi.Vector3f(*(upload(mi.Float, column) for column in directions.T)))
     towards = mi.Vector3f(*(float(c) for c in light))
     dr.make_opaque(towards)
     turned = weights * directions[:, 2] / light[2]

@@ -16,6 +16,7 @@ import numpy as np
 from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb, linear_srgb, response
+from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, noises, quantum_catches
 from .spectra import Reals, Spectra
 from .spectral_variables import colours_of
@@ -32,6 +33,8 @@ MAPPED = 8
 _BRIGHTEST = 0.35
 # Ratio of the highest to the lowest curve from which on the axis is logarithmic.
 _APART = 20.0
+# Curves whose legend fits into the plot.
+_FEW = 4
 _STYLES = ("-", "--", "-.", ":")
 
 #: Spectra by the name of their group; "" without groups.
@@ -82,6 +85,16 @@ def save_colours(groups: Groups, path: Any) -> None:
     ]
     columns = ("spectrum", "srgb", "hue", "chroma", "B1", "B2", "B3", "S8", "H1", "FWHM")
     write_table(path, columns, rows)
+
+
+def save_angular(groups: Groups, path: Any) -> None:
+    """Write `angular_variables` of each surface, a row each, with its group and number."""
+    rows = [
+        {"group": group, "scan": number, **row}
+        for group, each in groups.items()
+        for number, row in enumerate(each.angular, 1)
+    ]
+    write_table(path, ("group", "scan", *VARIABLES), rows)
 
 
 def save_catches(
@@ -158,7 +171,9 @@ def spectra_figure(groups: Groups | Spectra, title: str = "") -> Figure:
         f"{geometry.acceptance:g}°".strip(),
         fontsize=9,
     )
-    axes[0].legend(fontsize=8 if len(geometry.detectors) < MAPPED else 6)
+    curves = len(groups) * len(geometry.detectors)
+    beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    axes[0].legend(fontsize=6 if mapped else 8, **(beside if curves > _FEW else {}))
     axes[0].grid(alpha=0.25)
     if mapped:
         _draw_map(figure, axes[1], first, against[first.relative])

@@ -36,12 +36,12 @@ from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
 from .repeats import sample_of, scan_files, write_repeats
-from .scans import bsdf_of, read_scan, table_of
+from .scans import bsdf_of, in_medium, read_scan, table_of
 from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 6
+VERSION = 7
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -131,6 +131,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if weak is not None:
         row |= {"weak_period_um": weak.period, "weak_direction_deg": weak.direction}
         row["weak_share"] = weak.share
+    scan = in_medium(scan, dict(job.surface).get("ext_ior"))
     table = table_of(scan)
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}

@@ -147,8 +147,10 @@ def add_material(group: argparse._ArgumentGroup) -> None:
         help="index of the dielectric at all wavelengths, or its name; default: 1.5, as in scenes",
     )  # fmt: skip
     group.add_argument(
-        "--ext-ior", metavar="N", help="index of the medium above, or its name; default: air"
-    )
+        "--ext-ior", metavar="N",
+        help="index of the medium that light comes and goes in, or its name: water for an animal "
+        "under water; default: air",
+    )  # fmt: skip
     group.add_argument(
         "--coat-ior", metavar="N",
         help="index of a flat clear coat over the surface, or its name: water on a wet animal",
@@ -318,6 +320,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
+    from ..analysis.scans import medium_index
     from ..plugin.dictionary import ORDERS, bsdf_dict
     from ..plugin.diffraction import Diffraction
     from ..plugin.orders.orders_sheet import diffraction_orders
@@ -325,6 +328,9 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
 
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
     parameters |= surface_parameters(args)
+    if (index := medium_index(args.ext_ior)) != 1.0:
+        parameters["lateral_scale"] = index
+        parameters["height_scale"] = index * (args.height_scale or 1.0)
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)

@@ -7,13 +7,15 @@ import math
 import time
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
 from . import options
-from .console import Bar, say_warning
+from .brdf_map import add_material, surface_parameters
+from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
 from .report import check_outputs, save_report
 
@@ -56,6 +58,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
         f"default: {_WINDOWS}",
     )  # fmt: skip
+    add_material(parser.add_argument_group("the surface, by default R = 1"))
     options.add_json(parser)
     options.add_heights(parser)
 
@@ -121,6 +124,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _prepared(args: argparse.Namespace) -> _Experiment:
     """Check the options, read the patch, and choose the beam and the viewing angles."""
+    if surface_parameters(args) and args.method != "spectral":
+        raise DiffractionError(
+            f"method={args.method} reflects all light; leave the material out, or the method"
+        )
     from ..heights.spectra import dominant_periods
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.periods import check_period
@@ -155,16 +162,14 @@ class _Result(NamedTuple):
 def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Result, dict[str, Any]]:
     """Measure and fit; also return the figures for the NPZ file."""
     from ..heights.coherence import resolved_width
-    from ..thesis.methods import make
     from ..thesis.period_fit import measure
 
     patch, settings, _, held, beam, steps, angles = experiment
-    with Bar(args) as bar, warnings.catch_warnings():
+    with Bar(args) as bar, mitsuba_warnings(), warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # `options.notes` has them
-        method = make(args.method, patch, period=args.period, progress=bar, **settings)
+        brdf, sigma = _brdf(args, experiment, bar)
         response = measure(
-            method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
-            progress=bar,
+            brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
         )  # fmt: skip
         followed = _followed(response, args.order, held)
         fit = followed.fit
@@ -175,6 +180,28 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Resul
              "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
              "source": str(args.source)}  # fmt: skip
     return _Result(response, followed, lines), more
+
+
+def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
+    """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
+    patch, settings = experiment.patch, experiment.settings
+    if not (surface := surface_parameters(args)):
+        from ..thesis.methods import make
+
+        method = make(args.method, patch, period=args.period, progress=bar, **settings)
+        return method.brdf, method.sigma
+    from ..analysis.known_wavelengths import check_material
+    from ..analysis.scans import Scan, bsdf_of, in_medium, table_of
+    from ..analysis.spectra import brdf_values, table_range
+    from ..scene.load import set_variant
+
+    steps = experiment.steps
+    check_material(args.material, steps, args.pigment)
+    set_variant("llvm_ad_spectral")
+    asked = {name: value for name, value in settings.items() if name != "step"}
+    asked["wavelength_range"] = table_range(steps)
+    table = table_of(in_medium(Scan([patch], TableSettings(**asked)), args.ext_ior), bar)
+    return partial(brdf_values, bsdf_of(table, **surface)), table.sigma
 
 
 def _write(

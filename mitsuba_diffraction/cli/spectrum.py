@@ -68,6 +68,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "d65, sun and sky; d75, sky in open shade; leaves, a model of shade under leaves; or a "
         "file of wavelengths (nm) and photons; default: ideal",
     )  # fmt: skip
+    parser.add_argument(
+        "--iridescence", action="store_true",
+        help="also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others 2019), fitted "
+        "to lamps from 0 to 60 degrees and detectors between them, beside the mirror direction",
+    )  # fmt: skip
     options.add_output(
         parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
         "folder", ".csv",
@@ -93,6 +98,9 @@ def run(args: argparse.Namespace) -> int:
     errors = output.with_name(f"{output.stem}-errors.csv")
     if args.observer is not None:
         written += [output.with_name(f"{output.stem}-{name}.csv") for name in _SEEN]
+    angular = output.with_name(f"{output.stem}-iridescence.csv")
+    if args.iridescence:
+        written.append(angular)
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     check_outputs([*written, errors] if repeated else written, files, "spectrum")
     lam = _wavelengths(args)
@@ -127,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
     files_of_spectra.save_colours(spectra, written[2])
     if eye is not None:
         files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
+    if args.iridescence:
+        files_of_spectra.save_angular(spectra, angular)
     title = _title(groups, args)
     with atomic_path(written[1]) as temporary:
         files_of_spectra.spectra_figure(spectra, title).savefig(temporary, format="png")
@@ -196,6 +206,14 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
         except DiffractionError as error:
             raise DiffractionError(f"group {name}: {error}") from error
     return groups
+
+
+def _say_once(args: argparse.Namespace, line: str) -> None:
+    """Print a line that holds for several scans, once."""
+    said = vars(args).setdefault("said", set())
+    if line not in said:
+        said.add(line)
+        say(line)
 
 
 def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
@@ -300,8 +318,7 @@ def _of_table(
     """Measure the spectra of a table."""
     names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
     names = [name for name in names if name != "--wavelength-range"]
-    if args.crops is not None:
-        names.append("--crops")
+    names += [f"--{n.replace('_', '-')}" for n in ("crops", "ext_ior") if getattr(args, n)]
     if refused := [*options.used_heights_options(args), *names]:
         raise DiffractionError(f"'{file}' is a table, which has its own; leave {refused[0]} out")
     if args.light_azimuth == "auto":
@@ -312,7 +329,7 @@ def _of_table(
         lam = _within(table, lam, file)
     elif args.wavelength_range is None:
         lam = lam[lam >= table.wavelength_range[0]]
-    return _spectrum(args, table, geometry, lam, bar)
+    return _spectrum(args, table, geometry, lam, bar, angular=args.iridescence)
 
 
 def _of_heights(
@@ -320,44 +337,50 @@ def _of_heights(
     lam: Any, bar: Bar, *, quiet: bool = False,
 ) -> Spectra:  # fmt: skip
     """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
-    from ..analysis.scans import Scan, read_scan, table_of
+    from ..analysis.scans import Scan, in_medium, read_scan, table_of
+    from ..analysis.spectra import table_range
     from ..heights.coherence import blur
     from ..heights.load import notes_line
     from ..heights.spectra import dominant_periods
-    from ..optics.colour import LONGEST, SHORTEST
     from ..tables.build.checks import warnings_of
 
-    # Mitsuba loads no table that begins later than the light that it renders
-    span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
     asked = {**_treatment(args, file).settings, **options.table_options(args)}
-    asked["wavelength_range"] = span
+    asked["wavelength_range"] = table_range(lam)
     bar(0, 0, f"tabulating {file.name}")
-    scan = Scan(list(patches), read_scan(file, how, asked).settings)
+    settings = read_scan(file, how, asked).settings
+    scan = in_medium(Scan(list(patches), settings), args.ext_ior)
     table = table_of(scan, bar)
     line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
     if line and not quiet and args.crops is None:
         say(line)
-    if table.settings.window_width is not None and not quiet and args.crops is None:
-        say(f"{file.name}: {blur(table.window_width)}")
+    if table.settings.window_width is not None:
+        _say_once(args, blur(table.window_width))
     if args.light_azimuth == "auto":
         gratings = dominant_periods(patches[0])
         geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)
         if not quiet:
             found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
             say(f"{file.name}: azimuth {found}")
-    return _spectrum(args, table, geometry, lam, bar)
+    return _spectrum(args, table, geometry, lam, bar, angular=args.iridescence and not quiet)
 
 
-def _spectrum(args: argparse.Namespace, table: Any, geometry: Any, lam: Any, bar: Bar) -> Spectra:
-    """Measure the spectra of a table's BSDF."""
+def _spectrum(
+    args: argparse.Namespace, table: Any, geometry: Any, lam: Any, bar: Bar, *, angular: bool
+) -> Spectra:
+    """Measure the spectra of a table's BSDF, and its variables over all angles."""
+    from ..analysis.angular_variables import angular_variables
     from ..analysis.scans import bsdf_of
     from ..analysis.spectra import spectrum
 
-    return spectrum(
-        bsdf_of(table, **surface_parameters(args)),
-        geometry.light, geometry.detectors, light_azimuth=geometry.azimuth,
-        acceptance=geometry.acceptance, relative=args.relative, wavelengths=lam, progress=bar,
+    bsdf = bsdf_of(table, **surface_parameters(args))
+    azimuth, cone = geometry.azimuth, geometry.acceptance
+    spectra = spectrum(
+        bsdf, geometry.light, geometry.detectors, light_azimuth=azimuth, acceptance=cone,
+        relative=args.relative, wavelengths=lam, progress=bar,
     )  # fmt: skip
+    if not angular:
+        return spectra
+    return replace(spectra, angular=(angular_variables(bsdf, lam, azimuth, cone, bar),))
 
 
 def _within(table: OrderTable, lam: Any, file: Path) -> Any:

@@ -104,7 +104,8 @@ eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
-    or names: `water`. The medium changes the reflectance; directions are of light in air.
+    or names: `water`. The medium changes the reflectance alone. For light within it, whose waves
+    are shorter, multiply lateral_scale and height_scale by its index, as `--ext-ior` does.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of

@@ -11,7 +11,7 @@ from tests.support.acceptance import spectra_and_reference
 pytestmark = pytest.mark.thorough
 
 
-@pytest.mark.parametrize("name", ["melanin", "wet keratin"])
+@pytest.mark.parametrize("name", ["melanin", "wet keratin", "keratin under water"])
 def test_spectra_of_tissue_are_the_reference_s_over_the_acceptance(name):
     mi.set_variant("llvm_ad_spectral")
     # 1 %: the table's tolerance, and 400 directions of the cone

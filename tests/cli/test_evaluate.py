@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.options import METHODS
-from tests.support.directions import rough_patch
+from mitsuba_diffraction.optics.materials import TISSUES
+from tests.support.directions import polar, rough_patch
 
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
@@ -43,6 +45,21 @@ def test_picture_and_numbers_are_written_and_the_period_is_found(run, heights, h
     assert abs(float(rows[3]["difference_deg"])) < 0.5
     with Image.open("grating-evaluation.png") as image:
         assert image.size[0] > 500
+
+
+def test_a_surface_of_a_material_is_the_reference_s(run, heights):
+    ran = run("evaluate", heights, *EXACT, *QUICK[:-1], "0", "--material", "keratin")
+    assert ran.code == 0, ran.err
+    patch = md.HeightField(np.load(heights), 0.08, periodic=True)
+    with np.load("grating-evaluation.npz") as saved:
+        lam, angles, found = saved["wavelengths"][4], saved["angles"][::20], saved["scatter"][4]
+    theta = np.radians(angles)
+    wo = np.stack([np.sin(theta), 0.0 * theta, np.cos(theta)], axis=1)
+    eta = TISSUES["keratin"].index(lam).real
+    f = md.reference.brdf(patch, polar(75.0), wo, lam, eta=eta, coherence_width=12.0)
+    # the table's tolerance is of the largest value
+    expected = f * wo[:, 2]
+    assert found[::20] == pytest.approx(expected, rel=1e-2, abs=1e-3 * expected.max())
 
 
 @pytest.mark.parametrize("method", METHODS[1:])
@@ -98,6 +115,8 @@ def test_a_given_period_is_compared_with(run, heights):
         (["--period", "0"], "period=0.0 must be"),
         (["--order", "0"], "order=0 is"),
         (["--order", "-1"], "too few"),
+        (["--material", "kerratin"], "did you mean keratin"),
+        (["--material", "keratin", "--method", "flss"], "method=flss"),
         (["-o", "missing/a.png"], "cannot write"),
     ],
 )

@@ -8,6 +8,7 @@ import os
 import numpy as np
 import pytest
 
+from mitsuba_diffraction.analysis import angular_variables
 from mitsuba_diffraction.heights import gratings
 
 pytestmark = pytest.mark.usefixtures("coarse")
@@ -92,11 +93,13 @@ def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here
         assert str(source) in line
 
 
-def test_groups_have_columns_errors_and_colours_each(run, scans, here):
+def test_groups_have_columns_errors_colours_and_variables_each(run, scans, here, monkeypatch):
+    for name in ("LAMPS", "DETECTORS"):
+        monkeypatch.setattr(angular_variables, name, getattr(angular_variables, name)[::4])
     (here / "t.toml").write_text(f'["*.npy"]\npixel_size = {PIXEL[1]}\n')
     ran = run("spectrum", "--group", f"a b={scans / 'scan0.npy'}", "--group", f"both={scans}",
               "--treatments", "t.toml", *QUICK, "--detector", "-20:20:20",
-              "-o", "g.csv")  # fmt: skip
+              "--iridescence", "-o", "g.csv")  # fmt: skip
     assert ran.code == 0, ran.err
     names = read("g.csv").dtype.names
     angles = ("m20", "0", "20")
@@ -106,6 +109,10 @@ def test_groups_have_columns_errors_and_colours_each(run, scans, here):
     colours = (here / "g-colours.csv").read_text("utf-8").splitlines()
     assert colours[0].startswith("spectrum,srgb,hue,chroma,B1,B2,B3,S8,H1")
     assert [line.split(",")[0] for line in colours[1:]] == expected
+    variables = [line.split(",") for line in (here / "g-iridescence.csv").read_text().splitlines()]
+    assert variables[0] == ["group", "scan", *angular_variables.VARIABLES]
+    assert [row[:2] for row in variables[1:]] == [["a b", "1"], ["both", "1"], ["both", "2"]]
+    assert all(float(row[2]) > 0.0 for row in variables[1:])
 
 
 def test_crops_of_a_scan_have_errors_and_auto_turns_the_lamp(run, scans, here):

@@ -8,7 +8,9 @@ import mitsuba as mi
 import numpy as np
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.analysis.scans import Scan, in_medium, medium_index
 from mitsuba_diffraction.optics.materials import SODIUM, TISSUES
+from mitsuba_diffraction.settings import TableSettings
 from tests.support.directions import Array, rough_patch
 
 ANGLES, LIGHT, AZIMUTH, ACCEPTANCE = (0.0, 35.0), 20.0, 30.0, 5.0
@@ -33,6 +35,10 @@ MATERIALS = {
             "coat": WET,
         },
     ),
+    "keratin under water": (
+        {"material": "keratin", "ext_ior": "water"},
+        lambda lam: {"eta": _parts("keratin", lam)["eta"] / _parts("water", lam)["eta"]},
+    ),
 }
 
 
@@ -40,14 +46,18 @@ def spectra_and_reference(name: str, wavelengths: Array) -> tuple[Array, Array]:
     """Reflectance factors (n, 2) of a rough surface, and those of `md.reference`."""
     patch = rough_patch((24, 24), (0.15, 0.15), 0.08)
     parameters, index = MATERIALS[name]
+    medium = parameters.get("ext_ior")
+    above = medium_index(medium)
+    within = in_medium(Scan([patch], TableSettings()), medium).patches[0]
     found = md.spectrum(
-        mi.load_dict(md.bsdf_dict(patch, **parameters)), LIGHT, ANGLES, light_azimuth=AZIMUTH,
+        mi.load_dict(md.bsdf_dict(within, **parameters)), LIGHT, ANGLES, light_azimuth=AZIMUTH,
         acceptance=ACCEPTANCE, wavelengths=wavelengths,
     ).value  # fmt: skip
     phi = math.radians(AZIMUTH)
     side = np.array([-math.sin(phi), math.cos(phi), 0.0])
     expected = [
-        [_factor(patch, phi, _cone(angle, phi, side), lam, index(lam)) for angle in ANGLES]
+        # waves in a medium are shorter by its index
+        [_factor(patch, phi, _cone(angle, phi, side), lam / above, index(lam)) for angle in ANGLES]
         for lam in wavelengths
     ]
     return found, np.array(expected)
