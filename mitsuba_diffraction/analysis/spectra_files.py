@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 #: Fewest detectors from which on a map of angle and wavelength is drawn beside the curves.
 MAPPED = 8
 
+#: Azimuth of a lamp that is turned for each scan.
+EACH = "of each scan"
+
 # Of a curve drawn: the brightest channel of its colour, so that white is grey on white paper.
 _BRIGHTEST = 0.35
 # Ratio of the highest to the lowest curve from which on the axis is logarithmic.
@@ -140,11 +143,13 @@ def colour_of(spectra: Spectra) -> Reals:
     return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
 
 
-def spectra_figure(groups: Groups | Spectra, title: str = "") -> Figure:
+def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "") -> Figure:
     """Draw spectra over wavelength, with bands of one standard error or of treatments.
 
     Each curve has its own colour; of several groups, each group one. From `MAPPED` detectors on a
     map of angle and wavelength stands beside.
+
+    azimuth : of the lamp in words, where the scans of a mean have several.
     """
     from matplotlib.figure import Figure
 
@@ -163,9 +168,9 @@ def spectra_figure(groups: Groups | Spectra, title: str = "") -> Figure:
         "none": "collected (% of the incident light)",
     }
     axes[0].set(xlabel="wavelength (nm)", ylabel=against[first.relative])
-    _scale(axes[0], np.concatenate([each.value for each in groups.values()], axis=1))
+    _scale(axes[0], *groups.values())
     turned = {each.geometry.azimuth for each in groups.values()}
-    azimuth = f"{geometry.azimuth:g}°" if len(turned) == 1 else "of each scan"
+    azimuth = azimuth or (f"{geometry.azimuth:.4g}°" if len(turned) == 1 else EACH)
     axes[0].set_title(
         f"{title}\nlamp at {geometry.light:g}°, azimuth {azimuth}; cone of "
         f"{geometry.acceptance:g}°".strip(),
@@ -199,8 +204,15 @@ def _draw(axes: Axes, name: str, spectra: Spectra, colour: Any, first: Spectra) 
             axes.fill_between(lam, low, high, color=drawn, alpha=0.2, lw=0)
 
 
-def _scale(axes: Axes, value: Reals) -> None:
+def _scale(axes: Axes, *spectra: Spectra) -> None:
     """Set the limits of per cent: linear from 0, or logarithmic where curves are far apart."""
+    value = np.concatenate(
+        [
+            each.value if each.band is None else np.maximum(each.value, each.band[1])
+            for each in spectra
+        ],
+        axis=1,
+    )
     highest = 100.0 * np.maximum(value.max(axis=0), 0.0)
     if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
         axes.set_yscale("log")

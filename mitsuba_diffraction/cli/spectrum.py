@@ -137,9 +137,9 @@ def run(args: argparse.Namespace) -> int:
         files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
     if args.iridescence:
         files_of_spectra.save_angular(spectra, angular)
-    title = _title(groups, args)
+    title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
     with atomic_path(written[1]) as temporary:
-        files_of_spectra.spectra_figure(spectra, title).savefig(temporary, format="png")
+        files_of_spectra.spectra_figure(spectra, title, turned).savefig(temporary, format="png")
     shown = spectra[first]
     lam = shown.wavelength
     print(
@@ -159,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
         for name, each in spectra.items() for column, values in each.columns(name).items()
     }  # fmt: skip
     save_report(args, {"files": written, "sources": files, "light": args.light,
-                       "light_azimuth": shown.geometry.azimuth,
+                       "light_azimuth": turned or shown.geometry.azimuth,
                        "detectors": shown.geometry.detectors,
                        "acceptance": args.acceptance, "relative": args.relative,
                        "wavelengths": lam.tolist(), "spectra": columns})  # fmt: skip

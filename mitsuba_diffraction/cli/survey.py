@@ -95,11 +95,16 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
+    from ..analysis.known_wavelengths import known_range
+    from ..analysis.scans import medium_index
     from ..analysis.survey import run_survey
     from ..analysis.treatments import Treatment, load_treatments
 
     treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
+    # a wrong name is refused before hours of tables
+    known_range(args.material, args.pigment)
+    medium_index(args.ext_ior)
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
         if client is not None:

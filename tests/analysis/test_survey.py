@@ -146,6 +146,16 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
     assert "none.npy" in ran.err
 
 
+@pytest.mark.parametrize(
+    ("option", "named"), [("--material", "kerratin"), ("--ext-ior", "melanin")]
+)
+def test_materials_that_are_none_are_refused_before_a_scan_is_measured(
+    run, scans, tmp_path, option, named
+):
+    line = run("survey", *scans, "-o", tmp_path / "out", option, named).failed_in_one_line()
+    assert named in line
+
+
 def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
     path = _toml(
         tmp_path,
