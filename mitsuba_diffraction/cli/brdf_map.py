@@ -26,11 +26,13 @@ _TABLE = {
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = (
-    "material", "int_ior", "ext_ior", "coat_ior", "pigment", "model", "orientation", "height_scale",
+    "material", "int_ior", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
+    "height_scale",
 )  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
-    "mode", "material", "ext_ior", "coat_ior", "pigment", "model", "orientation", "height_scale",
+    "mode", "material", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
+    "height_scale",
     "basis", "second_order", "preset",
 )  # fmt: skip
 
@@ -154,6 +156,10 @@ def add_material(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--coat-ior", metavar="N",
         help="index of a flat clear coat over the surface, or its name: water on a wet animal",
+    )  # fmt: skip
+    group.add_argument(
+        "--layers", metavar="TOML",
+        help="stack of thin layers on the surface; parameter layers in docs/parameters.md",
     )  # fmt: skip
     group.add_argument(
         "--pigment", metavar="COLOUR|CSV",

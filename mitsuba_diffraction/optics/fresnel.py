@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from .arithmetic import Number, formula, is_complex, of, squared
+from .stack import Stacked
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ class Filmed:
         return material, film, np.real(np.asarray(self.depth))
 
 
-#: Index n + ik relative to the medium above, or of a material under a film.
-Index: TypeAlias = Number | Filmed
+#: Index n + ik relative to the medium above, or of a material under a film, or under a stack.
+Index: TypeAlias = Number | Filmed | Stacked
 
 
 class Face(NamedTuple):
@@ -133,6 +134,8 @@ def amplitudes(cosine: Number, square: Number, index: Index) -> tuple[Number, Nu
     cosine, square : of the angle of incidence, 0 to 1, and of its sine the square.
     index : relative to the medium above.
     """
+    if isinstance(index, Stacked):
+        return index.amplitudes(cosine)
     if not isinstance(index, Filmed):
         epsilon = index * index
         inside = decaying_root(epsilon - square)  # n cosθ of the refracted wave
@@ -186,6 +189,6 @@ def reflectance(cosine: Number, index: Index) -> Number:
 @formula
 def normal_reflectance(index: Index) -> Number:
     """Return R₀ of eq. 9, the reflectance along the normal."""
-    if isinstance(index, Filmed):
+    if isinstance(index, Filmed | Stacked):
         return squared(amplitudes(1.0, 0.0, index)[0])
     return squared((index - 1.0) * of(index).reciprocal(index + 1.0))

@@ -21,6 +21,7 @@ from .blend import Real
 from .boundary import Direction, Heights, Jones
 from .coat import crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
+from .stack import Stacked
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Path:
     least : of w; powers of orders over w² have a limit for w → 0.
     """
 
-    index: complex | Filmed | None
+    index: complex | Filmed | Stacked | None
     model: str
     came: Side = ABOVE
     left: Side = ABOVE
@@ -149,7 +150,7 @@ class Path:
         if self.thin:  # the flat side lies over the structure as the face of a coat does
             n = self.came.at_structure
             assert self.index is not None
-            assert not isinstance(self.index, Filmed)  # no coat lies on it
+            assert not isinstance(self.index, Filmed | Stacked)  # no coat lies on it
             pair = boundary.geometry(refracted(wi, n), refracted(wo, n))
             jones = model.jones(pair, self.index, heights)
             faces = (crossing(direction[2], n) for direction in (wi, wo))

@@ -17,6 +17,7 @@ dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 diffraction_parameters  parameters of `diffraction`, read from Mitsuba's Properties and checked
 surface_parameters  parameters that both plugins have: the surface and its table
+stack           a stack of layers on the structure: its file and its table
 support         features that go together, declared by each choice of a scene
 meshes          arrays of Mitsuba's meshes, of 3.9 and 3.10
 properties      words, flags and numbers from them, refused by name; what elements are called

@@ -32,6 +32,7 @@ from .directions import Pair, TablePoint
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import CoatedPair, UnderFilm
 from .memory import index_between, read_record, upload
+from .stack import UnderStack
 from .types import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The model of flat faces and of a perfect reflector, which has no index.
@@ -74,7 +75,7 @@ class Boundary:
     """
 
     model: Model
-    material: Reflectance | Inside | UnderFilm
+    material: Reflectance | Inside | UnderFilm | UnderStack
     statistic: HeightStatistic | None = None
 
     def of(self, material: Inside) -> Boundary:
@@ -138,7 +139,7 @@ class Boundary:
 
 
 def boundary_of(
-    model: str, material: Reflectance | UnderFilm, roughness: RoughnessTable
+    model: str, material: Reflectance | UnderFilm | UnderStack, roughness: RoughnessTable
 ) -> Boundary:
     """Return the boundary of a model; a perfect reflector, without an index, has Kirchhoff's."""
     chosen = KIRCHHOFF if isinstance(material, Perfect) else model_of(model)

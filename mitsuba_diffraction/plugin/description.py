@@ -39,6 +39,7 @@ class Feature(Enum):
     CONDUCTOR = "material", "a conductor or a material with an index over wavelength"
     COAT = "", "a coat (coat_ior)"
     FILM = "", "a thin film (film_ior)"
+    STACK = "", "a stack of layers (layers)"
     SMALL_SLOPE = "model", "model='small_slope'"
     KIRCHHOFF = "model", "model='kirchhoff'"
     OWN_MODEL = "model", "model='{model}'"
@@ -163,6 +164,7 @@ class Surface:
     second_order, energy, nested : see their classes; None where the surface has none.
     shadowing : whether grooves shadow each other (`vcavity`).
     transmits : whether light goes through.
+    stacked : whether a stack of layers lies on the structure.
     """
 
     table: DiffractionTable | OrderTable
@@ -184,6 +186,7 @@ class Surface:
     nested: Nested | None = None
     shadowing: bool = False
     transmits: bool = False
+    stacked: bool = False
 
     @property
     def patch(self) -> DiffractionTable:
@@ -218,6 +221,7 @@ class Surface:
             Feature.TRANSMISSION: self.transmits,
             Feature.COAT: self.coat is not None,
             Feature.FILM: self.film is not None,
+            Feature.STACK: self.stacked,
             Feature.SECOND_ORDER: self.second_order is not None,
             Feature.ENERGY_SCALE: scales and self.energy_scale(tall.number) is not None,
             Feature.SHADOWING: self.shadowing,

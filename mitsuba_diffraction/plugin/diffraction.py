@@ -127,6 +127,13 @@ film_thickness : float ∂ [none]
 film_k : float ∂ [0]
     Absorption of the film: k of its index n + ik, over the index of the medium above. Excludes a
     nested BSDF.
+layers : string [none]
+    Instead of a film: a stack of layers that follows the heights, a TOML file of `layers`, pairs of
+    a material and a thickness in µm from the material upwards; `repeat`; and `spread`, the standard
+    deviation of all thicknesses from place to place, as a share:
+    `layers = [["chitin", 0.09], ["1.33", 0.08]]`. Reflectance is tabulated over angle and
+    wavelength. The model is `kirchhoff`; coats are excluded, and a nested BSDF under layers that
+    absorb. Under a spread, polarised variants keep the mean phase between s and p.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller

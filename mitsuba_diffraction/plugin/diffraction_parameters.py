@@ -16,10 +16,11 @@ from .boundary import Boundary, boundary_of
 from .directions import SHADOWINGS
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
 from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
-from .materials import coat_of, film_of, material_of, warn_of_film
+from .materials import coat_of, film_of, material_of, stack_of, warn_of_film
 from .properties import choice, kind_of, number
 from .second_order import SecondOrder, ratios_of_second_order
 from .sources import TableProvider
+from .stack import UnderStack
 from .support import Support, check_combination, supported
 from .surface_parameters import (
     REFLECTING,
@@ -31,7 +32,7 @@ from .surface_parameters import (
 from .types import BSDF, Properties
 
 #: Layers, pigment and medium that "none" leaves out.
-OPTIONAL = ("coat_ior", "film_ior", "ext_ior", "pigment")
+OPTIONAL = ("coat_ior", "film_ior", "layers", "ext_ior", "pigment")
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Parameters:
     """
 
     surface: SurfaceParameters
-    reflectance: Reflectance | UnderCoat | UnderFilm
+    reflectance: Reflectance | UnderCoat | UnderFilm | UnderStack
     coat: Dielectric | None
     boundary: Boundary
     vcavity: bool
@@ -81,10 +82,13 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     surface = read_surface(props, provider, optical, may_have_second_order)
 
     filmed = film_of(props, material, surface.wavelength, surface.table.wavelength_range[0])
+    filmed = stack_of(props, filmed, surface.wavelength, surface.table.wavelength_range)
+    if isinstance(filmed, UnderStack) and filmed.absorbs:
+        check_combination(dict(_asked(props, nested)), [support.OPAQUE])
     if isinstance(filmed, UnderFilm) and filmed.absorbs:
         check_combination(dict(_asked(props, nested)), [support.ABSORBING])
     warn_of_film(filmed, surface.table, surface.largest_scale)
-    flat: Reflectance | UnderCoat | UnderFilm = filmed
+    flat: Reflectance | UnderCoat | UnderFilm | UnderStack = filmed
     if coat is not None and isinstance(material, Dielectric | Conductor):
         flat = UnderCoat(material, coat)
     boundary = boundary_of(model, filmed, surface.table.roughness)
@@ -107,7 +111,11 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
 
 def _model(props: Properties, material: Reflectance) -> str:
     """Name of the boundary model; by default small slope if there is an index and no thesis."""
-    scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
+    scalar = (
+        isinstance(material, Perfect)
+        or "layers" in props
+        or props.get("layering", LAYERINGS[0]) == "thesis"
+    )
     default = "kirchhoff" if scalar else "small_slope"
     return choice(props, "model", (default, *(name for name in MODELS if name != default)))
 
@@ -125,6 +133,8 @@ def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
         yield "placed", f"coherence='{SURFACE}'"
     if checked("second_order", props.get("second_order", "auto")) is True:
         yield "second_order", "second_order=true"
+    if "layers" in props:
+        yield "layers", "layers"
     for name in ("coat", "film"):
         if f"{name}_ior" in props:
             yield name, f"{name}_ior"
@@ -142,6 +152,8 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.COAT
     if "film_ior" in props:
         yield support.FILM
+    if "layers" in props:
+        yield support.STACK
     if model != "small_slope":
         yield support.without_second_order(model)
     if props.get("layering", "") == "thesis":
@@ -155,7 +167,7 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
 def _layering(
     props: Properties,
     name: str,
-    reflectance: Reflectance | UnderCoat | UnderFilm,
+    reflectance: Reflectance | UnderCoat | UnderFilm | UnderStack,
     nested: bool,
 ) -> Layering:
     if name == "transmission":

@@ -19,6 +19,7 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
+from ..optics.stack import Stacked
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
@@ -31,11 +32,12 @@ from .energy_factors import ScaleRange
 from .fresnel import Dielectric, Inside, Perfect, Reflectance
 from .layers import UnderFilm, plain
 from .memory import upload
+from .stack import UnderStack
 from .types import Colour, Float, Vector3f
 
 Array = NDArray[np.float32]
 #: Of wavelengths (n,).
-Indices = NDArray[np.complex128] | fresnel.Filmed
+Indices = NDArray[np.complex128] | fresnel.Filmed | Stacked
 
 #: Indices are rounded to this, real and imaginary part, for s and the ratio of albedos.
 INDEX_STEP = 0.05
@@ -230,7 +232,7 @@ class EnergyModel:
         # of an index of 1 there is neither
         ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
         values = albedo.values * ratio
-        if isinstance(index, fresnel.Filmed):  # which may reflect next to nothing
+        if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
             values = np.minimum(values, MOST_RATIO)
         return DirectionalTable(albedo.wavelengths, values.astype(np.float32))
 
@@ -242,11 +244,13 @@ def _gain(exponents: DirectionalTable, height_scale: float) -> DirectionalTable:
 
 
 def indices_of(
-    material: Reflectance | Inside | UnderFilm, wavelengths: NDArray[np.float64]
+    material: Reflectance | Inside | UnderFilm | UnderStack, wavelengths: NDArray[np.float64]
 ) -> Indices | None:
     """n + ik of a material at wavelengths (n,), nm, in the variant's colours; None for R = 1."""
     if isinstance(material, Perfect):
         return None
+    if isinstance(material, UnderStack):
+        return material.at(wavelengths)
     if isinstance(material, UnderFilm):
         index = indices_of(material.material, wavelengths)
         assert isinstance(index, np.ndarray)
@@ -270,7 +274,7 @@ def indices_of(
 
 
 def _indices_under(
-    material: Reflectance | Inside | UnderFilm,
+    material: Reflectance | Inside | UnderFilm | UnderStack,
     step: float,
     centre: float,
     wavelength_range: tuple[float, float],
@@ -289,14 +293,16 @@ def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:
 
 
 def _rounded_indices(
-    material: Reflectance | Inside | UnderFilm, step: float, wavelengths: NDArray[np.float64]
+    material: Reflectance | Inside | UnderFilm | UnderStack,
+    step: float,
+    wavelengths: NDArray[np.float64],
 ) -> Indices | None:
     """`indices_of`, to a step: an optimisation of them waits rarely, and sees s and the ratio of
     albedos as constants; g under a film has derivatives with respect to the film's numbers.
     """
     exact = indices_of(material, wavelengths)
-    if exact is None:
-        return None
+    if exact is None or isinstance(exact, Stacked):
+        return exact
     if isinstance(exact, fresnel.Filmed):
         index, film, depth = exact.parts
         phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)

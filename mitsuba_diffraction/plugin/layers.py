@@ -24,6 +24,7 @@ from ..optics.geometry import wavenumber
 from .directions import Pair
 from .fresnel import INDEX_PARTS, Conductor, Dielectric, Reflectance
 from .parameter_changes import Bounded
+from .stack import UnderStack
 from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
 
@@ -292,7 +293,7 @@ class Transmission:
     ratio, which is smooth; under a coat as the flat reflectance alone.
     """
 
-    fresnel: Reflectance | UnderCoat | UnderFilm
+    fresnel: Reflectance | UnderCoat | UnderFilm | UnderStack
     diffraction_share = 1.0
 
     def beneath(
@@ -320,7 +321,7 @@ class Blend:
     constant for which it gives no value. A white pair gains energy, towards grazing angles most.
     """
 
-    fresnel: Reflectance | UnderCoat | UnderFilm
+    fresnel: Reflectance | UnderCoat | UnderFilm | UnderStack
     weight: float
 
     @property

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import partial
+from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
@@ -10,10 +12,12 @@ import mitsuba as mi
 from ..errors import DiffractionError, warn
 from ..optics.materials import PERFECT, TISSUES, material_named
 from ..tables.table import DiffractionTable
+from .energy import indices_of
 from .fresnel import INDEX_PARTS, Conductor, Dielectric, Perfect, Reflectance
-from .layers import UnderFilm
+from .layers import UnderFilm, plain
 from .parameter_changes import ObjectValues
 from .properties import kind_of, number
+from .stack import UnderStack, read_layers
 from .surface_parameters import DEFAULT_WAVELENGTH, read_index
 from .types import Properties
 
@@ -128,6 +132,28 @@ def film_of(
         if refused:
             raise DiffractionError(refused)
     return filmed
+
+
+def stack_of(
+    props: Properties,
+    material: Reflectance | UnderFilm,
+    wavelength: float,
+    wavelengths: tuple[float, float],
+) -> Reflectance | UnderFilm | UnderStack:
+    """Read the stack; return the material under it, or the material as it is.
+
+    wavelength : nm, of mono variants; wavelengths : that the table serves.
+    """
+    if "layers" not in props:
+        return material
+    if not isinstance(name := props.get("layers"), str):
+        raise DiffractionError(f"layers={kind_of(name)} must be the name of a file (.toml)")
+    assert isinstance(material, Dielectric | Conductor)  # `support` refuses others
+    medium = Dielectric(read_index(props, "ext_ior", _above(props)), 1.0, "ext_eta")
+    layers = read_layers(Path(str(mi.file_resolver().resolve(name))))
+    return UnderStack(
+        material, partial(indices_of, material), layers, plain(medium.eta), wavelength, wavelengths
+    )
 
 
 def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, scale: float) -> None:

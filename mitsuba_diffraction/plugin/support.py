@@ -21,7 +21,7 @@ class Support:
     choice : name of the choice, for messages.
     index : boundary models that need a refractive index, all but Kirchhoff's.
     second_order : the second order of small slope.
-    coat, film : layers over the structure.
+    coat, film, layers : layers over the structure.
     nested : a BSDF beneath the structure.
     thesis : the layering of the thesis of 2014.
     placed : windows that sit where the light falls, `coherence="surface"`.
@@ -32,6 +32,7 @@ class Support:
     second_order: bool = True
     coat: bool = True
     film: bool = True
+    layers: bool = True
     nested: bool = True
     thesis: bool = True
     placed: bool = True
@@ -39,13 +40,15 @@ class Support:
 
 MIRROR = Support(
     "material='none', a mirror without a refractive index",
-    index=False, second_order=False, coat=False, film=False, nested=False,
+    index=False, second_order=False, coat=False, film=False, layers=False, nested=False,
 )  # fmt: skip
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
 DISPERSIVE = Support("a material whose index varies with the wavelength", second_order=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
-COAT = Support("coat_ior", film=False, thesis=False)
-FILM = Support("a thin film (film_ior)", second_order=False, coat=False, thesis=False)
+COAT = Support("coat_ior", film=False, layers=False, thesis=False)
+FILM = Support("a thin film (film_ior)", second_order=False, coat=False, layers=False, thesis=False)
+STACK = Support("layers, a stack", index=False, second_order=False, coat=False, film=False)
+OPAQUE = Support("layers that absorb the light for what lies beneath", nested=False)
 ABSORBING = Support("film_k, which absorbs the light for a nested BSDF", nested=False)
 THESIS = Support("layering='thesis'", second_order=False)
 PATCH = Support("coherence='patch'", second_order=False)

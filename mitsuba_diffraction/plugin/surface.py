@@ -22,6 +22,7 @@ from .layers import CoatedPair, UnderCoat, UnderFilm
 from .nesting import NestingBSDF
 from .parameter_changes import Bounded, Changeable
 from .power import power_model
+from .stack import UnderStack
 from .surface_parameters import SurfaceParameters
 from .types import BSDF, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 
@@ -46,7 +47,7 @@ class DiffractingSurface(NestingBSDF):
         self,
         props: Properties,
         surface: SurfaceParameters,
-        fresnel: Reflectance | UnderCoat | UnderFilm,
+        fresnel: Reflectance | UnderCoat | UnderFilm | UnderStack,
         nested: BSDF = None,
     ) -> None:
         super().__init__(props, nested)
@@ -179,6 +180,9 @@ class DiffractingSurface(NestingBSDF):
         film = None
         if isinstance(structure, UnderFilm):
             film, structure = Film(*structure.numbers()), structure.material
+        stacked = isinstance(structure, UnderStack)
+        if stacked:
+            structure = structure.material
         largest = float(dr.slice(dr.max(dr.detach(self.height_scale))))
         placed = self.window_positions is not None
         return Surface(
@@ -198,6 +202,7 @@ class DiffractingSurface(NestingBSDF):
             material=_described(structure),
             film=film,
             model=str(self.boundary),
+            stacked=stacked,
         )
 
     @property

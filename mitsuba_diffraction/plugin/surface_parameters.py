@@ -62,7 +62,8 @@ _COMMON = (
     "energy_conserving",
 )
 _LAYERS = (
-    "coat_ior", "film_ior", "film_k", "film_thickness", "layering", "diffuse_weight", "pigment",
+    "coat_ior", "film_ior", "film_k", "film_thickness", "layers", "layering", "diffuse_weight",
+    "pigment",
 )  # fmt: skip
 REFLECTING, TRANSMITTING = PLUGINS
 #: Names of the parameters of each plugin.

@@ -33,7 +33,7 @@ _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 GLSL = Consumer(
     "the realtime renderer",
     frozenset(Feature) - {
-        Feature.TRANSMISSION, Feature.FILM, Feature.PLACED,
+        Feature.TRANSMISSION, Feature.FILM, Feature.STACK, Feature.PLACED,
         Feature.VARYING_HEIGHT,
     },
     "leave it out, or render the scene with Mitsuba",

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from ...optics import boundary, through
 from ...optics.fresnel import Filmed
 from ...optics.paths import ABOVE, Path, Returned, Side
+from ...optics.stack import Stacked
 from ..directional import Real
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
-Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
+Index = Callable[[Real], "NDArray[np.complex128] | Filmed | Stacked | None"]
 #: Wavelengths at which a material is told from another.
 PROBES = 24
 
@@ -55,7 +56,7 @@ class Reflector:
         """Phase (rad) by which a film's fringe advances over a range of wavelengths (nm)."""
         film = self.index(np.array(wavelength_range[:1]))
         share = 1.0 - wavelength_range[0] / wavelength_range[1]
-        return film.phase * share if isinstance(film, Filmed) else 0.0
+        return film.phase * share if isinstance(film, Filmed | Stacked) else 0.0
 
 
 @dataclass(frozen=True)
@@ -101,10 +102,12 @@ class Dielectric:
         return [self.index, self.model, self.thin]
 
 
-def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
+def rounded(index: NDArray[np.complex128] | Filmed | Stacked | None) -> list[str] | None:
     """Round indices to five digits: single precision's noise makes no other material."""
     if index is None:
         return None
+    if isinstance(index, Stacked):
+        index = index.table.ravel() + 0j
     if isinstance(index, Filmed):
         index = np.concatenate([np.ravel(part) for part in index.parts])
     return [f"{n.real:.5g} {n.imag:.5g}" for n in index]

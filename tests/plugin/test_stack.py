@@ -1,0 +1,191 @@
+"""Stacks of layers: transfer matrices, means over thickness, colours, and what is refused."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError, reference
+from mitsuba_diffraction.optics.fresnel import Filmed
+from mitsuba_diffraction.optics.stack import amplitudes, mean_powers
+from mitsuba_diffraction.plugin.description import Feature, describe
+from mitsuba_diffraction.plugin.stack import read_layers
+from mitsuba_diffraction.realtime.glsl.materials import GLSL
+from tests.support.variants import obstacle
+
+pytestmark = pytest.mark.thorough
+
+FLAT = md.HeightField(np.zeros((8, 8)), 0.05, periodic=True)
+COSINES = np.cos(np.radians([0.0, 20, 45, 70, 88]))
+LAM = np.array([400.0, 550, 700])
+#: Gold, then a high, a low and an absorbing index upwards; nm.
+INDICES = np.array([0.3 + 2.5j, 2.3, 1.38, 1.6 + 0.05j])[:, None] * np.ones(3)
+THICK = np.array([60.0, 130.0, 90.0])
+
+
+@pytest.fixture
+def spectral():
+    if reason := obstacle("llvm_ad_spectral"):
+        pytest.skip(reason)
+    mi.set_variant("llvm_ad_spectral")
+
+
+def stack(folder, text):
+    (folder / "stack.toml").write_text(text)
+    return str(folder / "stack.toml")
+
+
+CHITIN = 'layers = [["chitin", 0.09], ["1.33", 0.08]]\nrepeat = 6\n'
+
+
+def test_reflection_is_that_of_transfer_matrices():
+    tmm = pytest.importorskip("tmm")
+    r_s, r_p = amplitudes(COSINES, LAM, INDICES, THICK)
+    depths = [np.inf, *THICK[::-1], np.inf]
+    for n, lam in enumerate(LAM):
+        for m, cosine in enumerate(COSINES):
+            column = [1.0, *INDICES[::-1, n]]
+            r = [tmm.coh_tmm(p, column, depths, np.arccos(cosine), lam)["r"] for p in "sp"]
+            # rounding
+            assert [r_s[n, m], r_p[n, m]] == pytest.approx(r, abs=1e-9)
+
+
+def test_one_layer_is_a_film():
+    got = amplitudes(COSINES, LAM, INDICES[:2], THICK[:1])
+    for n, lam in enumerate(LAM):
+        film = Filmed(INDICES[0, n], INDICES[1, n], 2 * np.pi * THICK[0] / lam)
+        expected = reference.fresnel.amplitudes(COSINES, film)
+        np.testing.assert_allclose([part[n] for part in got], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("pairs", [0, 1, 4])
+def test_quarter_waves_reflect_as_published(pairs):
+    """Zinc sulphide and cryolite on glass: Born and Wolf, section 1.6.5, eq. 95."""
+    high, low, glass, lam = 2.3, 1.35, 1.52, 546.0
+    layers = [high] + [low, high] * pairs
+    indices = np.array([glass, *layers])[:, None]
+    r_s, _ = amplitudes(np.ones(1), np.array([lam]), indices, lam / (4 * np.array(layers)))
+    x = high * (high / glass) * (high / low) ** (2 * pairs)
+    assert abs(r_s[0, 0]) ** 2 == pytest.approx(((1 - x) / (1 + x)) ** 2, abs=1e-12)
+
+
+def test_a_spread_is_the_mean_over_thicknesses():
+    rng = np.random.default_rng(0)
+    factors = 1 + 0.1 * rng.standard_normal(4000)
+    pairs = [amplitudes(COSINES, LAM, INDICES, f * THICK) for f in factors]
+    random = np.mean([np.abs(r_s) ** 2 for r_s, _ in pairs], axis=0)
+    got = mean_powers(COSINES, LAM, INDICES, THICK, 0.1)
+    # four standard errors of 4000 random thicknesses, of a deviation below 0.35
+    np.testing.assert_allclose(got[..., 0], random, atol=4 * 0.35 / np.sqrt(4000))
+    assert np.all(np.abs(got[..., 2]) <= np.sqrt((got[..., 0] * got[..., 1]).real) + 1e-12)
+
+
+def values(bsdf, angles, wavelengths):
+    """f cosθo in the plane of incidence from 30°, (angles, 4)."""
+    a, wi = np.radians(angles), np.radians(30.0)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(a))
+    si.wi, si.wavelengths = mi.Vector3f(float(-np.sin(wi)), 0, float(np.cos(wi))), wavelengths
+    wo = mi.Vector3f(mi.Float(np.sin(a)), 0.0, mi.Float(np.cos(a)))
+    f = bsdf.eval(mi.BSDFContext(), si, wo)
+    return np.stack([np.array(channel) for channel in (f[0, 0] if mi.is_polarized else f)], axis=-1)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.05])
+def test_a_surface_reflects_what_the_stack_does_at_the_half_vector(tmp_path, spectral, spread):
+    file = stack(tmp_path, f"{CHITIN}spread = {spread}")
+    shared = {"coherence_width": 2.0, "energy_conserving": False}
+    bsdf = mi.load_dict(md.bsdf_dict(FLAT, material="1.56+0.3i", layers=file, **shared))
+    perfect = mi.load_dict(md.bsdf_dict(FLAT, material="none", **shared))
+    angles, lam = np.array([10.0, 30, 50]), np.array([420.0, 500, 580, 660])
+    light = mi.Spectrum(lam.tolist())
+    ratio = values(bsdf, angles, light) / values(perfect, angles, light)
+    layers = read_layers(tmp_path / "stack.toml")
+    cosines = np.cos(np.radians(0.5 * (angles + 30)))
+    substrate = np.full((1, 4), 1.56 + 0.3j)
+    indices = np.concatenate([substrate, layers.indices(lam)])
+    powers = mean_powers(cosines, lam, indices, layers.thicknesses, spread)[..., :2].real
+    # linear interpolation between 24 nodes of a fringe; single precision
+    np.testing.assert_allclose(ratio, powers.mean(axis=-1).T, atol=0.008)
+    described = describe(bsdf)
+    assert Feature.STACK in described.features()
+    assert "a stack of layers" in GLSL.refusal(described)
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized"])
+def test_no_direction_reflects_more_than_it_receives(tmp_path, variant):
+    if reason := obstacle(variant):
+        pytest.skip(reason)
+    mi.set_variant(variant)
+    # 20 quarter waves of 550 nm: a stop band of 0.999
+    file = stack(tmp_path, 'layers = [["2.3", 0.0598], ["1.38", 0.0996]]\nrepeat = 10')
+    rough = md.gratings.sinusoidal(period=1.5, depth=0.1, periods=2)
+    bsdf = mi.load_dict(md.bsdf_dict(rough, coherence_width=3.0, layers=file))
+    random = mi.PCG32(1 << 15)
+    for theta in (0.0, 60.0, 85.0):
+        si = dr.zeros(mi.SurfaceInteraction3f, 1 << 15)
+        angle = np.radians(theta)
+        si.wi = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
+        si.wavelengths = mi.Color0f() if mi.is_rgb or mi.is_monochromatic else mi.Spectrum(550.0)
+        pair = mi.Point2f(random.next_float32(), random.next_float32())
+        weight = bsdf.sample(mi.BSDFContext(), si, random.next_float32(), pair)[1]
+        if mi.is_polarized:
+            weight = weight[0, 0]
+        albedo = np.mean(np.array(weight).reshape(-1, 1 << 15), axis=1)
+        assert albedo.max() < 1.01  # of 32768 samples
+        if theta == 0.0:
+            assert albedo.max() > 0.8
+
+
+def test_polarised_light_has_the_phases_of_a_film(tmp_path):
+    if reason := obstacle("llvm_ad_mono_polarized"):
+        pytest.skip(reason)
+    mi.set_variant("llvm_ad_mono_polarized")
+    shared = {"coherence_width": 8.0, "material": "Al", "energy_conserving": False}
+    film = {"film_ior": 1.77, "film_thickness": 250.0, "model": "kirchhoff"}
+    both = []
+    for more in (film, {"layers": stack(tmp_path, 'layers = [["1.77", 0.25]]')}):
+        bsdf = mi.load_dict(md.bsdf_dict(FLAT, **shared, **more))
+        si, angle = dr.zeros(mi.SurfaceInteraction3f), np.radians(50.0)
+        si.wi = mi.Vector3f(float(-np.sin(angle)), 0.0, float(np.cos(angle)))
+        wo = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
+        matrix = bsdf.eval(mi.BSDFContext(), si, wo)
+        both.append(np.array([[np.array(matrix[i, j])[0] for j in range(4)] for i in range(4)]))
+    # nodes over the angle
+    np.testing.assert_allclose(both[1] / both[0][0, 0], both[0] / both[0][0, 0], atol=5e-3)
+
+
+def test_iridophores_lie_beneath_a_scale(tmp_path, spectral):
+    below = md.bsdf_dict(FLAT, coherence_width=2.0, material="melanin",
+                         layers=stack(tmp_path, CHITIN))  # fmt: skip
+    scale = md.bsdf_dict(FLAT, coherence_width=2.0, material="keratin", pigment=below)
+    light = mi.Spectrum(500.0)
+    alone, with_stack = (
+        values(mi.load_dict(each), np.array([30.0]), light)[0, 0]
+        for each in (md.bsdf_dict(FLAT, coherence_width=2.0, material="keratin"), scale)
+    )
+    assert with_stack > 1.5 * alone
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "message"),
+    [
+        ("spread = 0.1", {}, "layers: expected pairs"),
+        ('layers = [["chitin", 0]]', {}, "layer 1: thickness"),
+        ('layers = [["chitim", 0.1]]', {}, "did you mean chitin"),
+        ('layers = [["none", 0.1]]', {}, "perfect conductor is no layer"),
+        ('layers = [["1.5", 0.1]]\nrepeet = 2', {}, "unknown key 'repeet'"),
+        ('layers = [["1.5", 0.1]]\nrepeat = 100', {}, "interfere"),
+        (CHITIN, {"coat_ior": 1.5}, "cannot be combined"),
+        (CHITIN, {"film_ior": 1.5, "film_thickness": 100.0}, "cannot be combined"),
+        (CHITIN, {"material": "none"}, "cannot be combined"),
+        (CHITIN, {"model": "small_slope"}, "cannot be combined"),
+        ('layers = [["melanin", 0.1]]', {"pigment": 0.5}, "absorb the light"),
+    ],
+)
+def test_wrong_stacks_are_one_line(tmp_path, spectral, text, more, message):
+    surface = md.bsdf_dict(FLAT, coherence_width=2.0, layers=stack(tmp_path, text), **more)
+    with pytest.raises((DiffractionError, RuntimeError), match=message):
+        mi.load_dict(surface)
