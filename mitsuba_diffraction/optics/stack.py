@@ -9,9 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .arithmetic import Number
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -84,7 +87,7 @@ def nodes(path: float, wavelengths: tuple[float, float]) -> tuple[int, int]:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stacked:
     """Index of a stack, accepted where Kirchhoff's model takes an index.
 
@@ -94,10 +97,10 @@ class Stacked:
     phase : largest phase (rad) of light there and back.
     """
 
-    table: Real = field(repr=False)
+    table: Any = field(repr=False)
     phase: float = 0.0
 
-    def amplitudes(self, cosine: Real) -> tuple[Complex, Complex]:
+    def amplitudes(self, cosine: Number) -> tuple[Number, Number]:
         """Return r_s and r_p of the mean powers; of a spread without its loss of polarisation."""
         place = np.clip(np.asarray(cosine), 0.0, 1.0) * (self.table.shape[-2] - 1)
         lower = np.minimum(place.astype(int), self.table.shape[-2] - 2)

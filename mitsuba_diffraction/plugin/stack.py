@@ -126,7 +126,7 @@ def _index_of(material: object, where: str) -> Callable[[Real], Complex]:
         places, values = tabulated_index(known)
     except DiffractionError as error:
         raise DiffractionError(f"{where}: {error}") from error
-    return lambda wavelengths: np.interp(wavelengths, places, values)
+    return lambda wavelengths: np.asarray(np.interp(wavelengths, places, values), np.complex128)
 
 
 class UnderStack:
@@ -192,7 +192,8 @@ class UnderStack:
             places = [(dr.rcp(w) - self._first) * self._rate for w in si.wavelengths]
         else:
             places = [mi.Float(float(row)) for row in range(self._rows)]
-        return [_Row(self._table, self._columns, self._rows, place) for place in places]
+        size = {"columns": self._columns, "rows": self._rows}
+        return [_Row(self._table, **size, place=place) for place in places]
 
     def traverse(self, callback: Callback) -> None:
         """Expose nothing."""
@@ -211,35 +212,36 @@ class UnderStack:
         return f"{self.material} under stack[{self.layers.name}, {count} layers{spread_text}]"
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Row(Stacked):
-    """Stack at one wavelength in a kernel."""
+    """Stack at one wavelength in a kernel.
 
-    def __init__(self, table: Any, columns: int, rows: int, place: Float) -> None:
-        last = max(rows - 2, 0)
-        place = dr.clip(place, 0.0, float(rows - 1))
-        row = dr.clip(dr.floor(place), 0.0, float(last))
-        values = {"table": table, "columns": columns, "row": mi.UInt32(row), "share": place - row,
-                  "single": rows == 1}  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, f"_{name}", value)
+    Attributes
+    ----------
+    columns : of the table; rows : one or more.
+    place : between the rows.
+    """
+
+    columns: int
+    rows: int
+    place: Float
 
     def amplitudes(self, cosine: Float) -> tuple[Number, Number]:
         """See `Stacked.amplitudes`."""
-        place = dr.clip(cosine, 0.0, 1.0) * (self._columns - 1.0)
-        lower = dr.clip(dr.floor(place), 0.0, self._columns - 2.0)
-        column, share = mi.UInt32(lower), place - lower
-        first = self._between(self._row, column, share)
-        if not self._single:
-            second = self._between(self._row + 1, column, share)
-            first = [dr.lerp(a, b, self._share) for a, b in zip(first, second, strict=True)]
-        return mi.Complex2f(first[0], 0.0), mi.Complex2f(first[1], first[2])
+        across = dr.clip(cosine, 0.0, 1.0) * (self.columns - 1.0)
+        column = dr.clip(dr.floor(across), 0.0, self.columns - 2.0)
+        place = dr.clip(self.place, 0.0, self.rows - 1.0)
+        row = dr.clip(dr.floor(place), 0.0, max(self.rows - 2.0, 0.0))
+        index = mi.UInt32(row) * self.columns + mi.UInt32(column)
+        values = self._between(index, across - column)
+        if self.rows > 1:
+            following = self._between(index + self.columns, across - column)
+            values = [dr.lerp(a, b, place - row) for a, b in zip(values, following, strict=True)]
+        return mi.Complex2f(values[0], 0.0), mi.Complex2f(values[1], values[2])
 
-    def _between(self, row: Any, column: Any, share: Float) -> list[Float]:
-        index = row * self._columns + column
-        ends = zip(
-            read_record(self._table, index, 4), read_record(self._table, index + 1, 4), strict=True
-        )
-        return [dr.lerp(a, b, share) for a, b in ends]
+    def _between(self, index: Any, share: Float) -> list[Float]:
+        ends = (read_record(self.table, each, 4) for each in (index, index + 1))
+        return [dr.lerp(a, b, share) for a, b in zip(*ends, strict=True)]
 
 
 def _of_channels(powers: Complex) -> Complex:
