@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import importlib
+from importlib.metadata import requires
 from typing import Any, NamedTuple
 
 from .errors import DiffractionError
+
+
+_NAME = "mitsuba_diffraction"
 
 
 class _Need(NamedTuple):
@@ -40,7 +44,7 @@ def optional(module: str, subject: str = "") -> Any:
 
     subject : file or option at which the need arose, for the message.
 
-    Raises a DiffractionError if it cannot be imported; the message names the extra.
+    Raises a DiffractionError if it cannot be imported; the message names packages and extra.
     """
     need = _NEEDS[module.partition(".")[0]]
     try:
@@ -50,5 +54,13 @@ def optional(module: str, subject: str = "") -> Any:
         alternative = f", or {need.alternative}" if need.alternative else ""
         raise DiffractionError(
             f"{place}{need.clause}, which is not installed: pip install "
-            f"'mitsuba-diffraction[{need.extra}]'{alternative}"
+            f"{_packages(need.extra)} (extra {need.extra}){alternative}"
         ) from error
+
+
+def _packages(extra: str) -> str:
+    """Return the packages of an extra for pip, which need no copy of this package."""
+    marked = [line.partition(";")[::2] for line in requires(_NAME) or ()]
+    return " ".join(
+        f"'{package.strip()}'" for package, marker in marked if f"extra == '{extra}'" in marker
+    )

@@ -37,9 +37,11 @@ def test_missing_package_names_an_extra_that_has_it(
         optional(module, "'a.spm'")
     text = str(caught.value)
     assert text.startswith("'a.spm': ")
-    extra = re.search(r"pip install 'mitsuba-diffraction\[(\w+)\]'", text)
-    assert extra, text
-    assert any(re.match(rf"{package}\b", requirement) for requirement in EXTRAS[extra[1]])
+    found = re.search(r"pip install (.+) \(extra (\w+)\)", text)
+    assert found, text
+    named, extra = found.groups()
+    assert any(re.match(rf"{package}\b", requirement) for requirement in EXTRAS[extra])
+    assert f"'{package.lower()}" in named.lower()
 
 
 def test_installed_package_is_the_module():

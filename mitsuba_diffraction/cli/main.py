@@ -23,6 +23,7 @@ from . import (
     evaluate,
     export_bsdf,
     export_osl,
+    hologram,
     info,
     orders,
     plan,
@@ -53,7 +54,8 @@ from .wording import speak_for
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
     precompute.add_parser, solve.add_parser, orders.add_parser, info.add_parser,
-    tangents.add_parser, presets.add_parser, plan.add_parser, render.add_parser, tonemap.add_parser,
+    tangents.add_parser, presets.add_parser, hologram.add_parser, plan.add_parser,
+    render.add_parser, tonemap.add_parser,
     brdf_map.add_parser, spectrum.add_parser,
     evaluate.add_parser, survey.add_parser, sweep.add_parser, tradeoff.add_parser,
     realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,

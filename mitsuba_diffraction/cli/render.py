@@ -57,8 +57,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_view(parser)
     parser.add_argument(
         "--denoise", action="store_true",
-        help="write a denoised picture, too, with _denoised in its name (extra denoise); the film "
-        "gets the box filter, which the denoiser needs",
+        help="write a denoised picture, too, with _denoised in its name (extra denoise); with "
+        "--frames, denoise each frame, all of one seed; the film gets the box filter, which the "
+        "denoiser needs",
     )  # fmt: skip
     parser.add_argument(
         "--preview", action="store_true",
@@ -90,8 +91,10 @@ def run(args: argparse.Namespace) -> int:
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
-    if args.denoise and (args.frames is not None or on_workers(args)):
-        args.parser.error("argument --denoise: is for one picture in one process")
+    if args.denoise:
+        if on_workers(args):
+            args.parser.error("argument --denoise: is for one process; leave the workers out")
+        optional("pyoidn")
     if args.frames is not None:
         if not moving:
             args.parser.error("argument --frames: say what changes, with --animate or --turn")
@@ -169,10 +172,8 @@ def _on_workers(args: argparse.Namespace) -> int:
 def _run_one(args: argparse.Namespace) -> int:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
-    if args.denoise:
-        optional("pyoidn")
-        for path in outputs.denoised:
-            check_writable(path)
+    for path in outputs.denoised if args.denoise else ():
+        check_writable(path)
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -356,12 +357,14 @@ def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
                 "scene": content,
                 **{f"-D {name}": value for name, value in sorted(values.items())},
                 "samples": args.spp or "the scene's",
-                "seed": args.seed + n,
+                # noise that stands still: a denoiser makes the same of it in all frames
+                "seed": args.seed + (0 if args.denoise else n),
                 "variant": args.mode or "the default",
                 "sensor": args.sensor,
                 "exposure": args.exposure,
                 "view": args.view,
                 "preview": args.preview,
+                "denoise": args.denoise,
                 "version": version("mitsuba_diffraction"),
             },
         )

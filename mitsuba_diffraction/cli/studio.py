@@ -6,10 +6,14 @@ Each is short for parameters of the stage, `scenes/own_mesh.xml`, which -D may s
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from ..errors import DiffractionError, quoted
-from ..files import MESHES, readable_file
-from ..scene.parameters import numbers_in
+from ..files import MESHES
+from ..scene.orbit import ORBIT
+from ..scene.parameters import numbers_in, parameters_of
+from ..scene.pictures import check_panorama
+from ..scene.stage import STUDIO
 from .options import number_between
 
 #: Materials of --look: parameters of the BSDF, that which --base sets, and its default.
@@ -48,7 +52,8 @@ def add_studio(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--orbit", action="store_true",
-        help=f"let the camera go around the mesh: --frames ({_FRAMES}) and --turn camera_azimuth",
+        help=f"let the camera go around the mesh, or the surfaces of a scene that diffract, in "
+        f"--frames ({_FRAMES}) pictures",
     )  # fmt: skip
     group.add_argument(
         "--clamp", metavar="L", type=number_between(1e-3, 1e6),
@@ -67,10 +72,10 @@ def take_studio(args: argparse.Namespace) -> None:
     values: dict[str, str] = {}
     is_mesh = args.scene.suffix.lower() in MESHES
     if args.env is not None or args.sun is not None:
-        sky = "daylight.xml" if args.env is None else "environment.xml"
+        sky = str(STUDIO.parent / ("daylight.xml" if args.env is None else "environment.xml"))
         values |= {"light": "outdoors.xml", "sky": sky} if is_mesh else {"light": sky}
     if args.env is not None:
-        values["environment"] = str(readable_file(args.env).absolute())
+        values["environment"] = str(check_panorama(Path(args.env)).absolute())
     if args.sun is not None:
         values |= {"sun_azimuth": args.sun[0], "sun_elevation": args.sun[1]}
         if args.env is not None:
@@ -79,7 +84,8 @@ def take_studio(args: argparse.Namespace) -> None:
     if args.height_scale is not None:
         values["height_scale"] = f"{args.height_scale:g}"
     if args.orbit:
-        args.turn.append("camera_azimuth")
+        own = is_mesh or "camera_azimuth" in (parameters_of(args.scene) or {})
+        args.turn.append("camera_azimuth" if own else ORBIT)
         args.frames = args.frames or _FRAMES
     if is_mesh and {"turn", "camera_azimuth"} & set(args.turn):
         values["frame"] = "turning"

@@ -192,7 +192,7 @@ def _check(texture: Texture) -> None:
     """
     if not is_bitmap(texture):
         return  # attributes of meshes are checked where there is a mesh
-    data = np.array(mi.traverse(texture)["data"])
+    data = np.array(mi.traverse(texture)["data"], np.float32)  # half precision would overflow
     if data.shape[-1] < 3:
         raise DiffractionError(
             f"orientation: the bitmap has {data.shape[-1]} channel; an orientation has "

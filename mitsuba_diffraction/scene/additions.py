@@ -24,6 +24,7 @@ from ..plugin.presets import PLUGIN as PRESET_PLUGIN
 from ..plugin.surface_parameters import NAMES
 from ..tables.orders import OrderTable
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
+from .orbit import ORBIT
 from .orientation.files import write_ply
 
 #: Shape that is put on the stage.
@@ -50,12 +51,14 @@ class SceneValues(NamedTuple):
     materials : surfaces by the id that they are put on.
     surface : parameters of the BSDF, for all diffracting surfaces of the scene.
     clamp : limit of samples in units of white, or None.
+    orbit : degrees by which the cameras are turned around the vertical.
     """
 
     parameters: dict[str, Any]
     materials: dict[str, str]
     surface: dict[str, Any]
     clamp: float | None
+    orbit: float
 
 
 def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
@@ -64,11 +67,12 @@ def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValu
     known : names of the scene's parameters, which precede the BSDF's.
     """
     materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k != CLAMP}
+    own = (CLAMP, ORBIT)
+    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k not in own}
     surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
     clamp = float(values[CLAMP]) if CLAMP in values else None
-    own = {k: v for k, v in rest.items() if k not in surface}
-    return SceneValues(own, materials, surface, clamp)
+    parameters = {k: v for k, v in rest.items() if k not in surface}
+    return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
 
 
 def fit_meshes(state: Any, folder: Path) -> None:

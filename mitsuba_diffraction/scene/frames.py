@@ -15,6 +15,7 @@ from ..errors import DiffractionError, warn
 from ..extras import optional
 from ..files import refuse_pipe
 from ..progress import Progress
+from .denoise import denoised
 from .load import load_scene, preview_samples, sensor_of, shrink
 from .parameters import files_of
 from .passes import Stop, render_passes
@@ -70,7 +71,7 @@ def render_frames(
     """Render and write frame after frame, in the variant that is set; ends early after Ctrl-C.
 
     frames : settings hold `samples` (a number, or a text for the scene's own), `seed`, `sensor`,
-        `exposure`, `view` and `preview`.
+        `exposure`, `view`, `preview` and `denoise`.
     with_exr : write a linear EXR beside each PNG.
     progress : called as progress(samples done, samples in all, text).
 
@@ -81,7 +82,7 @@ def render_frames(
         for n, frame in enumerate(frames):
             settings = frame.settings
             # the scene before is held until the next is there, and with it its tables
-            loaded = load_scene(scene, frame.values)
+            loaded = load_scene(scene, frame.values, box_filter=settings["denoise"])
             sensor = sensor_of(loaded, settings["sensor"])
             if settings["preview"]:
                 shrink(sensor)
@@ -98,7 +99,10 @@ def render_frames(
             )  # fmt: skip
             if result.interrupted and result.spp < spp:
                 return
-            write_frame(frame, result.bitmap, scene, variant, with_exr)
+            picture = result.bitmap
+            if settings["denoise"]:
+                picture = denoised(loaded, sensor, picture, result.spp, settings["seed"])
+            write_frame(frame, picture, scene, variant, with_exr)
             yield frame
             if stop.asked:
                 return

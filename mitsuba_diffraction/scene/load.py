@@ -104,6 +104,7 @@ def load_scene(
 
     from .additions import split_values
     from .bands import WiderTables, warn_of_dark_bands
+    from .orbit import turn_cameras
 
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
@@ -128,6 +129,8 @@ def load_scene(
     for number, shape in surfaces.items():
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
+    if values.orbit:
+        turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
     named = {name_of(shape, number): shape.bsdf() for number, shape in surfaces.items()}
     warn_of_dark_bands(scene.sensors(), named)
     return scene

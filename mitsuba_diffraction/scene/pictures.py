@@ -40,6 +40,36 @@ def read_exr(path: Path) -> Any:
     return colours
 
 
+def check_panorama(path: Path) -> Path:
+    """Return the path of a panorama after a look at the file.
+
+    Raises a DiffractionError if the file is no picture of latitude and longitude, twice as wide as
+    high, or not linear.
+    """
+    import mitsuba as mi
+
+    readable_file(path)
+    try:
+        picture = mi.Bitmap(str(path))
+    except RuntimeError as error:
+        reason = one_line(str(error)).rpartition("] ")[2].rpartition(": ")[2].rstrip("!")
+        raise DiffractionError(
+            f"'{path}' is not a panorama that Mitsuba reads ({reason}); name an HDR or EXR"
+        ) from error
+    width, height = picture.width(), picture.height()
+    if not 1.9 <= width / height <= 2.1:
+        raise DiffractionError(
+            f"'{path}' has {width} x {height} pixels, but a panorama of latitude and longitude is "
+            "twice as wide as high; convert it, e.g. a cube map or light probe, first"
+        )
+    if picture.component_format() in (mi.Struct.Type.UInt8, mi.Struct.Type.UInt16):
+        raise DiffractionError(
+            f"'{path}' is a picture for screens, in which the sun and lamps are cut off at white; "
+            "name an HDR or EXR"
+        )
+    return path
+
+
 def colours_of(bitmap: Any) -> Any | None:
     """Return the part of a film's bitmap that a screen can show; None if there is none.
 

@@ -67,6 +67,7 @@ def write_scenes(folder: Path) -> None:
     _write_png(textures / "stone.png", pigment.stone())
     _write_png(textures / "back.png", pigment.back())
     sticker().write(textures)
+    _write_png(textures / "black.png", np.zeros((1, 1)))
     close = piece(scales=CLOSE_SCALES, columns=CLOSE_COLUMNS, rows=CLOSE_ROWS)
     _write_scene_mesh(meshes / "scales.ply", close)
     painted = pigment.corn_snake_piece(CLOSE_SCALES, CLOSE_COLUMNS, CLOSE_ROWS)

@@ -20,7 +20,6 @@ Floats = NDArray[np.float64]
 def sticker(dots: int = 384) -> Hologram:
     """Return the textures of a square sticker of so many dots a side."""
     x, y = np.meshgrid(*[(np.arange(dots) + 0.5) / dots * 2.0 - 1.0] * 2)
-    y = -y  # row 0 is at the top
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     periods, turns = np.full(x.shape, np.nan), np.zeros(x.shape)
 

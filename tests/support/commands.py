@@ -19,6 +19,7 @@ from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
 from tests.support.clone import small_clone
 from tests.support.instruments import nanoscope
+from tests.support.logos import drawn, write_board
 from tests.support.pages import blocks, spans, typed
 
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
@@ -81,7 +82,7 @@ def run(words: list[str]) -> None:
     for option in {"--workers", "--jobs"} & set(rest):  # tests/cluster starts processes
         at = rest.index(option)
         del rest[at : at + 2]
-    if command == "render" and not rest[0].endswith(".xml"):  # on the package's own stage
+    if command == "render" and (not rest[0].endswith(".xml") or "label" in rest[0]):  # large stages
         rest += ["-D", "resx=12", "-D", "resy=10"]
     if "--preset" in rest and command in ("render", "export-viewer"):
         at = rest.index("--preset") + 1
@@ -151,6 +152,8 @@ def small_tree(folder: Path) -> Path:
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
     Image.fromarray(grey).save(folder / "cow.png")
     mi.Bitmap(np.full((4, 8, 3), 0.4, np.float32)).write(str(folder / "sky.hdr"))
+    drawn(32, 1).save(folder / "logo.png")
+    write_board(folder / "bottle.obj")
     (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):

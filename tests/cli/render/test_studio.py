@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
@@ -22,8 +23,11 @@ def parameters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """`parameters(*options)`: values for the scene, and the options as `render` has them."""
     monkeypatch.chdir(tmp_path)
     mi.set_variant("llvm_ad_spectral")
-    for name in ("sky.hdr", "scale.npy", "skin.png"):
+    for name in ("scale.npy", "skin.png", "none.exr"):
         Path(name).write_bytes(b"x")
+    mi.Bitmap(np.ones((2, 4, 3), np.float32)).write("sky.hdr")
+    mi.Bitmap(np.ones((4, 4, 3), np.float32)).write("probe.hdr")
+    mi.Bitmap(np.ones((2, 4, 3), np.uint8)).write("screen.png")
 
     def call(*options: str):
         args = build_parser().parse_args(["render", str(MESH), *options])
@@ -40,12 +44,13 @@ def parameters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_a_panorama_and_a_sun_light_the_scene_outdoors(parameters):
     values, _ = parameters("--preset", "cd", "--env", "sky.hdr", "--sun", "120,40")
-    assert (values["light"], values["sky"]) == ("outdoors.xml", "environment.xml")
+    assert values["light"] == "outdoors.xml"
+    assert Path(values["sky"]).name == "environment.xml"
     assert Path(values["environment"]).name == "sky.hdr"
     assert (values["sun_azimuth"], values["sun_elevation"]) == ("120", "40")
     assert float(values["sun_irradiance"]) > 0
     values, _ = parameters("--preset", "cd", "--sun=-30,10", "-D", "sun_elevation=12")
-    assert values["sky"] == "daylight.xml"
+    assert Path(values["sky"]).name == "daylight.xml"
     assert values["sun_elevation"] == "12"  # -D goes before
 
 
@@ -71,6 +76,15 @@ def test_an_orbit_turns_the_camera_around_a_mesh_framed_for_all_turns(parameters
     assert (args.frames, args.turn) == (24, ["camera_azimuth"])
 
 
+@pytest.mark.parametrize(
+    ("scene", "turned"), [("material_ball", "render:orbit"), ("label", "camera_azimuth")]
+)
+def test_any_scene_has_an_orbit(scene, turned):
+    args = build_parser().parse_args(["render", str(STUDIO.with_name(f"{scene}.xml")), "--orbit"])
+    take_studio(args)
+    assert (args.frames, args.turn) == (24, [turned])
+
+
 def test_parameters_of_the_surface_change_a_preset(parameters):
     values, _ = parameters("--preset", "snake", "-D", "pigment=0.3,0.2,0.1", "-D", "resx=8")
     assert values["material:surface"] == "preset:snake,pigment=0.3,0.2,0.1"
@@ -82,6 +96,9 @@ def test_parameters_of_the_surface_change_a_preset(parameters):
     [
         (["--look", "metal", "--base", "sienna"], "--base 'sienna' is not a metal"),
         (["--env", "none.hdr"], "'none.hdr' does not exist"),
+        (["--env", "none.exr"], "'none.exr' is not a panorama"),
+        (["--env", "probe.hdr"], "twice as wide as high"),
+        (["--env", "screen.png"], "a picture for screens"),
     ],
 )
 def test_what_does_not_fit_is_an_error(parameters, options, said):

@@ -1,0 +1,80 @@
+"""`mitsuba-diffraction hologram`: from a logo to a scene with its hologram."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from . import options
+from .console import mitsuba_warnings
+from .options import number_between, whole_number
+from .report import save_report
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "hologram", run, "make a hologram of a logo: textures and a scene",
+        "Divide a picture into areas of a few colours, give each the grating that shows its "
+        "colour, and write textures and a scene with a card, or with a label on the front of a "
+        "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
+    )  # fmt: skip
+    parser.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, JPEG, ...")
+    parser.add_argument("--mesh", metavar="FILE", type=Path, help="mesh with texture coordinates")
+    options.add_output(parser, "default: PICTURE_hologram", metavar="FOLDER")
+    parser.add_argument(
+        "--colours", metavar="N", type=whole_number(1), default=6,
+        help="largest number of colours; default: 6",
+    )  # fmt: skip
+    parser.add_argument(
+        "--dots", metavar="N", type=whole_number(16), default=512,
+        help="dots along the longer side; default: 512",
+    )  # fmt: skip
+    parser.add_argument(
+        "--keep-ground", action="store_true",
+        help="give the colour of most of the border a grating, too",
+    )  # fmt: skip
+    parser.add_argument(
+        "--width", metavar="S", type=number_between(0.01, 10), default=0.5,
+        help="of a label, as a share of the mesh's width; default: 0.5",
+    )  # fmt: skip
+    parser.add_argument(
+        "--height", metavar="S", type=number_between(0, 1), default=0.5,
+        help="of a label's middle, as a share of the mesh's height; default: 0.5",
+    )  # fmt: skip
+    parser.add_argument(
+        "--turn", metavar="DEG", type=number_between(-360, 360), default=0.0,
+        help="turn the mesh around the vertical, which puts another side to the front; default: 0",
+    )  # fmt: skip
+    parser.add_argument(
+        "--up", metavar="AXIS", default="auto", help="axis of the mesh that points upwards: x, y, "
+        "z, with a minus sign if it points downwards; default: auto",
+    )  # fmt: skip
+    options.add_json(parser, "colours and files")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the folder, print the colours, and return the exit code."""
+    from ..scene import label
+    from ..scene.load import set_variant
+    from ..scene.logo import areas
+
+    folder = args.output or Path(f"{args.picture.stem}_hologram")
+    parts = areas(args.picture, colours=args.colours, dots=args.dots, keep_ground=args.keep_ground)
+    ny, nx = parts.labels.shape
+    values = {}
+    with mitsuba_warnings():
+        if args.mesh is None:
+            place = label.card(nx / ny)
+        else:
+            set_variant("scalar_rgb")
+            place = label.front(
+                args.mesh, nx / ny, width=args.width, height=args.height, up=args.up,
+                turn=args.turn,
+            )  # fmt: skip
+            values = {"turn": f"{args.turn:g}", "up": args.up}
+        scene = label.write(folder, parts, place, args.mesh, **values)
+    for line in label.described(parts):
+        print(line)
+    print(f"{scene}: render it, e.g. mitsuba-diffraction render {scene} --denoise")
+    save_report(args, {"scene": scene, "colours": label.described(parts)})
+    return 0

@@ -1,0 +1,237 @@
+"""Scenes of a hologram made from a logo: on a card, or as a label on the front of a mesh."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from ..plugin.presets import PATCHES
+from .fitted_mesh import fitted_mesh
+from .logo import Areas, logo, wavelengths_of
+from .orientation.files import load_mesh
+from .stage import STUDIO
+
+Floats = NDArray[np.float64]
+
+#: Length of the tangential part of ω_i + ω_o: periods of 1.0 to 1.4 µm are blue to red.
+TANGENTIAL = 0.448
+#: Period of the patch that the scene stretches, µm: `precompute/hologram.toml`.
+PERIOD = 1.3
+# Elevation of the scene's camera and distance of its ring, degrees and cm; elevations of the ring,
+# which is 2° high; half of the card's larger side, cm
+_CAMERA, _DISTANCE, _RING, _CARD = 8.0, 158.0, (6.0, 80.0), 3.0
+# Factors on the patch's period that the plugin's table serves well
+_STRETCH = (0.4, 1.5)
+
+
+class Place(NamedTuple):
+    """Place of a label on a surface.
+
+    Attributes
+    ----------
+    matrix : (2, 3), centimetres to the right and upwards from the label's middle, of (u, v, 1).
+    size : (width, height), cm.
+    elevation : of the surface's normal, degrees.
+    """
+
+    matrix: Floats
+    size: tuple[float, float]
+    elevation: float
+
+
+def card(aspect: float) -> Place:
+    """Return the place of a picture, of this width over height, that fills an upright card."""
+    width, height = 2 * _CARD * min(1.0, aspect), 2 * _CARD * min(1.0, 1.0 / aspect)
+    matrix = np.array([[width, 0.0, -width / 2], [0.0, height, -height / 2]])
+    return Place(matrix, (width, height), 0.0)
+
+
+def front(
+    file: Path, aspect: float, *, width: float, height: float, up: str = "auto", turn: float = 0.0
+) -> Place:
+    """Return the place of a label on the front of a mesh, upright and not mirrored.
+
+    The texture coordinates of the triangle in the label's middle are continued over the label.
+
+    Parameters
+    ----------
+    file : mesh.
+    aspect : width over height of the picture.
+    width : of the label, as a share of the mesh's width.
+    height : of the label's middle, as a share of the mesh's height.
+    up, turn : axis that points upwards, and degrees around it, as in the scene.
+
+    Raises a DiffractionError if the mesh has no texture coordinates, or no area of them there.
+    """
+    own = load_mesh(file)  # coordinates before those without area are replaced
+    if own.uv is None:
+        raise DiffractionError(
+            f"mesh '{file}' has no texture coordinates, which a label needs; unwrap it, e.g. in "
+            "Blender"
+        )
+    mesh = fitted_mesh(file, up=up)
+    sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
+    rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    corners, uv = (mesh.positions @ rotation.T)[mesh.faces], own.uv[own.faces]
+    normals = (mesh.normals @ rotation.T)[mesh.faces].sum(axis=1)
+    sides = np.ptp(corners.reshape(-1, 3), axis=0)
+    number, weights = _in_front(corners, height * sides[2], normals)
+    normal = normals[number] / np.linalg.norm(normals[number])
+    right = np.array([-normal[1], normal[0], 0.0]) / math.hypot(normal[0], normal[1])
+    edges = corners[number, 1:] - corners[number, 0]
+    flat = np.stack([edges @ right, edges @ np.cross(normal, right)])  # (2, 2), columns are edges
+    steps = (uv[number, 1:] - uv[number, 0]).T
+    if abs(np.linalg.det(steps)) < 1e-12:
+        raise DiffractionError(
+            f"mesh '{file}': its texture coordinates have no area in the label's middle; unwrap it "
+            "again, or turn another side to the front"
+        )
+    linear = flat @ np.linalg.inv(steps)
+    shift = -linear @ (weights @ uv[number])
+    wide = width * sides[0]
+    elevation = math.degrees(math.asin(float(np.clip(normal[2], -1.0, 1.0))))
+    return Place(np.column_stack([linear, shift]), (wide, wide / aspect), elevation)
+
+
+def _in_front(corners: Floats, z: float, normals: Floats) -> tuple[int, Floats]:
+    """Return the triangle seen first from −y at x = 0 and this height, and its barycentric place.
+
+    Where the axis meets no triangle, it is the nearest one that faces −y.
+    """
+    a, b, c = np.moveaxis(corners[..., [0, 2]], 1, 0)
+    point = np.array([0.0, z])
+
+    def area(p: Floats, q: Floats, r: Floats) -> Floats:
+        return np.asarray(
+            (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
+            - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
+        )
+
+    whole = area(a, b, c)
+    parts = np.stack([area(point, b, c), area(a, point, c), area(a, b, point)], 1)
+    weights = parts / np.where(whole == 0.0, np.nan, whole)[:, None]
+    hit = (weights >= -1e-9).all(axis=1) & (normals[:, 1] < 0.0)
+    if hit.any():
+        depth = np.where(hit, np.einsum("ij,ij->i", weights, corners[..., 1]), np.inf)
+        number = int(depth.argmin())
+        return number, weights[number]
+    away = np.linalg.norm(corners.mean(axis=1)[:, [0, 2]] - point, axis=1)
+    return int(np.where(normals[:, 1] < 0.0, away, np.inf).argmin()), np.full(3, 1.0 / 3.0)
+
+
+def geometry(elevation: float) -> tuple[float, float]:
+    """Return the ring's elevation, degrees, and the tangential part of ω_i + ω_o upwards.
+
+    elevation : of the label's normal, degrees.
+
+    Raises a DiffractionError if no ring shows colours there.
+    """
+    seen = math.sin(math.radians(_CAMERA - elevation))
+    wanted = math.degrees(math.asin(float(np.clip(TANGENTIAL - seen, -1.0, 1.0))))
+    ring = float(np.clip(wanted + elevation, *_RING))
+    tangential = seen + math.sin(math.radians(ring - elevation))
+    stretch = [nm * 1e-3 / tangential / PERIOD if tangential > 0 else 0.0 for nm in (445, 640)]
+    if not _STRETCH[0] <= stretch[0] <= stretch[1] <= _STRETCH[1]:
+        raise DiffractionError(
+            f"the label's surface is inclined by {abs(elevation):.0f}°, where no lamp shows its "
+            "colours to the camera; choose another height or turn"
+        )
+    return ring, tangential
+
+
+def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values: str) -> Path:
+    """Write textures, patch, light and scene into a folder; return the scene.
+
+    Parameters
+    ----------
+    parts : areas of the picture.
+    place : where the label lies.
+    mesh : copied into the folder; None for a card.
+    values : defaults of the scene's parameters.
+
+    Raises a DiffractionError if the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(f"cannot make the folder '{folder}': {error.strerror}") from error
+    ring, tangential = geometry(place.elevation)
+    linear = place.matrix[:, :2]
+    # degrees from the first tangent, in the label's plane, to the label's upward direction
+    orientation = 90.0 - math.degrees(math.atan2(linear[1, 0], linear[0, 0]))
+    foil = logo(parts, tangential=tangential, orientation=orientation, period=PERIOD)
+    names = foil.write(folder, "label")
+    around = np.full(foil.weight.shape, 255, np.uint8)
+    around[1:-1, 1:-1] = 0
+    with atomic_path(folder / "label_around.png") as temporary:
+        Image.fromarray(around).save(temporary, optimize=True)
+    copies = {"grating.toml": PATCHES / "hologram.toml", "ring.xml": STUDIO.parent / "ring.xml"}
+    if mesh is not None:
+        copies[mesh.name] = mesh
+    for name, source in copies.items():
+        with atomic_path(folder / name) as temporary:
+            shutil.copyfile(source, temporary)
+    ny, nx = foil.weight.shape
+    # from centimetres to the texture, whose row 0 is at the top and whose margin has one texel
+    size = np.array(place.size) * [nx / (nx - 2), ny / (ny - 2)]
+    rows = place.matrix / size[:, None] * [[1.0], [-1.0]]
+    rows[:, 2] += 0.5
+    (a, b, c), (d, e, f) = rows
+    middle, half = (_DISTANCE * math.sin(math.radians(ring + side)) for side in (0, 1))
+    given = {
+        "patch": "grating.toml", "around": "label_around.png",
+        **{name: path.name for name, path in names._asdict().items()},
+        "to_uv": " ".join(f"{x:.9g}" for x in (a, b, 0, c, d, e, 0, f, 0, 0, 1, 0, 0, 0, 0, 1)),
+        "half_width": f"{place.size[0] / 2:.6g}", "half_height": f"{place.size[1] / 2:.6g}",
+    }  # fmt: skip
+    lamp = {
+        "ring_radius": f"{_DISTANCE * math.cos(math.radians(ring)):.6g}",
+        "ring_low": f"{3 + 2 * middle - half:.6g}", "ring_high": f"{3 + half:.6g}",
+    }  # fmt: skip
+    scene = folder / "label.xml"
+    _write_scene(scene, given | values, lamp, mesh)
+    return scene
+
+
+def _write_scene(
+    file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: Path | None
+) -> None:
+    """Write the scene with these defaults, and a mesh in the card's place."""
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    parser = ElementTree.XMLParser(target=builder)
+    root = ElementTree.parse(STUDIO.parent / "label.xml", parser).getroot()
+    for default in root.iter("default"):
+        default.set("value", values.get(default.get("name", ""), default.get("value", "")))
+    for number, (name, value) in enumerate(lamp.items()):
+        root.insert(number, ElementTree.Element("default", name=name, value=value))
+    if mesh is not None:
+        shape = next(each for each in root.iter("shape") if each.get("id") == "label")
+        shape.set("type", "fitted_mesh")
+        placed = shape.find("transform")
+        assert placed is not None
+        placed[:] = [ElementTree.Element("rotate", z="1", angle="$turn")]
+        texts = {"filename": mesh.name, "up": "$up", "frame": "$frame"}
+        shape[:0] = [ElementTree.Element("string", name=k, value=v) for k, v in texts.items()]
+    ElementTree.indent(root, "    ")
+    text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode")
+    with atomic_path(file) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def described(parts: Areas) -> list[str]:
+    """List the colours of a logo with the wavelengths that show them."""
+    return [
+        f"#{''.join(f'{round(c):02x}' for c in colour)}: "
+        f"{' and '.join(f'{nm:.0f}' for nm in wavelengths_of(colour))} nm"
+        for colour in parts.colours
+    ]

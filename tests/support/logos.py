@@ -1,0 +1,65 @@
+"""A logo with a letter, which no mirror and no turn maps onto itself, and meshes to put it on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+#: Colours of the logo, most frequent first.
+COLOURS = ((230, 60, 40), (250, 210, 40), (40, 80, 200))
+
+
+def drawn(width: int, finer: int) -> Image.Image:
+    """Return a shield with a disc and the letter F; antialiased if drawn finer than shown."""
+    unit = width * finer / 64
+    picture = Image.new("RGBA", (round(64 * unit), round(48 * unit)), (0, 0, 0, 0))
+    pen = ImageDraw.Draw(picture)
+
+    def box(*sides: float) -> tuple[float, ...]:
+        x, y, right, bottom = (side * unit for side in sides)
+        return x, y, right - 1, bottom - 1
+
+    pen.rounded_rectangle(box(4, 4, 60, 44), 6 * unit, fill=COLOURS[0])
+    pen.ellipse(box(8, 12, 32, 36), fill=COLOURS[1])
+    for stroke in ((38, 10, 42, 38), (38, 10, 54, 15), (38, 20, 50, 25)):
+        pen.rectangle(box(*stroke), fill=COLOURS[2])
+    size = width, width * 3 // 4
+    return picture.resize(size, Image.Resampling.BOX) if finer > 1 else picture
+
+
+def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
+    """Write a board of 64 × 8 × 48 mm, z up, whose front has the unit square of coordinates.
+
+    turn : quarter turns of the texture coordinates.
+    """
+    x, y, z = 32.0, 4.0, 48.0
+    corners = [(s * x + 500.0, t * y, h) for t in (-1, 1) for h in (0.0, z) for s in (-1, 1)]
+    quads = ((0, 1, 3, 2), (5, 4, 6, 7), (4, 0, 2, 6), (1, 5, 7, 3), (2, 3, 7, 6), (4, 5, 1, 0))
+    uv: NDArray[np.float64] = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
+    angle = np.pi / 2 * turn
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    front = (uv - 0.5) @ rotation.T + 0.5
+    if file.suffix == ".obj":
+        lines = [f"v {a} {b} {c}" for a, b, c in corners]
+        places = (*front, *(uv * 0.1 + 7)) if with_uv else ()
+        lines += [f"vt {a:.6f} {b:.6f}" for a, b in places]
+        for number, quad in enumerate(quads):
+            first = 1 if number == 0 else 5
+            ends = (f"{v + 1}/{first + k}" if with_uv else f"{v + 1}" for k, v in enumerate(quad))
+            lines.append("f " + " ".join(ends))
+        file.write_text("\n".join(lines) + "\n")
+        return
+    rows, faces = [], []
+    for number, quad in enumerate(quads):
+        places = front if number == 0 else uv * 0.1 + 7
+        rows += [f"{' '.join(map(str, corners[v]))} {places[k][0]:.6f} {places[k][1]:.6f}"
+                 for k, v in enumerate(quad)]  # fmt: skip
+        a = 4 * number
+        faces += [f"3 {a} {a + 1} {a + 2}", f"3 {a} {a + 2} {a + 3}"]
+    header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
+    header += [f"property float {name}" for name in ("x", "y", "z", "s", "t")]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    file.write_text("\n".join([*header, *rows, *faces]) + "\n")
