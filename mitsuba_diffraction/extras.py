@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from .errors import DiffractionError
 
-
 _NAME = "mitsuba_diffraction"
 
 

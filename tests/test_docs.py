@@ -83,6 +83,8 @@ def check_command(words: list[str]) -> None:
         return
     if hasattr(args, "scene") and hasattr(args, "parameters"):
         scene = STUDIO if args.scene.suffix in MESHES else ROOT / args.scene
+        if scene.name == "label.xml":  # written by `hologram`
+            scene = STUDIO.with_name(scene.name)
         known = parameters_of(scene)
         assert known is not None
         assert {name for name, _ in args.parameters} <= set(known)

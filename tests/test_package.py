@@ -79,7 +79,7 @@ def test_the_wheel_holds_nothing_else(in_wheel):
     info = f"mitsuba_diffraction-{md.__version__}.dist-info/"
     others = {name for name in in_wheel if not name.startswith(info)}
     # `render MESH` works without a clone
-    scenes = ("own_mesh", "studio", "lamp", "outdoors", "daylight", "environment")
+    scenes = ("own_mesh", "studio", "lamp", "outdoors", "daylight", "environment", "label", "ring")
     studio = {f"mitsuba_diffraction/scene/studio/{n}.xml" for n in scenes}
     brought = studio | {
         f"mitsuba_diffraction/plugin/patches/{look.patch.relative_to(ROOT / 'precompute')}"

@@ -9,6 +9,7 @@ tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
 orders                 efficiencies of solved orders as a CSV
 presets                the named looks of --preset
+hologram               a logo as textures and a scene
 plan                   recipes of smaller tables, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 animation              options of `render --frames`, and reasons to render frames again

@@ -13,6 +13,9 @@ clamping     integrator that limits the light of single samples
 bands        films with a band for each receptor of an eye, and tables that cover it
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor
 hologram     textures of dot-matrix holograms from pictures
+logo         areas of colour of a picture, and the gratings that show them
+label        scenes of a logo's hologram, on a card or a mesh
+orbit        cameras that go around what diffracts
 stage        the studio for meshes without a scene
 planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh

@@ -27,9 +27,13 @@ Floats = NDArray[np.float64]
 TANGENTIAL = 0.448
 #: Period of the patch that the scene stretches, µm: `precompute/hologram.toml`.
 PERIOD = 1.3
-# Elevation of the scene's camera and distance of its ring, degrees and cm; elevations of the ring,
-# which is 2° high; half of the card's larger side, cm
-_CAMERA, _DISTANCE, _RING, _CARD = 8.0, 158.0, (6.0, 80.0), 3.0
+# The scene's camera: elevation, degrees, distance and height of the point it looks at, cm; so far
+# that colours change little over the label
+_CAMERA, _FAR, _MIDDLE = 8.0, 400.0, 3.0
+# The ring, which is 2° high: distance, cm, and elevations, degrees
+_DISTANCE, _RING = 600.0, (6.0, 80.0)
+# Half of the card's larger side, cm, and its part of the picture of 4 by 3
+_CARD, _FILLED, _PICTURE = 3.0, 0.86, 4.0 / 3.0
 # Factors on the patch's period that the plugin's table serves well
 _STRETCH = (0.4, 1.5)
 
@@ -187,16 +191,18 @@ def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values:
     rows = place.matrix / size[:, None] * [[1.0], [-1.0]]
     rows[:, 2] += 0.5
     (a, b, c), (d, e, f) = rows
-    middle, half = (_DISTANCE * math.sin(math.radians(ring + side)) for side in (0, 1))
+    low, high = (_DISTANCE * math.sin(math.radians(ring + side)) for side in (-1, 1))
+    seen = max(place.size[1], place.size[0] / _PICTURE) / 2 / _FILLED  # half of the picture
     given = {
         "patch": "grating.toml", "around": "label_around.png",
         **{name: path.name for name, path in names._asdict().items()},
         "to_uv": " ".join(f"{x:.9g}" for x in (a, b, 0, c, d, e, 0, f, 0, 0, 1, 0, 0, 0, 0, 1)),
+        "fov": f"{2 * math.degrees(math.atan(seen / _FAR)):.6g}" if mesh is None else "1",
         "half_width": f"{place.size[0] / 2:.6g}", "half_height": f"{place.size[1] / 2:.6g}",
     }  # fmt: skip
     lamp = {
         "ring_radius": f"{_DISTANCE * math.cos(math.radians(ring)):.6g}",
-        "ring_low": f"{3 + 2 * middle - half:.6g}", "ring_high": f"{3 + half:.6g}",
+        "ring_low": f"{_MIDDLE + low:.6g}", "ring_high": f"{_MIDDLE + high:.6g}",
     }  # fmt: skip
     scene = folder / "label.xml"
     _write_scene(scene, given | values, lamp, mesh)

@@ -116,8 +116,7 @@ def test_on_a_mesh_it_is_as_a_diffuse_texture_on_an_obj(
     check(seen, truth)
     # light is spread upwards
     assert place.elevation == pytest.approx(0.0, abs=1e-3)
-    angle = np.arctan2(*reversed([float(v) for v in place.matrix[:, 0]]))
-    upwards = np.pi / 2 - angle
+    upwards = np.pi / 2 - np.arctan2(place.matrix[1, 0], place.matrix[0, 0])
     first = np.array(found.dp_du)[:, 0]
     first = first / np.linalg.norm(first)
     second = np.cross(np.array(found.n)[:, 0], first)

@@ -44,8 +44,8 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
     front = (uv - 0.5) @ rotation.T + 0.5
     if file.suffix == ".obj":
         lines = [f"v {a} {b} {c}" for a, b, c in corners]
-        places = (*front, *(uv * 0.1 + 7)) if with_uv else ()
-        lines += [f"vt {a:.6f} {b:.6f}" for a, b in places]
+        used = (*front, *(uv * 0.1 + 7)) if with_uv else ()
+        lines += [f"vt {a:.6f} {b:.6f}" for a, b in used]
         for number, quad in enumerate(quads):
             first = 1 if number == 0 else 5
             ends = (f"{v + 1}/{first + k}" if with_uv else f"{v + 1}" for k, v in enumerate(quad))

@@ -41,11 +41,12 @@ def draw(folder: Path, samples: int) -> Path:
     for number, name in enumerate(names):
         ball = folder / f"{name}.png"
         command = ["render", "scenes/material_ball.xml", "--preset", name, "-s", str(samples),
-                   "-D", f"resx={width}", "-D", f"resy={height}", "-o", str(ball)]  # fmt: skip
+                   "-D", f"resx={width}", "-D", f"resy={height}", "--clamp", "20", "--denoise",
+                   "-o", str(ball)]  # fmt: skip
         if program(command):
             raise DiffractionError(f"the ball of {name} failed; its message stands above")
         x, y = number % _COLUMNS * width, number // _COLUMNS * (height + _LABEL)
-        with Image.open(ball) as picture:
+        with Image.open(ball.with_stem(f"{name}_denoised")) as picture:
             sheet.paste(picture.convert("RGB"), (x, y))
         pen.text((x + width / 2, y + height + 2), name, fill="black", anchor="ma")
     written = folder / "presets.png"
