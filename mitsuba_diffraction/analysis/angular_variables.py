@@ -4,6 +4,7 @@ References
 ----------
 H. Gruson, C. Andraud, W. Daney de Marcillac, S. Berthier, M. Elias and D. Gomez, Quantitative
 characterization of iridescent colours in biological studies, Interface Focus 9, 20180049 (2019).
+Checked: the abstract, which has five variables for every pair of angles. Not checked: the formulas.
 """
 
 from __future__ import annotations

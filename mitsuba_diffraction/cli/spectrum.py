@@ -320,7 +320,9 @@ def _of_table(
     names = [name for name in names if name != "--wavelength-range"]
     names += [f"--{n.replace('_', '-')}" for n in ("crops", "ext_ior") if getattr(args, n)]
     if refused := [*options.used_heights_options(args), *names]:
-        raise DiffractionError(f"'{file}' is a table, which has its own; leave {refused[0]} out")
+        raise DiffractionError(
+            f"'{file}' is a table, which has its own; leave {refused[0]} out, or give heights"
+        )
     if args.light_azimuth == "auto":
         raise DiffractionError(
             f"'{file}' is a table, without heights to find gratings in; give --azimuth in degrees"
