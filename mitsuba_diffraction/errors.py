@@ -7,6 +7,7 @@ import re
 import sys
 import unicodedata
 import warnings
+from collections.abc import Iterable, Sequence
 from types import FrameType
 
 # Packages whose lines mean nothing to whoever reads a warning.
@@ -96,3 +97,24 @@ def quoted(value: object) -> str:
     """Return a value as an error quotes it: in one line of at most 80 characters."""
     text = one_line(repr(value))
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def check_choice(name: str, value: object, choices: Iterable[str]) -> None:
+    """Raise a DiffractionError if the value of a parameter is not one of `choices`."""
+    if value not in (known := tuple(choices)):
+        raise DiffractionError(
+            f"{name}={quoted(value)} is unknown; choose one of {', '.join(known)}"
+        )
+
+
+def check_keys(where: str, keys: Iterable[str], known: Sequence[str]) -> None:
+    """Raise a DiffractionError with the nearest known key if a file has an unknown key."""
+    import difflib
+
+    for key in keys:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, 1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise DiffractionError(
+                f"{where}: unknown key {key!r}; {hint}Known are {', '.join(known)}"
+            )

@@ -25,7 +25,7 @@ from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
 from ..tables.powers import order_0_power, power_series
 from ..tables.table import DiffractionTable
-from .maps.result import Light
+from .maps.result import LightDirection
 
 Reals = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ class DiffractedLight:
         return np.asarray(self.xyz[lit])
 
 
-def chance_iridescence(table: DiffractionTable, light: Light) -> float:
+def chance_iridescence(table: DiffractionTable, light: LightDirection) -> float:
     """Return the index of an unordered surface of the same size and roughness, by chance alone.
 
     The mean over `CHANCES` surfaces. Each order has the median power of all orders at its
@@ -117,7 +117,7 @@ def chance_iridescence(table: DiffractionTable, light: Light) -> float:
 
 
 def diffracted_light(
-    table: DiffractionTable, light: Light, *, speckle: Reals | None = None
+    table: DiffractionTable, light: LightDirection, *, speckle: Reals | None = None
 ) -> DiffractedLight:
     """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
 
@@ -178,7 +178,7 @@ def diffracted_light(
     return DiffractedLight(xyz, diffracted / max(diffracted + central[1], 1e-300))
 
 
-def _obliquity(sines: Reals, cosine: Reals, light: Light) -> Reals:
+def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
     """Return the power of an order over |a_j|²: ((1 + ωi·ωo)/w)² / (cosθi cosθo) (n,).
 
     The integral of equation 4 of docs/theory.md over the lobe, R = 1; 1 in the mirror direction.

@@ -24,7 +24,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, check_choice
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
@@ -49,7 +49,7 @@ FIRST, LAST, STEP = 300.0, 830.0, 5.0
 #: Steepest direction of a lamp or of the edge of a detector's cone, degrees.
 STEEPEST = 89.0
 #: Wavelengths that a spectrum may have.
-MOST = 10_000
+MAX_WAVELENGTHS = 10_000
 
 # Nodes of the cone: radii and azimuths per standard deviation of the narrowest lobe, and at least.
 _PER_LOBE, _FEWEST_RADII, _FEWEST_AZIMUTHS = 1.25, 8, 16
@@ -182,7 +182,7 @@ def spectrum(
     progress : called as progress(done, total, text).
     """
     geometry = Geometry(light, tuple(float(d) for d in detectors), light_azimuth, acceptance)
-    check_relative(relative)
+    check_choice("relative", relative, RELATIVE)
     if not mi.is_spectral or "scalar" in mi.variant():
         raise DiffractionError(
             f"variant '{mi.variant()}' does not support spectra; use llvm_ad_spectral, or "
@@ -217,19 +217,13 @@ def spectrum(
     return Spectra(lam, value, geometry, relative, s, p)
 
 
-def check_relative(relative: str) -> None:
-    """Refuse a word outside `RELATIVE`."""
-    if relative not in RELATIVE:
-        raise DiffractionError(
-            f"relative='{relative}' is unknown; choose one of {', '.join(RELATIVE)}"
-        )
-
-
 def check_wavelengths(wavelengths: ArrayLike) -> Reals:
     """Return wavelengths (n,) in nm, increasing; refuse others."""
     lam = np.asarray(wavelengths, np.float64)
-    if lam.ndim != 1 or not 1 <= lam.size <= MOST or not np.isfinite(lam).all():
-        raise DiffractionError(f"wavelengths must be a list of 1 to {MOST} numbers, in nm")
+    if lam.ndim != 1 or not 1 <= lam.size <= MAX_WAVELENGTHS or not np.isfinite(lam).all():
+        raise DiffractionError(
+            f"wavelengths must be a list of 1 to {MAX_WAVELENGTHS} numbers, in nm"
+        )
     if lam[0] <= 0.0 or not np.all(np.diff(lam) > 0.0):
         raise DiffractionError("wavelengths must be above 0 nm and increase, e.g. 400, 405, 410")
     return lam

@@ -34,7 +34,7 @@ from ..tables.table import DiffractionTable
 from .crops import crops_of
 from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
-from .maps.result import BrdfMap, Light
+from .maps.result import BrdfMap, LightDirection
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, in_medium, read_scan, table_of
 from .survey_files import write_rows, write_sheets
@@ -146,9 +146,12 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
-    diffracted = diffracted_light(table, Light(job.theta, phi))
+    diffracted = diffracted_light(table, LightDirection(job.theta, phi))
     row["diffracted"] = diffracted.share
-    index, floor = diffracted.iridescence(), chance_iridescence(table, Light(job.theta, phi))
+    index, floor = (
+        diffracted.iridescence(),
+        chance_iridescence(table, LightDirection(job.theta, phi)),
+    )
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (

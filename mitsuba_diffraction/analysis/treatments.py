@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError, check_keys, one_line
 from ..files import read_text
 from ..heights.read import LoadOptions
 from ..heights.recipes import LOAD_KEYS, options_and_settings
@@ -70,10 +70,5 @@ def _treatment(where: str, values: Any) -> Treatment:
     """Check the options of one pattern."""
     if not isinstance(values, dict):
         raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
-    unknown = set(values) - {*LOAD_KEYS, *RECIPE_SETTINGS}
-    if unknown:
-        raise DiffractionError(
-            f"{where}: unknown key {min(unknown)!r}; known are "
-            f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
-        )
+    check_keys(where, values, (*LOAD_KEYS, *RECIPE_SETTINGS))
     return Treatment(*options_and_settings(values, where))

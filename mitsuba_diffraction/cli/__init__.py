@@ -28,7 +28,8 @@ export_osl             a surface as a shader for Blender's Cycles
 options                options that several commands share, declared once, and their types
 scene_options          the scene, its parameters and materials; a mesh on a stage
 workers                options of commands that may run on many processes
-console                lines and bars on stderr, what Mitsuba says among them; Ctrl-C and SIGTERM
+console                lines and bars on stderr, and Mitsuba's among them
+interrupt              Ctrl-C and SIGTERM
 wording                messages of the library with the options of the command
 report                 output files, checked before the work; plain data as text and JSON
 """

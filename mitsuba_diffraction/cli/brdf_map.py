@@ -249,10 +249,10 @@ class Evaluated(NamedTuple):
 
 def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
     """Map the renderer's BSDF."""
-    from ..analysis.maps import Light, brdf_map, check_map
+    from ..analysis.maps import LightDirection, brdf_map, check_map
     from .console import mitsuba_warnings
 
-    light = Light(args.theta, args.phi)
+    light = LightDirection(args.theta, args.phi)
     check_map(bands, args.resolution, args.samples, args.spectral)
     variant = set_variant(args.mode)
     with mitsuba_warnings(), Bar(args) as bar:
@@ -267,11 +267,15 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
 
 def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
     """Map a method of the thesis."""
-    from ..analysis.maps import Light, check_map
+    from ..analysis.maps import LightDirection, check_map
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
 
-    light, samples, single = Light(args.theta, args.phi), args.samples or 1, args.wavelength
+    light, samples, single = (
+        LightDirection(args.theta, args.phi),
+        args.samples or 1,
+        args.wavelength,
+    )
     check_map(bands, args.resolution, args.samples, spectral=False)
     gain = gain_of(args)
     patch, settings = options.load_patch(args)

@@ -205,7 +205,7 @@ def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
     from ..scene.fitted_mesh import fit_of
-    from ..scene.orientation.files import has_own_normals, load_mesh, load_orientation
+    from ..scene.orientation.mesh_files import has_own_normals, load_mesh, load_orientation
     from ..scene.orientation.tangents import check_tangents
 
     if mi.variant() is None:

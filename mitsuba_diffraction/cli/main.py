@@ -39,14 +39,8 @@ from . import (
     tonemap,
     tradeoff,
 )
-from .console import (
-    INTERRUPTED,
-    PROGRAM,
-    ended_at_once,
-    say_error,
-    say_interrupted,
-    warnings_in_one_line,
-)
+from .console import PROGRAM, say_error, warnings_in_one_line
+from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
 from .options import STDOUT
 from .report import check_writable
 from .wording import speak_for

@@ -14,7 +14,8 @@ from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, sh
 from ..scene.passes import Stop, render_passes
 from ..scene.pictures import count_bad, write_exr
 from . import scene_options
-from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
+from .console import Bar, mitsuba_warnings, say, say_warning
+from .interrupt import INTERRUPTED
 from .report import check_writable, default_output, save_report
 
 

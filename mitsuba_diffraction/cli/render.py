@@ -30,7 +30,8 @@ from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import add_animation, say_why
-from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
+from .console import Bar, mitsuba_warnings, say, say_warning
+from .interrupt import INTERRUPTED
 from .observed import add_observer, run_observed
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, default_output, save_report

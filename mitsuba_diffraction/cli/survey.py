@@ -12,7 +12,8 @@ from typing import Any
 from ..scene.load import set_variant
 from . import options
 from .brdf_map import add_material, surface_parameters
-from .console import INTERRUPTED, Bar, mitsuba_warnings, say
+from .console import Bar, mitsuba_warnings, say
+from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, on_workers, worker_threads

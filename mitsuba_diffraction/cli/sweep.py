@@ -66,7 +66,7 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate all maps, compare, draw, and return the exit code."""
-    from ..analysis.maps import Light
+    from ..analysis.maps import LightDirection
     from ..analysis.maps.picture import contact_sheet
     from ..atomic import atomic_path
     from ..thesis.sweeps import sweep
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
     numbers = output.with_suffix(".csv")
     check_outputs((output, numbers), [args.source], "sheet")
-    light, values, gain = Light(args.theta, args.phi), _values(args), gain_of(args)
+    light, values, gain = LightDirection(args.theta, args.phi), _values(args), gain_of(args)
     patch, settings = options.load_patch(args)
     settings |= options.wavelengths(args)
     if args.period is not None:

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the mesh, say where its field is singular, and return the exit code."""
     check_writable(args.output)
     from ..scene.orientation.directions import direction_field, turned
-    from ..scene.orientation.files import load_mesh, write_ply
+    from ..scene.orientation.mesh_files import load_mesh, write_ply
     from ..scene.orientation.tangents import BREAK, check_tangents
     from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 

@@ -13,7 +13,6 @@ Several patches of one surface, whose powers one table averages, are a list of s
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import json
 import os
@@ -25,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError
+from ..errors import DiffractionError, check_keys
 from ..files import FileKind, kind_of, path_within, read_text
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
@@ -72,13 +71,7 @@ class Recipe:
                 f"{shown} is a recipe of solved orders: run the command 'solve "
                 f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
             )
-        for key in content:
-            if key not in _KEYS:
-                near = difflib.get_close_matches(key, _KEYS, 1)
-                hint = f"did you mean {near[0]}? " if near else ""
-                raise DiffractionError(
-                    f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
-                )
+        check_keys(shown, content, _KEYS)
         if ("source" in content) == ("generator" in content):
             raise DiffractionError(
                 f"{shown} needs either source, a file, or generator, one of "

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from ..errors import DiffractionError
+from ..errors import check_choice
 from .arithmetic import Number, of, squared
 from .blend import RoughnessTable, kirchhoff_weight
 from .fresnel import Face, Filmed, Index, amplitudes, faces, normal_reflectance, reflectance
@@ -258,6 +258,5 @@ def model_of(name: str, models: Iterable[str] = MODELS) -> Model:
 
 def checked_model(model: str, models: Iterable[str] = MODELS) -> str:
     """Return the name of a boundary model if it is one of `models`."""
-    if model not in (names := tuple(models)):
-        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(names)}")
+    check_choice("model", model, models)
     return model

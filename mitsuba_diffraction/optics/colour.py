@@ -12,7 +12,7 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError
+from ..errors import check_choice
 from .arithmetic import Number, formula, of
 
 #: CIE standard illuminant D65 (daylight), and E, equal energy at all wavelengths.
@@ -36,14 +36,6 @@ _OBSERVER = "CIE 1931 2 Degree Standard Observer"
 RGB_WAVELENGTHS = (642.4, 543.0, 440.8)
 
 
-def check_illuminant(illuminant: str) -> None:
-    """Raise a DiffractionError for an illuminant that is not one of `ILLUMINANTS`."""
-    if illuminant not in ILLUMINANTS:
-        raise DiffractionError(
-            f"illuminant='{illuminant}' is unknown; choose one of {', '.join(ILLUMINANTS)}"
-        )
-
-
 def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float64]:
     """Contribution of a reflectance of 1 to X, Y and Z per nanometre, shape (..., 3), 1/nm.
 
@@ -56,7 +48,7 @@ def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float
     wavelength : nm, any shape.
     illuminant : one of `ILLUMINANTS`.
     """
-    check_illuminant(illuminant)
+    check_choice("illuminant", illuminant, ILLUMINANTS)
     nodes, values = _responses(illuminant)
     lam = np.asarray(wavelength, np.float64)
     return np.stack([np.interp(lam, nodes, v, left=0.0, right=0.0) for v in values.T], axis=-1)
@@ -108,7 +100,7 @@ def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[n
 
     Colours outside the display's gamut have negative components; they are kept.
     """
-    check_illuminant(illuminant)
+    check_choice("illuminant", illuminant, ILLUMINANTS)
     return xyz @ _matrix(illuminant).astype(xyz.dtype)
 
 

@@ -20,7 +20,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError
+from ..errors import check_choice
 from .arithmetic import Number, formula, of
 from .colour import encode_srgb, encoded_colour
 
@@ -74,14 +74,8 @@ def shown(linear: ArrayLike, view: str = "natural") -> Array:
 
     Raises a DiffractionError if `view` is not in `VIEWS`.
     """
-    check_view(view)
+    check_choice("view", view, VIEWS)
     return encode_srgb(linear if view == "standard" else natural(linear))
-
-
-def check_view(view: str) -> None:
-    """Raise a DiffractionError if `view` is not in `VIEWS`."""
-    if view not in VIEWS:
-        raise DiffractionError(f"view={view!r} is unknown; choose one of {', '.join(VIEWS)}")
 
 
 def natural(linear: ArrayLike) -> Array:

@@ -68,7 +68,7 @@ MIN_LIGHT = 1e-12
 #: Bands of the spectrum in an octave, and lines in a band: g has no finer features.
 _PER_OCTAVE, _LINES = 4, 3
 #: Bands with less than this share of the variance are left out.
-_LEAST = 1e-5
+_MIN_SHARE = 1e-5
 _HORIZON = np.radians(89.5)
 
 
@@ -154,7 +154,7 @@ def _spectrum(roughness: ScaleRoughness | RoughnessTable) -> ScaleRoughness:
     which = place - place.min(initial=0)
     total = np.bincount(which, roughness.variance).astype(np.float64)
     moment = np.bincount(which, roughness.variance * roughness.frequency)
-    kept = total > _LEAST * total.sum()
+    kept = total > _MIN_SHARE * total.sum()
     return ScaleRoughness(moment[kept] / total[kept], total[kept])
 
 
@@ -170,7 +170,7 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
     first, last = np.log2(nodes[[0, -1]])
     frequency = 2.0 ** np.arange(first, last + 1.0, 1.0 / _PER_OCTAVE)
     variance, _ = scipy.optimize.nnls(shares(frequency, nodes), roughness.nodes)
-    kept = variance > _LEAST * variance.sum()
+    kept = variance > _MIN_SHARE * variance.sum()
     return ScaleRoughness(frequency[kept], variance[kept])
 
 

@@ -40,11 +40,11 @@ STEP_OF_ORDERS = 1 / 12
 #: linear in κ; the error of the factors on powers is below 0.3 % on average.
 BETWEEN = 0.8
 #: Least power in a cell that has a ratio: less is rounding in single precision.
-LEAST = 1e-12
+MIN_CELL_POWER = 1e-12
 #: Finer cells along each axis of a cell that holds many orders, for `CellSums.fine_power`.
 FINER = 3
 #: Largest |r| times the gate: any larger one reaches `second_order.LIMIT`.
-MOST = 100.0
+MAX_RATIO = 100.0
 
 Single = NDArray[np.complex64]
 Complex = NDArray[np.complex128]
@@ -259,10 +259,10 @@ class CellSums:
         summed, nodes = self.grid.summed, self.grid.nodes
         power = self.power[:, None]
         ratios = np.divide(
-            self.products, power, out=np.zeros_like(self.products), where=power > LEAST
+            self.products, power, out=np.zeros_like(self.products), where=power > MIN_CELL_POWER
         )
         ratios *= self.gate
-        ratios /= np.maximum(1.0, np.abs(ratios) / MOST)
+        ratios /= np.maximum(1.0, np.abs(ratios) / MAX_RATIO)
         if summed is not nodes:
             linear = scipy.interpolate.interp1d(
                 summed, summed[:, None, None, None] * ratios, axis=0

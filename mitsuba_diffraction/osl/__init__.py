@@ -3,7 +3,7 @@
 Contents
 --------
 export            write a shader with its textures and the script into a folder
-orders            texture and constants of a table of solved orders
+solved            texture and constants of a table of solved orders
 patch             textures and constants of a patch of heights
 formulas          formulas of optics that the shaders call, as functions in OSL
 spectrum          wavelengths that a shader draws, and their colours

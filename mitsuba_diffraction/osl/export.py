@@ -23,7 +23,6 @@ from ..optics.colour import WORKING_SPACES
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
 from .formulas import order_formulas, patch_formulas, shader_file
-from .orders import interpolation_error, order_constants, order_texture
 from .patch import (
     energy_texture,
     mean_transmittance,
@@ -38,6 +37,7 @@ from .sockets import (
     height_socket,
     window_socket,
 )
+from .solved import interpolation_error, order_constants, order_texture
 from .spectrum import NODES, drawn_spectrum
 
 #: Script that adds the material to a .blend file, copied into the folder.

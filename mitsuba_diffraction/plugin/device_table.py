@@ -8,7 +8,6 @@ are multiplied with the weights of a series in κ (`plugin.series`).
 from __future__ import annotations
 
 import math
-import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +21,7 @@ from ..tables.layout import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .loops import sum_of
-from .memory import index_between, packet_size, read_packets, upload, zero_packets
+from .memory import index_between, once_a_table, packet_size, read_packets, upload, zero_packets
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import Window
@@ -35,10 +34,6 @@ _LONGEST_RATIOS = 6
 _SHALLOW = 30.0
 #: Dr.Jit's indices are 32 bits wide.
 _MOST_PACKETS = 2**31
-
-_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable]] = (
-    weakref.WeakKeyDictionary()
-)
 
 
 def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
@@ -356,9 +351,7 @@ def _log2(exponent: float) -> float:
     return -float(exponent) / math.log(2.0)
 
 
+@once_a_table
 def device_table(table: DiffractionTable) -> DeviceTable:
-    """Return the table in the current variant's memory, uploaded once for all BSDFs."""
-    variants = _uploaded.setdefault(table, {})
-    if mi.variant() not in variants:
-        variants[mi.variant()] = DeviceTable(table)
-    return variants[mi.variant()]
+    """Return the table in the current variant's memory."""
+    return DeviceTable(table)

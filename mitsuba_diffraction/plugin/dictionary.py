@@ -7,7 +7,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..tables.orders import OrderTable
@@ -56,10 +56,7 @@ def bsdf_dict(
     -------
     dict for `mi.load_dict`, alone or inside a shape.
     """
-    if plugin not in PLUGINS:
-        raise DiffractionError(
-            f"bsdf_dict: plugin={quoted(plugin)} is unknown; choose one of {', '.join(PLUGINS)}"
-        )
+    check_choice("bsdf_dict: plugin", plugin, PLUGINS)
     arguments = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, OrderTable):
         return {"type": ORDERS, "data": OrderData(field), **arguments}

@@ -5,6 +5,11 @@ Hides the difference between JIT and scalar variants.
 
 from __future__ import annotations
 
+import functools
+import weakref
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -14,6 +19,26 @@ from .types import Buffer, Float, Index, Kind, Mask, Packet
 
 #: Largest number of floats that one packet load fetches.
 PACKET = 16
+
+Table = TypeVar("Table")
+Shared = TypeVar("Shared")
+Further = ParamSpec("Further")
+
+
+def once_a_table(
+    make: Callable[Concatenate[Table, Further], Shared],
+) -> Callable[Concatenate[Table, Further], Shared]:
+    """Let all BSDFs of a table share what a function makes of it, in each variant's memory."""
+    made: weakref.WeakKeyDictionary[Any, dict[str, Shared]] = weakref.WeakKeyDictionary()
+
+    @functools.wraps(make)
+    def shared(table: Table, /, *args: Further.args, **kwargs: Further.kwargs) -> Shared:
+        variants = made.setdefault(table, {})
+        if mi.variant() not in variants:
+            variants[mi.variant()] = make(table, *args, **kwargs)
+        return variants[mi.variant()]
+
+    return shared
 
 
 def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:

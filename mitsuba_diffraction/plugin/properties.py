@@ -7,15 +7,14 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, check_choice
 from .types import BSDF, Properties
 
 
 def choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
     """Read a word out of several; the first is the default."""
     value = props.get(name, choices[0])
-    if value not in choices:
-        raise DiffractionError(f"{name}={value!r} is unknown; choose one of {', '.join(choices)}")
+    check_choice(name, value, choices)
     return str(value)
 
 

@@ -8,7 +8,6 @@ fetches all terms of all colours of a bin. For the density of ωo per solid angl
 from __future__ import annotations
 
 import math
-import weakref
 
 import drjit as dr
 import mitsuba as mi
@@ -21,7 +20,7 @@ from ..tables.colour.table import PACKET, TERMS, ColourTable
 from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
 from .directions import Pair, TablePoint
-from .memory import index_between, read, read_record, upload
+from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
 from .transmission.crossing import Crossing
@@ -119,11 +118,6 @@ def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
     clipped = dr.maximum(position, 0.0)
     lower = dr.minimum(mi.UInt32(clipped), count - 2)
     return lower, dr.minimum(clipped - mi.Float(lower), 1.0)
-
-
-_models: weakref.WeakKeyDictionary[DiffractionTable, dict[str, RGBPower]] = (
-    weakref.WeakKeyDictionary()
-)
 
 
 class RGBPower:
@@ -239,9 +233,7 @@ class RGBPower:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
 
 
+@once_a_table
 def rgb_power(table: DiffractionTable) -> RGBPower:
-    """The colours in the current variant's memory, shared by all BSDFs of the table."""
-    variants = _models.setdefault(table, {})
-    if mi.variant() not in variants:
-        variants[mi.variant()] = RGBPower(cached_colours(table))
-    return variants[mi.variant()]
+    """Return the colours in the current variant's memory."""
+    return RGBPower(cached_colours(table))

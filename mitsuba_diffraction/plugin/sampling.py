@@ -15,7 +15,6 @@ cosθo does not.
 from __future__ import annotations
 
 import math
-import weakref
 from typing import NamedTuple
 
 import drjit as dr
@@ -24,7 +23,7 @@ import numpy as np
 
 from ..tables.sampling import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
-from .memory import float_of_bits, index_between, read, upload
+from .memory import float_of_bits, index_between, once_a_table, read, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn evenly over the hemisphere.
@@ -36,10 +35,6 @@ LEAST_SHARE = 0.02
 BELOW_ONE = float(np.nextafter(np.float32(1.0), np.float32(0.0)))
 
 _SMALLEST = float(np.finfo(np.float32).tiny)
-
-_samplers: weakref.WeakKeyDictionary[DiffractionTable, dict[str, OrderSampler]] = (
-    weakref.WeakKeyDictionary()
-)
 
 
 class Strategy(NamedTuple):
@@ -183,9 +178,7 @@ def invert(
     return index, dr.clip((sample - lower) / width, 0.0, 1.0)
 
 
+@once_a_table
 def order_sampler(table: DiffractionTable) -> OrderSampler:
-    """The sampler in the current variant's memory, shared by all BSDFs of the table."""
-    variants = _samplers.setdefault(table, {})
-    if mi.variant() not in variants:
-        variants[mi.variant()] = OrderSampler(table)
-    return variants[mi.variant()]
+    """Return the sampler in the current variant's memory."""
+    return OrderSampler(table)

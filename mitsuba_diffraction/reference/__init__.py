@@ -10,7 +10,7 @@ bsdf          `brdf` and `mueller`: the model with any window, material, coat an
 coat, film    wrappers of the model
 fresnel, boundary, through  float64 judges of the formulas of the same names in `optics`
 transmission  `btdf`: light that goes through a dielectric
-orders        `orders_brdf`: a grating from the efficiencies of its orders
+grating       `orders_brdf`: a grating from the efficiencies of its orders
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
 second_order  whether "auto" applies the second order
 arguments     checks of the arguments
@@ -21,9 +21,9 @@ from __future__ import annotations
 from ..optics.boundary import MODELS
 from ..settings import COHERENCES
 from .bsdf import brdf, mueller
+from .grating import orders_brdf
 from .integral import screen_power, window_power
 from .model import Sigmas
-from .orders import orders_brdf
 from .transmission import btdf
 
 __all__ = [

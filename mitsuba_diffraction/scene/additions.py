@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, check_choice
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
@@ -25,7 +25,7 @@ from ..plugin.surface_parameters import NAMES
 from ..tables.orders import OrderTable
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .orbit import ORBIT
-from .orientation.files import write_ply
+from .orientation.mesh_files import write_ply
 
 #: Shape that is put on the stage.
 FITTED = "fitted_mesh"
@@ -102,8 +102,7 @@ def fit_meshes(state: Any, folder: Path) -> None:
 def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     """Move the scene's first camera until the mesh of a shape fills its picture."""
     frame = str(shape.get("frame", FRAMES[0]))
-    if frame not in FRAMES:
-        raise DiffractionError(f"frame={frame!r} is unknown; choose one of {', '.join(FRAMES)}")
+    check_choice("frame", frame, FRAMES)
     sensor = next((n for n in state.nodes if n.type == mi.ObjectType.Sensor), None)
     if frame == FRAMES[0] or sensor is None:
         return

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
-from .orientation.files import load_mesh, load_orientation
+from .orientation.mesh_files import load_mesh, load_orientation
 from .orientation.tangents import check_tangents
 from .orientation.trimesh import TriangleMesh, oriented_mesh, vertex_normals
 
@@ -71,8 +71,7 @@ def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
     file : file of the mesh, whose format suggests an axis and whose name is quoted in errors.
     up : one of `UPS`; `auto` takes y or z, whichever the mesh stands on more firmly.
     """
-    if up not in UPS:
-        raise DiffractionError(f"up={up!r} is unknown; choose one of {', '.join(UPS)}")
+    check_choice("up", up, UPS)
     lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if len(lost):
         raise DiffractionError(

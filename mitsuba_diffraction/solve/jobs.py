@@ -20,7 +20,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError, check_choice, one_line
 from ..progress import Progress, silent
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
@@ -84,9 +84,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     """
     if method == AUTO:
         method = method_for(grating)
-    if method not in METHODS:
-        known = ", ".join((AUTO, *METHODS))
-        raise DiffractionError(f"solver {method!r} is unknown; choose one of {known}")
+    check_choice("method", method, (AUTO, *METHODS))
     if grating.films and method != "coupled":
         raise DiffractionError(
             f"method {method} has no films on the profile; use method=coupled, or leave the "

@@ -263,7 +263,8 @@ def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.fl
         here = np.flatnonzero((cell.band == k) & (cell.kind == kind) & (cell.channel == j))
         if k < cell.band.min():
             # nearer to the grooves' direction than all light of the file: a mirror
-            values[:, :, :, j, j] = _mean_sum(samples, int(cell.band.min()))
+            lowest = samples.powers[cell.band == cell.band.min()]
+            values[:, :, :, j, j] = lowest.sum(axis=1).mean(axis=0)
         elif len(here) and several:
             known = np.stack([samples.of_order(j - q)[here] for q in range(size)], axis=1)
             values[:, :, :, j] = _interpolated(coordinates[here], known, places)
@@ -306,11 +307,6 @@ def _of_nearest_direction(samples: _Samples, order: int, s: Real, big_k: Real) -
         for kind, column in enumerate(powers[light].T):
             values[here, kind] = np.interp(big_k[here], samples.cell.k_continuous[light], column)
     return values
-
-
-def _mean_sum(samples: _Samples, band: int) -> Real:
-    """Return the mean sum over orders of a band, for s and p, (2,), or (4,) of a sheet."""
-    return np.asarray(samples.powers[samples.cell.band == band].sum(axis=1).mean(axis=0))
 
 
 def _interpolated(points: Real, values: Real, places: Real) -> Real:

@@ -17,8 +17,8 @@ from scipy.fft import dct
 from ..tables.orders import cells
 
 #: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most.
-MOST = (36, 24, 8)
-FEWEST = (4, 3, 2)
+MAX_NODES = (36, 24, 8)
+MIN_NODES = (4, 3, 2)
 #: Where a band's lines cross (τ, ρ, w): away from its middle, where symmetry would hide odd terms.
 _CROSSINGS = ((0.31, 0.38, 0.35), (0.69, 0.72, 0.7))
 
@@ -40,7 +40,7 @@ class Line(NamedTuple):
     places: tuple[Place, ...]
 
 
-def lines(band: int, most: tuple[int, int, int] = MOST) -> Iterator[Line]:
+def lines(band: int, most: tuple[int, int, int] = MAX_NODES) -> Iterator[Line]:
     """Yield the lines on which a band's numbers of nodes are chosen.
 
     Along τ, half of the nodes are enough: reciprocity gives the others.

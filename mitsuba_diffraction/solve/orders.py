@@ -19,7 +19,7 @@ from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
 from .films import Layers, films_of, material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
-from .nodes import FEWEST, MOST, Line, Place, count_for, lines
+from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
 from .profiles import Profile
 from .resolution import (
     Chosen,
@@ -232,7 +232,7 @@ def _counts(
     announce: Callable[[Estimate], None],
 ) -> dict[int, Counts]:
     """Choose the numbers of nodes of each band by series along lines across it."""
-    most = Counts(*MOST[:2], 1 if problem.grating.is_perfect else MOST[2])
+    most = Counts(*MAX_NODES[:2], 1 if problem.grating.is_perfect else MAX_NODES[2])
     drawn = {band: list(lines(band, most)) for band in bands}
     places = [place for of_band in drawn.values() for line in of_band for place in line.places]
     announce_stage(announce, "choosing nodes", problem, jobs, places)
@@ -269,7 +269,7 @@ def _count(
     sides: int,
 ) -> Counts:
     """Return the numbers of nodes that all lines of a band need, for values (w, j, q, n)."""
-    needed = [1 if size == 1 else least for size, least in zip(most, FEWEST, strict=True)]
+    needed = [1 if size == 1 else least for size, least in zip(most, MIN_NODES, strict=True)]
     for line in drawn:
         if most[line.axis] == 1:
             continue
@@ -283,7 +283,7 @@ def _count(
         along = np.concatenate(values)
         if (channels := along.shape[1] // sides) > 1:
             along *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
-        needed[line.axis] = max(needed[line.axis], count_for(along, FEWEST[line.axis], error))
+        needed[line.axis] = max(needed[line.axis], count_for(along, MIN_NODES[line.axis], error))
     return Counts(*needed)
 
 

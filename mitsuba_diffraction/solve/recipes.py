@@ -20,7 +20,6 @@ Paths are relative to the recipe.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import os
 import tomllib
@@ -29,7 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError, one_line, quoted
+from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import path_within, read_text
 from ..heights.lengths import number_between
 from ..heights.recipes import SOLVED
@@ -81,13 +80,7 @@ class SolvedRecipe:
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
                 "DiffractionTable.build"
             )
-        for key in content:
-            if key not in _KEYS:
-                near = difflib.get_close_matches(key, _KEYS, 1)
-                hint = f"did you mean {near[0]}? " if near else ""
-                raise DiffractionError(
-                    f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
-                )
+        check_keys(shown, content, _KEYS)
         output, arguments = content.get("output", f"{file.stem}.nc"), content.get("arguments", {})
         try:
             if not (isinstance(output, str) and output.endswith(".nc")):

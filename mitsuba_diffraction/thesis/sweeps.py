@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.maps.result import BrdfMap, Light
+from ..analysis.maps.result import BrdfMap, LightDirection
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics.colour import delta_e
@@ -91,7 +91,7 @@ class Sweep:
 def sweep(
     kind: str,
     heights: HeightField,
-    light: Light,
+    light: LightDirection,
     *,
     values: Sequence[Any] | None = None,
     method: str = "flss",
@@ -139,7 +139,7 @@ class TimedMap(NamedTuple):
     seconds: float
 
 
-def timed_map(method: Method, light: Light, **arguments: Any) -> TimedMap:
+def timed_map(method: Method, light: LightDirection, **arguments: Any) -> TimedMap:
     """Evaluate a map (arguments as in `methods.method_map`) and time it."""
     start = time.perf_counter()
     brdf_map = method_map(method, light, **arguments)
@@ -150,12 +150,12 @@ class _Setup(NamedTuple):
     """Parameters of the map of one value."""
 
     method: Method
-    light: Light
+    light: LightDirection
     step: float  # between wavelengths, nm
 
 
 def _setups(
-    kind: str, values: Sequence[Any], heights: HeightField, light: Light, method: str,
+    kind: str, values: Sequence[Any], heights: HeightField, light: LightDirection, method: str,
     progress: Progress | None, settings: dict[str, Any],
 ) -> list[_Setup]:  # fmt: skip
     """Return the setup of each value; setups share tables where the parameter allows."""
@@ -172,7 +172,7 @@ def _setups(
         )
         return [_Setup(by_name[name], light, step) for name in values]
     if kind == "light-angle":
-        lights = [Light(float(value), light.phi) for value in values]
+        lights = [LightDirection(float(value), light.phi) for value in values]
         shared = build()
         return [_Setup(shared, direction, step) for direction in lights]
     if kind == "wavelength-step":
@@ -287,7 +287,7 @@ class Compiled:
 
 def time_compiled(
     heights: HeightField,
-    light: Light,
+    light: LightDirection,
     *,
     resolution: int,
     samples: int,

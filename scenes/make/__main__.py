@@ -19,7 +19,7 @@ from PIL import Image
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.files import write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, oriented_mesh
 
 from . import pigment

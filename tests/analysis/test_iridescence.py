@@ -8,11 +8,11 @@ from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis.iridescence import DiffractedLight, diffracted_light
-from mitsuba_diffraction.analysis.maps import Light
+from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.tables import DiffractionTable
 
-LIGHT = Light(30.0, 0.0)
+LIGHT = LightDirection(30.0, 0.0)
 
 
 def light_of(field, light=LIGHT, **settings):

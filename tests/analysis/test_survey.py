@@ -16,7 +16,7 @@ from PIL import Image
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
 from mitsuba_diffraction.analysis.iridescence import chance_iridescence, diffracted_light
-from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
@@ -284,7 +284,7 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
     rough = rough_patch((n, n), (0.08, 0.08), 0.01)
     x = 0.08 * np.arange(n)
     grating = HeightField(0.3 * rough.heights + 0.03 * np.sin(2 * np.pi * x / 1.28), 0.08)
-    light = Light(30.0, 0.0)
+    light = LightDirection(30.0, 0.0)
     for field, above in ((rough, 1.25), (grating, 1.3)):
         table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
         index = diffracted_light(table, light).iridescence()

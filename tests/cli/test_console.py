@@ -71,7 +71,7 @@ def started(code: str, folder: Path) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
-    held = "import mitsuba_diffraction.cli.console as i; i.GRACE = 0.2\n" + STUCK.replace(
+    held = "import mitsuba_diffraction.cli.interrupt as i; i.GRACE = 0.2\n" + STUCK.replace(
         "ctypes.CDLL(None).sleep(600)",
         # the signals reach another thread, so that the sleep is not cut short
         "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]); "

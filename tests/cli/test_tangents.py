@@ -11,7 +11,7 @@ import pytest
 
 from mitsuba_diffraction.cli.tangents import _GUIDES
 from mitsuba_diffraction.scene.orientation.directions import GUIDES
-from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,
     grid_faces,

@@ -17,7 +17,7 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
-from mitsuba_diffraction.scene.orientation.files import load_mesh
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from mitsuba_diffraction.tables.document import parse_document
 from mitsuba_diffraction.tables.exr import read_document
 from tests.support.directions import rough_patch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.maps import Light
+from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
@@ -23,7 +23,9 @@ def grating():
 
 
 def test_finer_steps_come_closer(grating):
-    result = sweep("wavelength-step", grating, Light(20.0), values=[2.0, 10.0, 100.0], **SETTINGS)
+    result = sweep(
+        "wavelength-step", grating, LightDirection(20.0), values=[2.0, 10.0, 100.0], **SETTINGS
+    )
     assert result.reference == "2 nm"
     first, fine, coarse = result.steps
     assert first.difference.delta_e == 0.0
@@ -33,20 +35,20 @@ def test_finer_steps_come_closer(grating):
 
 
 def test_more_terms_come_closer(grating):
-    result = sweep("terms", grating, Light(20.0), values=[2, 6, 14], **SETTINGS)
+    result = sweep("terms", grating, LightDirection(20.0), values=[2, 6, 14], **SETTINGS)
     assert result.reference == "14 terms"
     assert result.steps[0].difference.delta_e > 10.0 * result.steps[1].difference.delta_e > 0.0
 
 
 def test_the_light_s_angle_has_no_reference(grating):
-    result = sweep("light-angle", grating, Light(), values=[0.0, 50.0], **SETTINGS)
+    result = sweep("light-angle", grating, LightDirection(), values=[0.0, 50.0], **SETTINGS)
     assert result.reference is None
     assert np.isnan(result.steps[1].difference.delta_e)
     assert [step.map.light.theta for step in result.steps] == [0.0, 50.0]
 
 
 def test_wider_windows_make_sharper_lobes(grating):
-    result = sweep("coherence-width", grating, Light(20.0), values=[5.0, 20.0], **SETTINGS)
+    result = sweep("coherence-width", grating, LightDirection(20.0), values=[5.0, 20.0], **SETTINGS)
     assert result.reference == "20 µm"
     brightest = [step.map.luminance.max() for step in result.steps]
     assert brightest[0] < 0.5 * brightest[1]
@@ -54,14 +56,19 @@ def test_wider_windows_make_sharper_lobes(grating):
 
 def test_methods_are_compared_with_flss(grating):
     names = ("spectral", "flss", "nmm", "rainbow")
-    result = sweep("method", grating, Light(20.0), values=names, **SETTINGS)
+    result = sweep("method", grating, LightDirection(20.0), values=names, **SETTINGS)
     by_name = {step.value: step for step in result.steps}
     # tables of tolerance 1e-3 both
     assert by_name["spectral"].difference.delta_e < 0.1
     assert by_name["nmm"].difference.delta_e > 1.0
     assert by_name["nmm"].difference.blueness > 1.05  # the purple shift
     lobes = sweep(
-        "method", grating, Light(20.0), values=["flss", "nmm"], nmm_weights="lobe", **SETTINGS
+        "method",
+        grating,
+        LightDirection(20.0),
+        values=["flss", "nmm"],
+        nmm_weights="lobe",
+        **SETTINGS,
     )
     assert lobes.steps[1].difference.delta_e < 0.5 * by_name["nmm"].difference.delta_e
 
@@ -79,7 +86,7 @@ def test_a_truncated_series_is_the_shorter_series(grating):
 
 def test_relative_maps_are_the_thesis_value(grating):
     method = methods.make("flss", grating, coherence_width=20.0)
-    light = Light(20.0)
+    light = LightDirection(20.0)
     found = method_map(method, light, wavelength=500.0, resolution=16, gain=Gain())
     row, column = 8, 11
     x, y = (column + 0.5) / 8 - 1.0, (row + 0.5) / 8 - 1.0
@@ -89,7 +96,7 @@ def test_relative_maps_are_the_thesis_value(grating):
 
 
 def test_a_contact_sheet_has_a_map_for_every_value(grating):
-    result = sweep("light-angle", grating, Light(), values=[0, 10, 20, 30, 40], **SETTINGS)
+    result = sweep("light-angle", grating, LightDirection(), values=[0, 10, 20, 30, 40], **SETTINGS)
     figure = contact_sheet(
         [s.map for s in result.steps], [s.label for s in result.steps], title="light"
     )
@@ -100,7 +107,9 @@ def test_a_contact_sheet_has_a_map_for_every_value(grating):
 
 
 def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant):
-    found = time_compiled(grating, Light(20.0), resolution=16, samples=1, coherence_width=20.0)
+    found = time_compiled(
+        grating, LightDirection(20.0), resolution=16, samples=1, coherence_width=20.0
+    )
     assert found.spectral > 0.0
     assert found.ratio == found.flss / found.spectral
     assert found.colour_ratio == found.flss / found.colours
@@ -122,4 +131,4 @@ def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant)
 )
 def test_what_does_not_fit_is_refused(grating, kind, arguments, text):
     with pytest.raises(DiffractionError, match=text):
-        sweep(kind, grating, Light(20.0), **(SETTINGS | arguments))
+        sweep(kind, grating, LightDirection(20.0), **(SETTINGS | arguments))

@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import Queries, kernel_seconds, ratio, rounds_of
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.progress import Progress
@@ -223,7 +223,7 @@ def _map(tables: Tables, variant: str, parameters: dict[str, Any], resolution: i
     squared = x**2 + y**2
     inside = squared < 0.97**2
     wo = np.stack([x[inside], y[inside], np.sqrt(1.0 - squared[inside])])
-    wi = np.stack([Light(*light).direction for light in _LIGHTS], axis=1)
+    wi = np.stack([LightDirection(*light).direction for light in _LIGHTS], axis=1)
     si = dr.zeros(mi.SurfaceInteraction3f, wo.shape[1] * len(_LIGHTS))
     si.wi = mi.Vector3f(np.repeat(wi, wo.shape[1], axis=1).astype(np.float32))
     wo = np.tile(wo, len(_LIGHTS))

@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import SEED, ratio, rounds_of
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.plugin.power import PowerModel
@@ -269,7 +269,7 @@ def deviation_of(
 ) -> tuple[float, float]:
     """Relative standard deviation of the weights, and the largest of them."""
     si = dr.zeros(mi.SurfaceInteraction3f, lanes)
-    si.wi = mi.Vector3f(*(float(c) for c in Light(theta, phi).direction))
+    si.wi = mi.Vector3f(*(float(c) for c in LightDirection(theta, phi).direction))
     si.wavelengths = mi.Spectrum(wavelength)
     dr.make_opaque(si.wi, si.wavelengths)  # one kernel for all of them
     random = mi.PCG32(size=lanes, initstate=SEED)

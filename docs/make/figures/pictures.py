@@ -20,7 +20,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from mitsuba_diffraction.analysis.maps import Light, brdf_map, draw
+from mitsuba_diffraction.analysis.maps import LightDirection, brdf_map, draw
 from mitsuba_diffraction.analysis.maps.picture import signed
 from mitsuba_diffraction.analysis.pictures import patches_figure
 from mitsuba_diffraction.atomic import atomic_path
@@ -32,7 +32,7 @@ from mitsuba_diffraction.heights.gratings import blazed, cd, dvd, elaphe_like, x
 from .pages import add_measured, exit_code, measured_patch, write_jpeg
 
 LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
-LIGHTS = (Light(0.0), Light(45.0, 180.0))
+LIGHTS = (LightDirection(0.0), LightDirection(45.0, 180.0))
 #: Names of the snakes' pictures and what is rendered: scene, azimuth of the sun in degrees.
 SNAKES = {
     "snake": ("snake.xml", 120),
@@ -48,7 +48,7 @@ _SIZE = (900, 563)
 
 def maps_figure(
     fields: Sequence[HeightField],
-    lights: Sequence[Light] = LIGHTS,
+    lights: Sequence[LightDirection] = LIGHTS,
     *,
     resolution: int = _RESOLUTION,
     step: float = 5.0,

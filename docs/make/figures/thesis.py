@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
-from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
@@ -52,7 +52,7 @@ APPROXIMATES = {
     "rainbow": "everything but the spacing: all orders equally bright",
 }
 
-_LIGHT = Light(30.0)
+_LIGHT = LightDirection(30.0)
 _FINE = 1.0  # nm, of the reference
 
 

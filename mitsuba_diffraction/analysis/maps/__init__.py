@@ -2,20 +2,29 @@
 
 Contents
 --------
-brdf_map   evaluate a BSDF over the hemisphere
-check_map  check the parameters of `brdf_map` before any work
-BrdfMap    colours and spectra of a map
-Light      direction to the light
-Bands      bands of wavelengths to sum over
-draw       draw a map into Matplotlib axes
-save_png   write a map as a picture with axes
-save_exr   write a map as linear numbers
+brdf_map        evaluate a BSDF over the hemisphere
+check_map       check the parameters of `brdf_map` before any work
+BrdfMap         colours and spectra of a map
+LightDirection  direction to the light
+Bands           bands of wavelengths to sum over
+draw            draw a map into Matplotlib axes
+save_png        write a map as a picture with axes
+save_exr        write a map as linear numbers
 """
 
 from __future__ import annotations
 
 from .evaluate import brdf_map, check_map
 from .picture import draw, save_exr, save_png
-from .result import Bands, BrdfMap, Light
+from .result import Bands, BrdfMap, LightDirection
 
-__all__ = ["Bands", "BrdfMap", "Light", "brdf_map", "check_map", "draw", "save_exr", "save_png"]
+__all__ = [
+    "Bands",
+    "BrdfMap",
+    "LightDirection",
+    "brdf_map",
+    "check_map",
+    "draw",
+    "save_exr",
+    "save_png",
+]

@@ -9,8 +9,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError
-from ...optics.colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
+from ...errors import DiffractionError, check_choice
+from ...optics.colour import ILLUMINANTS, LONGEST, SHORTEST, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.llvm import require_loaded_llvm
@@ -18,7 +18,7 @@ from ...plugin.memory import upload
 from ...progress import Progress
 from ...tables.build.spectrum import GLOSSY_RADIUS
 from . import hemisphere
-from .result import Bands, BrdfMap, Light
+from .result import Bands, BrdfMap, LightDirection
 
 #: Maps are of one place.
 MAPS = Consumer(
@@ -63,7 +63,7 @@ def brdf_map(
     Parameters
     ----------
     bsdf : a Mitsuba BSDF of the current variant, `diffraction` or any other without textures.
-    theta, phi : direction to the light, degrees; see `Light`.
+    theta, phi : direction to the light, degrees; see `LightDirection`.
     wavelength_range : nm.
     step : largest width of a band, nm.
     wavelength : nm; map f at this wavelength instead of colours.
@@ -74,9 +74,9 @@ def brdf_map(
     spectral : store the bands, too.
     progress : called as progress(done, total, text).
     """
-    light = Light(theta, phi)
+    light = LightDirection(theta, phi)
     bands = Bands.choose(wavelength_range, step, wavelength)
-    check_illuminant(illuminant)
+    check_choice("illuminant", illuminant, ILLUMINANTS)
     check_map(bands, resolution, samples, spectral)
     _check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
@@ -216,7 +216,7 @@ class _RgbSums:
 
 def _over_pixels(
     bsdf: Any,
-    light: Light,
+    light: LightDirection,
     resolution: int,
     samples: int,
     sums: _SpectralSums | _RgbSums,

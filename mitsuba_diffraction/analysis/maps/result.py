@@ -25,7 +25,7 @@ _CLIPPED, _CLIPPED_FROM = 1e-3, 8.0
 
 
 @dataclass(frozen=True)
-class Light:
+class LightDirection:
     """Direction to the light.
 
     Raises a DiffractionError if an angle is out of range.
@@ -146,7 +146,7 @@ class BrdfMap:
     lobe : radius in x and y of the glossy lobe around the mirror direction; 0 if unknown.
     """
 
-    light: Light
+    light: LightDirection
     bands: Bands
     coverage: Image
     xyz: Image | None

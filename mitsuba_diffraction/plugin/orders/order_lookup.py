@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ from ...optics.orders import (
 )
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners
-from ..memory import index_between, read, read_record, upload
+from ..memory import index_between, once_a_table, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
@@ -231,20 +230,13 @@ class OrderLookup:
         return wavelength_coordinate(wavelength, low, high, 1e-3)
 
 
-_lookups: weakref.WeakKeyDictionary[OrderTable, dict[str, OrderLookup]] = (
-    weakref.WeakKeyDictionary()
-)
-
-
+@once_a_table
 def order_lookup(table: OrderTable, kind: type[OrderLookup]) -> OrderLookup:
-    """Return the table in the current variant's memory, shared by all BSDFs of the table.
+    """Return the table in the current variant's memory.
 
     kind : of the look-up, which table and variant decide.
     """
-    variants = _lookups.setdefault(table, {})
-    if mi.variant() not in variants:
-        variants[mi.variant()] = kind(table)
-    return variants[mi.variant()]
+    return kind(table)
 
 
 def _smooth(t: Float) -> Float:

@@ -7,7 +7,7 @@ export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
 materials      BSDFs, and the gloss of plain ones
 modelled       surfaces of `diffraction`: constants, energy conservation, tables
-orders         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
+solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
 lobes          directions drawn from lobes, and their densities
 maps           textures of materials
 lights         directions, points, spots, and a smooth sky

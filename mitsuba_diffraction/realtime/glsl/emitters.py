@@ -36,7 +36,14 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.properties import name_of
-from .lights import Light, sampled_directions, sampled_positions, spectra_along, without_extent
+from .lights import (
+    Light,
+    area_of,
+    sampled_directions,
+    sampled_positions,
+    spectra_along,
+    without_extent,
+)
 from .surroundings import Environment, is_flat
 
 Array = NDArray[np.float64]
@@ -165,7 +172,7 @@ class _LightSequence:
             values, places, normals, waves = sampled_positions(self._emitter, _BLOCK, start)
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
             shape = self._emitter.get_shape()
-            densities = np.full(_BLOCK, 1.0 / _area(shape) if is_flat(shape) else 0.0)
+            densities = np.full(_BLOCK, 1.0 / area_of(shape) if is_flat(shape) else 0.0)
             address = int(shape.ptr)
         else:
             values, places, densities, waves = self._environment_block(start)
@@ -222,11 +229,6 @@ class _Directions(NamedTuple):
     directions: Array  # (n, 3)
     densities: Array  # (n,) `Light.density`
     wavelengths: Array  # nm
-
-
-def _area(shape: Any) -> float:
-    """Return the area of a shape."""
-    return float(np.array(shape.surface_area()).ravel()[0])
 
 
 def _kind_of(emitter: Any) -> str:

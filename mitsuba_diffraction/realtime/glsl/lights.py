@@ -279,10 +279,15 @@ def spectra_along(emitter: Any, directions: Array) -> tuple[Array, Array]:
     return lanes.spectra(emitter.eval(si))
 
 
+def area_of(shape: Any) -> float:
+    """Return the area of a shape."""
+    return float(np.array(shape.surface_area()).ravel()[0])
+
+
 def emitted_radiance(shape: Any) -> Array:
     """Return the mean radiance that a shape emits, linear sRGB (3,)."""
     values, _, _, waves = sampled_positions(shape.emitter(), 64)
-    mean = values.mean(axis=0) / float(np.array(shape.surface_area()).ravel()[0])
+    mean = values.mean(axis=0) / area_of(shape)
     return daylight_colour(waves, mean[:, 0] if mean.shape[1] == 1 else mean)
 
 

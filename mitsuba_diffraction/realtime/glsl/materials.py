@@ -14,8 +14,8 @@ from ...plugin.description import Consumer, Feature, Mix, Surface, describe
 from ...plugin.parameter_changes import children
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
 from .modelled import Modelled, index_spectra
-from .orders import Solved
 from .packing import pack_conductor
+from .solved import Solved
 from .texels import Packed, Texture, Uniform, as_half
 
 _COSINES = 64  # nodes of transmittances

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, check_choice
 from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
 from ...plugin.description import Consumer, Feature
@@ -48,10 +48,7 @@ def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> M
     Raises a DiffractionError if the series is too short for the patch, or the method needs a period
     and the patch has none.
     """
-    if name not in THESIS_METHODS:
-        raise DiffractionError(
-            f"method='{name}' is unknown; choose one of {', '.join(THESIS_METHODS)}"
-        )
+    check_choice("method", name, THESIS_METHODS)
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.window_width, coherence=table.coherence,
@@ -204,8 +201,7 @@ def method_tables(method: str, surface: Diffracting) -> Packed:
 
     Raises a DiffractionError if the method is unknown, or does not support the table.
     """
-    if method not in METHODS:
-        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    check_choice("method", method, METHODS)
     described = surface.described
     if method in CONSUMERS:
         CONSUMERS[method].check(described)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import warn
+from ...errors import check_choice, warn
 from ...extras import optional
-from ...optics.display import check_view
+from ...optics.display import VIEWS
 from ...tables.directional import FINE
 from .camera import Camera
 from .context import (
@@ -57,7 +57,7 @@ class Renderer:
     def __init__(
         self, scene: Any, *, sensor: int = 0, context: Any = None, view: str = "natural"
     ) -> None:
-        check_view(view)
+        check_choice("view", view, VIEWS)
         self.view = view
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from ...errors import DiffractionError
-from ...optics.display import check_view
+from ...errors import check_choice
+from ...optics.display import VIEWS
 from .formulas import formulas
 from .rewriting import shader_file
 from .texels import PAGE
@@ -67,8 +67,7 @@ def fragment_parts(
     main: str = "surface.frag",
 ) -> list[tuple[str, str]]:
     """Return names and texts of the parts of `fragment_source`; parameters and errors as there."""
-    if method not in METHODS:
-        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    check_choice("method", method, METHODS)
     known = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
@@ -126,5 +125,5 @@ def display_definitions(view: str) -> dict[str, str]:
 
     Raises a DiffractionError if the view is unknown.
     """
-    check_view(view)
+    check_choice("view", view, VIEWS)
     return {"DISPLAYED": ""} | ({"NATURAL": ""} if view == "natural" else {})

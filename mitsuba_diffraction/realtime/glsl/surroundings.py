@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.properties import name_of
-from .lights import emitted_radiance, radiance_along
+from .lights import area_of, emitted_radiance, radiance_along
 from .scene import sample_normal
 from .shadows import frame_along
 from .texels import Packed, Texture, Uniform, as_half, listed
@@ -218,7 +218,7 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
             to_local[2] *= -1.0
         rows[:3, number] = to_local[:3]
         if shape.is_emitter():
-            area = float(np.array(shape.surface_area()).ravel()[0])
+            area = area_of(shape)
             rows[3, number, :3] = emitted_radiance(shape)
             rows[3, number, 3] = share_of(shape.emitter()) / area
     uniforms: dict[str, Uniform] = dict(

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic import atomic_path
-from ...errors import DiffractionError
-from ...optics.display import check_view
+from ...errors import DiffractionError, check_choice
+from ...optics.display import VIEWS
 from ...progress import Progress, silent
 from ..glsl.emitters import Emitters
 from ..glsl.materials import (
@@ -104,7 +104,7 @@ def make_page(
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(WEB_METHODS)}, each at most once"
         )
-    check_view(view)
+    check_choice("view", view, VIEWS)
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if is_file else "Diffraction"

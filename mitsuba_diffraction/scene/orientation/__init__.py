@@ -3,7 +3,7 @@
 Contents
 --------
 trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
-files        `load_mesh`, `write_ply`; PLY files of polygons
+mesh_files   `load_mesh`, `write_ply`; PLY files of polygons
 tangents     `check_tangents`: whether a mesh has the tangents that a patch needs, where they break
 directions   `direction_field`: a smooth field of directions on any mesh
 """
@@ -11,7 +11,7 @@ directions   `direction_field`: a smooth field of directions on any mesh
 from __future__ import annotations
 
 from .directions import DirectionField, direction_field
-from .files import load_mesh, load_orientation, write_ply
+from .mesh_files import load_mesh, load_orientation, write_ply
 from .tangents import TangentReport, check_tangents
 from .trimesh import TriangleMesh, oriented_mesh
 

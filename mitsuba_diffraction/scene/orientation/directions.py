@@ -24,7 +24,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.sparse.linalg import splu
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, check_choice
 from .tangents import carried
 from .trimesh import across, tangential, unit
 
@@ -183,8 +183,7 @@ def direction_field(
         `body`: from one end of each part to the other, the way a current flows from tip to tip.
     smoothing : distance within which a field may leave its guide, as a share of the mesh's size.
     """
-    if along not in GUIDES:
-        raise DiffractionError(f"along={along!r} is unknown; choose one of {', '.join(GUIDES)}")
+    check_choice("along", along, GUIDES)
     if not 1e-4 <= smoothing <= 1.0:
         raise DiffractionError(f"directions: smoothing = {smoothing:g} is outside 0.0001 to 1")
     lost = np.flatnonzero(~np.isfinite(np.hstack([positions, normals])).all(axis=1))

@@ -33,11 +33,6 @@ _FINE, _LONGEST = 0.15, 200
 _Maker = Callable[[int, int], Expansion]
 
 
-def expansion_kind(basis: str, coherence: str) -> str:
-    """`ensemble` adds powers, so Chebyshev tabulates them; Taylor's series is of amplitudes."""
-    return "power" if coherence == "ensemble" and basis == "chebyshev" else "amplitude"
-
-
 def chebyshev_expansion(
     heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
 ) -> Expansion:
@@ -86,7 +81,7 @@ def svd_expansion(
 
 
 def _maker(heights: HeightField, coherence: str, kappa_max: float) -> _Maker:
-    kind = expansion_kind("chebyshev", coherence)
+    kind = "power" if coherence == "ensemble" else "amplitude"
     half_range = 0.5 * heights.range
 
     def make(terms: int, intervals: int) -> Expansion:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...analysis.maps import hemisphere
-from ...analysis.maps.result import Bands, BrdfMap, Light
-from ...errors import DiffractionError
+from ...analysis.maps.result import Bands, BrdfMap, LightDirection
+from ...errors import check_choice
 from ...heights.coherence import resolved_width
 from ...heights.field import HeightField
 from ...optics.geometry import wavenumber
@@ -100,8 +100,7 @@ def make_all(
     settings : fields of `MethodSettings`.
     """
     for name in names:
-        if name not in NAMES:
-            raise DiffractionError(f"method='{name}' is unknown; choose one of {', '.join(NAMES)}")
+        check_choice("method", name, NAMES)
     common = MethodSettings(**settings)
     width = resolved_width(common.coherence_width, [heights])
 
@@ -193,7 +192,7 @@ def _periods(
 
 def method_map(
     method: Method,
-    light: Light,
+    light: LightDirection,
     *,
     step: float = 5.0,
     wavelength: float | None = None,

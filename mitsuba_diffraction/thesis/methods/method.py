@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, check_choice
 from ...optics.colour import linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
 from ...progress import Progress
@@ -64,10 +64,7 @@ class Gain:
                 f"int_ior={self.int_ior:g} must be above 1 and below 100 for relative reflectance, "
                 "which is relative to a mirror of that index"
             )
-        if self.shadowing not in SHADOWINGS:
-            raise DiffractionError(
-                f"shadowing='{self.shadowing}' is unknown; choose one of {', '.join(SHADOWINGS)}"
-            )
+        check_choice("shadowing", self.shadowing, SHADOWINGS)
 
     def factor(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return C, dimensionless, shape (n,), of unit vectors (n, 3); 0 below the surface.

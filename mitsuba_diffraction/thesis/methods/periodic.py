@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, check_choice
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...tables.build.spectrum import GLOSSY_RADIUS
@@ -65,10 +65,7 @@ class OrdersOnly(Method):
         specular: float | None = None,
         name: str = "nmm",
     ) -> None:
-        if weights not in WEIGHTS:
-            raise DiffractionError(
-                f"weights='{weights}' is unknown; choose one of {', '.join(WEIGHTS)}"
-            )
+        check_choice("weights", weights, WEIGHTS)
         if periods[0] is None and periods[1] is None:
             raise DiffractionError("method 'nmm' needs a period along x or y; give one in µm")
         self.name, self.full, self.periods, self.weighting = name, full, periods, weights
@@ -181,11 +178,7 @@ class Repeated(UniformMethod):
         step: float = 5.0,
         name: str = "pq",
     ) -> None:
-        if interpolation not in INTERPOLATIONS:
-            raise DiffractionError(
-                f"interpolation='{interpolation}' is unknown; choose one of "
-                f"{', '.join(INTERPOLATIONS)}"
-            )
+        check_choice("interpolation", interpolation, INTERPOLATIONS)
         if min(repeats) < 1 or max(repeats) > 10**6:
             raise DiffractionError(f"repeats={repeats} must be from 1 to 1000000 along each axis")
         if not table.grid.coherent:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ...analysis.maps.result import Light
+from ...analysis.maps.result import LightDirection
 from ...errors import DiffractionError
 from ...optics.geometry import wavenumber
 from ...progress import Progress
@@ -44,8 +44,8 @@ _LINES = 4000
 
 
 @dataclass(frozen=True)
-class Beam(Light):
-    """Direction of the light, which defines the plane of incidence; parameters of `Light`."""
+class Beam(LightDirection):
+    """Direction of the light, which defines the plane of incidence."""
 
     theta: float = 75.0
 

@@ -8,7 +8,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.analysis.maps import Bands, Light, brdf_map, evaluate, hemisphere
+from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, evaluate, hemisphere
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from tests.support.directions import rough_patch
@@ -24,7 +24,7 @@ pytestmark = [
 @pytest.mark.usefixtures("variant")
 def test_a_map_is_the_reference_integrated_over_pixels_and_wavelengths():
     field, width = rough_patch((20, 24), (0.2, 0.2), 0.2), 4.0
-    light, bands, n, samples = Light(25.0, 60.0), Bands(360, 830, 47), 12, 3
+    light, bands, n, samples = LightDirection(25.0, 60.0), Bands(360, 830, 47), 12, 3
     result = brdf_map(
         plugin(field, coherence_width=width, tolerance=1e-4), light.theta, light.phi,
         step=47, resolution=n, samples=samples,
@@ -55,7 +55,7 @@ def test_a_mirror_is_white_as_a_whole(illuminant):
 
 @pytest.mark.usefixtures("variant")
 def test_a_mirror_s_lobe_lies_where_a_mirror_reflects_and_is_as_wide_as_the_window():
-    n, light = 256, Light(40.0, 30.0)
+    n, light = 256, LightDirection(40.0, 30.0)
     result = brdf_map(mirror(), light.theta, light.phi, wavelength=550.0, resolution=n)
     x, total = centres(n), result.luminance.sum(dtype=float)
     along_x, along_y = (result.luminance.sum(axis=a, dtype=float) / total for a in (0, 1))

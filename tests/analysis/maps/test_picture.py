@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.analysis import maps
-from mitsuba_diffraction.analysis.maps import Light, brdf_map
+from mitsuba_diffraction.analysis.maps import LightDirection, brdf_map
 from tests.support.mapped import centres, mirror
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.Diffraction
 
 @pytest.mark.usefixtures("variant")
 def test_an_exr_has_the_largest_y_on_top_and_says_what_it_is(tmp_path):
-    light = Light(50.0, 90.0)  # reflected towards -y
+    light = LightDirection(50.0, 90.0)  # reflected towards -y
     result = brdf_map(mirror(), light.theta, light.phi, step=47, resolution=64, spectral=True)
     maps.save_exr(result, tmp_path / "a.exr", notes={"source": "here"})
     file = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True)
@@ -42,7 +42,7 @@ def test_a_picture_shows_the_map_pixel_by_pixel(tmp_path):
     result = brdf_map(mirror(), 40.0, step=47, resolution=500)  # the marks are elsewhere
     maps.save_png(result, tmp_path / "a.png", exposure=-8.0, title="mirror", notes="R = 1")
     image = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(float)
-    column = int(250 * (1 + Light(40.0).mirror[0]))
+    column = int(250 * (1 + LightDirection(40.0).mirror[0]))
     shown = np.rint(result.srgb(-8.0)[246:254, column - 4 : column + 4, :3] * 255)[::-1]
     assert np.ptp(shown) == 255  # the lobe, white on black
     windows = np.lib.stride_tricks.sliding_window_view(image, (8, 8, 3))[:, :, 0]

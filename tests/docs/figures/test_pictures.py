@@ -10,7 +10,7 @@ from PIL import Image
 
 from docs.make.figures import pictures
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.analysis.maps import Light
+from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.pictures import colour_field, patches_figure
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 
@@ -91,7 +91,7 @@ def test_there_is_a_map_for_each_patch_and_light():
         HeightField(np.tile(0.02 * np.sin(2 * np.pi * m * x / 2.0), (32, 1)), 0.0625, name=f"{m}")
         for m in (1, 2)
     ]
-    lights = (Light(0.0), Light(30.0), Light(60.0))
+    lights = (LightDirection(0.0), LightDirection(30.0), LightDirection(60.0))
     figure = pictures.maps_figure(fields, lights, resolution=16, step=100)
     assert len(figure.axes) == 6
     titles = [axes.get_title() for axes in figure.axes]

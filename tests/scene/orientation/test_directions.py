@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
-from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,

@@ -1,5 +1,5 @@
 // Efficiencies of solved orders, like plugin/orders/lookup.py: the cell of the incident light
-// (tables/orders/cells.py), and its tile in a texture (orders.py).
+// (tables/orders/cells.py), and its tile in a texture (solved.py).
 
 uniform sampler2D efficiencies;  // tiles of ρ × τ, side by side for groups of four w
 uniform vec3 order_cells;        // cells of a tile along τ, ρ and w

@@ -134,15 +134,13 @@ def cells_within(table: OrderTable, most_bytes: int) -> Counts:
     """Return the numbers of cells of a texture of this size at most."""
     counts = CELLS if table.superstrate == 1.0 else CELLS_UNDER_LAYER
     tiles = sum(n * (n + 1) for band in table.bands for n in (kind.shape[3] for kind in band.kinds))
-    while _tile_bytes(counts) * tiles > most_bytes and max(counts) > 4:
+    while max(counts) > 4:
+        half_floats = (counts.tau + 1) * (counts.rho + 1) * (counts.w // 3) * 4
+        if 2 * half_floats * tiles <= most_bytes:
+            break
         tau, rho, w = (max(min(n, 4), 3 * n // 4) for n in counts)
         counts = Counts(tau, rho, max(w - w % 3, 3))
     return counts
-
-
-def _tile_bytes(counts: Counts) -> int:
-    """Return the size of a tile of half floats."""
-    return 2 * (counts.tau + 1) * (counts.rho + 1) * (counts.w // 3) * 4
 
 
 def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
