@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import DiffractionError
-from .symbols import Scope, Symbol, argument_of, is_vector, kind_of
+from .symbols import Scope, Symbol, argument_of, is_vector, symbol_kind
 
 _WIDTH = 100
 _JOINT = "\xa0"  # no line break
@@ -53,7 +53,7 @@ class Printer:
         """Print a function; result : number, or tuple of numbers."""
         several = isinstance(result, tuple) and not is_vector(result)
         values = result if several else (result,)
-        kinds = [kind_of(value) for value in values]
+        kinds = [symbol_kind(value) for value in values]
         leaves = [argument_of(value, self._scope) for value in values]
         for leaf in leaves:
             self._count(leaf)

@@ -29,9 +29,9 @@ from .symbols import (
     argument_of,
     components_of,
     current,
-    kind_of,
     refuse,
     scopes,
+    symbol_kind,
 )
 
 OWN_FILES.add(__file__)
@@ -156,7 +156,7 @@ class Scope:
 
     def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Return the results of a call of another formula, which is written if it is new."""
-        function = self.program.function_of(formula, tuple(map(kind_of, values)))
+        function = self.program.function_of(formula, tuple(map(symbol_kind, values)))
         self.callees.add(function.name)
         parts, kinds = (function.name, *map(argument_of, values)), function.kinds
         if function.record is None:

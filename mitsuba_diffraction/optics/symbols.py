@@ -267,7 +267,7 @@ def is_vector(value: Any) -> bool:
     return all(isinstance(v, int | float) or getattr(v, "kind", "") == "float" for v in value)
 
 
-def kind_of(value: Any) -> str:
+def symbol_kind(value: Any) -> str:
     """Return the kind of an argument or a result of a function."""
     if isinstance(value, Symbol):
         return value.kind

@@ -17,7 +17,7 @@ from .directions import SHADOWINGS
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
 from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
 from .materials import coat_of, film_of, material_of, stack_of, warn_of_film
-from .properties import choice, kind_of, number
+from .properties import choice, class_of, number
 from .second_order import SecondOrder, ratios_of_second_order
 from .sources import TableProvider
 from .stack import UnderStack
@@ -124,7 +124,7 @@ def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
     """Features that a scene asks for, as messages call them."""
     if nested is not None:
         pigment = "pigment" in props
-        yield "nested", "the pigment" if pigment else f"the nested BSDF {kind_of(nested)}"
+        yield "nested", "the pigment" if pigment else f"the nested BSDF {class_of(nested)}"
     if (model := props.get("model", "kirchhoff")) != "kirchhoff":
         yield "index", f"model='{model}'"
     if props.get("layering", "") == "thesis":

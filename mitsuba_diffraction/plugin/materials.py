@@ -16,7 +16,7 @@ from .energy import indices_of
 from .fresnel import INDEX_PARTS, Conductor, Dielectric, Perfect, Reflectance
 from .layers import UnderFilm, plain
 from .parameter_changes import ObjectValues
-from .properties import kind_of, number
+from .properties import class_of, number
 from .stack import UnderStack, read_layers
 from .surface_parameters import DEFAULT_WAVELENGTH, read_index
 from .types import Properties
@@ -53,7 +53,7 @@ def _named(props: Properties, coat: Dielectric | None) -> Reflectance:
     """Read the parameter `material`: a name or an index (`optics.materials`)."""
     value = props.get("material")
     if not isinstance(value, str | int | float):
-        raise DiffractionError(f"material={kind_of(value)} must be a name or an index")
+        raise DiffractionError(f"material={class_of(value)} must be a name or an index")
     material = material_named(value)
     if material == PERFECT:
         return Perfect()
@@ -147,7 +147,7 @@ def stack_of(
     if "layers" not in props:
         return material
     if not isinstance(name := props.get("layers"), str):
-        raise DiffractionError(f"layers={kind_of(name)} must be the name of a file (.toml)")
+        raise DiffractionError(f"layers={class_of(name)} must be the name of a file (.toml)")
     assert isinstance(material, Dielectric | Conductor)  # `support` refuses others
     medium = Dielectric(read_index(props, "ext_ior", _above(props)), 1.0, "ext_eta")
     layers = read_layers(Path(str(mi.file_resolver().resolve(name))))

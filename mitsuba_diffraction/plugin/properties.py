@@ -40,7 +40,7 @@ def number(props: Properties, name: str, default: float) -> float:
     return parsed
 
 
-def kind_of(element: BSDF) -> str:
+def class_of(element: BSDF) -> str:
     """Return the class of an element of a scene, for example `SmoothDielectric`."""
     return str(element.class_name())
 

@@ -22,7 +22,7 @@ from .dictionary import ORDERS, PLUGINS
 from .factors import HEIGHT, LateralScale, VaryingFactor, largest_of, read_factor, read_lateral
 from .llvm import require_loaded_llvm
 from .pigment import pigment_bsdf
-from .properties import choice, flag, kind_of, number
+from .properties import choice, class_of, flag, number
 from .sources import (
     Factors,
     TableProvider,
@@ -164,12 +164,12 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
     if "pigment" in props and "pigment" not in nested:
         if bsdf is not None:
             raise DiffractionError(
-                f"pigment and the nested BSDF {kind_of(bsdf)} both lie beneath; give one of them"
+                f"pigment and the nested BSDF {class_of(bsdf)} both lie beneath; give one of them"
             )
         return pigment_bsdf(props.get("pigment"))
     if bsdf is not None and bsdf.flags() & mi.BSDFFlags.Transmission:
         raise DiffractionError(
-            f"the nested BSDF {kind_of(bsdf)} lets light through, which would be lost beneath; "
+            f"the nested BSDF {class_of(bsdf)} lets light through, which would be lost beneath; "
             "nest one that only reflects"
         )
     return bsdf
@@ -322,7 +322,7 @@ def orientation_of(props: Properties) -> Orientation:
         texture = objects["orientation"]
         if not isinstance(texture, mi.Texture):
             raise DiffractionError(
-                f"orientation={kind_of(texture)} must be degrees, or a raw texture or mesh "
+                f"orientation={class_of(texture)} must be degrees, or a raw texture or mesh "
                 "attribute whose first two channels are (cos, sin)"
             )
         return OrientationTexture(texture)

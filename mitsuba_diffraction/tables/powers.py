@@ -11,7 +11,7 @@ from .expansion import Expansion
 from .table import DiffractionTable
 
 
-def kind_of(table: DiffractionTable) -> str:
+def series_kind(table: DiffractionTable) -> str:
     """How all orders but order 0 fade as κ → 0, by the kind of series that does the same.
 
     A power fades as κ²; in a coherent sum an amplitude beats with order 0's, and fades as κ.
@@ -24,7 +24,7 @@ def power_expansion(table: DiffractionTable) -> Expansion:
     amplitude = table.expansion
     intervals = max(1, math.ceil(amplitude.kappa_max * amplitude.half_range / 4.0))
     return Expansion(
-        "chebyshev", kind_of(table), 12, intervals, amplitude.kappa_max, amplitude.half_range
+        "chebyshev", series_kind(table), 12, intervals, amplitude.kappa_max, amplitude.half_range
     )
 
 

@@ -11,7 +11,7 @@ from ...settings import USUAL_WIDTH, checked
 from ...tables.orders import OrderTable
 from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
-from ..properties import kind_of
+from ..properties import class_of
 from ..surface_parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..textures import Orientation
 from ..types import BSDF, Properties
@@ -51,7 +51,7 @@ def read_parameters(props: Properties) -> Parameters:
     table = _table(props)
     if table.thin and nested is not None:
         raise DiffractionError(
-            f"the table is that of a thin sheet, beneath which no BSDF ({kind_of(nested)}) lies; "
+            f"the table is that of a thin sheet, beneath which no BSDF ({class_of(nested)}) lies; "
             "put a surface behind the sheet instead"
         )
     return Parameters(

@@ -12,7 +12,7 @@ from ...settings import SURFACE
 from ..boundary import Boundary, boundary_of
 from ..fresnel import Dielectric
 from ..materials import AIR, KERATIN
-from ..properties import choice, flag, kind_of
+from ..properties import choice, class_of, flag
 from ..sources import TableProvider
 from ..support import TRANSMISSION, check_combination
 from ..surface_parameters import (
@@ -53,7 +53,7 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     Raises a DiffractionError with the parameter, its value and the choices.
     """
     nested = nested_of(props, TRANSMITTING)
-    asked = {} if nested is None else {"nested": f"the nested BSDF {kind_of(nested)}"}
+    asked = {} if nested is None else {"nested": f"the nested BSDF {class_of(nested)}"}
     if coherence_of(props) == SURFACE:
         asked["placed"] = f"coherence='{SURFACE}'"
     check_combination(asked, [TRANSMISSION])

@@ -136,7 +136,7 @@ class _LightSequence:
         self._emitter, self._middle, self._environment = emitter, middle, environment
         self._fixed = without_extent(emitter, middle)
         self._blocks: dict[int, list[Light]] = {}
-        self.kind = "fixed" if self._fixed is not None else _kind_of(emitter)
+        self.kind = "fixed" if self._fixed is not None else _emitter_kind(emitter)
 
     def draws_from(self, emitter: Any) -> bool:
         """Return whether the lights represent `emitter`."""
@@ -231,7 +231,7 @@ class _Directions(NamedTuple):
     wavelengths: Array  # nm
 
 
-def _kind_of(emitter: Any) -> str:
+def _emitter_kind(emitter: Any) -> str:
     """Return "area", "environment", or "" for an unsupported emitter."""
     if emitter.class_name() == "AreaLight":
         return "area"

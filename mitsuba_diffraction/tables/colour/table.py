@@ -25,7 +25,7 @@ from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
 from ..expansion import Expansion
-from ..powers import kind_of
+from ..powers import series_kind
 from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 
@@ -176,7 +176,7 @@ def _expansion(
 
     def expand(terms: int, intervals: int) -> tuple[Expansion, NDArray[np.float64]]:
         half = table.expansion.half_range
-        expansion = Expansion("chebyshev", kind_of(table), terms, intervals, z_max, half)
+        expansion = Expansion("chebyshev", series_kind(table), terms, intervals, z_max, half)
         blocks = []
         for band in bands:
             azimuths = np.linspace(0, grid.counts[band.start], 33)[:-1].astype(np.int64)
