@@ -101,16 +101,14 @@ def means(
 
     Each sample has another wavelength of the band around each wavelength.
 
+    Raises a DiffractionError if the variant cannot be evaluated, or the surface transmits or
+    varies.
+
     Parameters
     ----------
     bsdf : a BSDF of the current variant, spectral and vectorised.
     size : of the largest cell, in direction cosines, by which the number of samples is chosen.
     cosine : whether f is multiplied by cosθo; the mean is then over the whole cell.
-
-    Raises
-    ------
-    DiffractionError
-        If the variant cannot be evaluated, or the surface transmits or varies.
     """
     if not mi.is_spectral or mi.is_polarized or "scalar" in mi.variant():
         raise DiffractionError(
