@@ -73,10 +73,7 @@ def read_layers(path: Path) -> Layers:
     """Read a stack (TOML): `layers`, pairs of a material and a thickness in µm from the material
     upwards; `repeat`, how often they follow each other; `spread` of the thicknesses.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or a key or value is not allowed.
+    Raises a DiffractionError if the file cannot be read, or a key or value is not allowed.
     """
     shown = f"layers='{path}'"
     try:

@@ -18,7 +18,7 @@ from ..errors import DiffractionError
 from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
 from .logo import Areas, logo, wavelengths_of
-from .orientation.files import load_mesh
+from .orientation.mesh_files import load_mesh
 from .stage import STUDIO
 
 Floats = NDArray[np.float64]
