@@ -20,7 +20,9 @@ from tests.support import ROOT
 os.environ["DRJIT_CACHE_DIR"] = str(ROOT / ".pytest_cache" / "kernels")
 
 import mitsuba_diffraction  # noqa: F401 - before Dr.Jit: it chooses the LLVM that Dr.Jit loads
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.store import VARIABLE
+from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
 from tests.support.variants import VARIANTS, obstacle
 
@@ -115,13 +117,18 @@ def own_vectors() -> int:
     return compile_quickly()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session", autouse=True)
 def coarse() -> Iterator[None]:
-    """Energy conserved coarsely, for modules that do not ask how well it is."""
-    from mitsuba_diffraction.tables.energy.settings import use_energy_settings
-    from tests.support.coarse import coarse_energy
-
+    """Energy conserved coarsely: scales as fine as users have them take seconds to find."""
     before = coarse_energy()
+    yield
+    use_energy_settings(before)
+
+
+@pytest.fixture(scope="module")
+def fine(coarse: None) -> Iterator[None]:
+    """Energy conserved as finely as users have it, for modules that ask how well it is."""
+    before = use_energy_settings(EnergySettings())
     yield
     use_energy_settings(before)
 

@@ -9,7 +9,7 @@ from tests.support.commands import run_page, small_tree
 pytestmark = [
     # heights as coarse and steep as the stand-ins' are worth a warning
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse", "some_variant"),
+    pytest.mark.usefixtures("some_variant"),
 ]
 
 

@@ -17,7 +17,7 @@ pytestmark = [
     pytest.mark.thorough,
     # heights as coarse and steep as the stand-ins' are worth a warning
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse", "some_variant"),
+    pytest.mark.usefixtures("some_variant"),
 ]
 
 

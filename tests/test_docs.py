@@ -20,8 +20,6 @@ from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
 from tests.support.pages import FENCE, PAGES, blocks, first_columns, spans, typed
 
-pytestmark = pytest.mark.usefixtures("coarse")
-
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 BLENDER_OPTIONS = {"--", "--python"} | set(

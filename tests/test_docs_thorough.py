@@ -15,7 +15,7 @@ from mitsuba_diffraction.solve import jobs
 from tests.support.clone import small_clone
 from tests.support.pages import PAGES, blocks
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 DENOISER = importlib.util.find_spec("pyoidn") is not None
 

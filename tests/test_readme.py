@@ -12,8 +12,6 @@ from PIL import Image
 
 from tests.support.pages import first_columns
 
-pytestmark = pytest.mark.usefixtures("coarse")
-
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 
 

@@ -14,7 +14,6 @@ from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 # the look-alikes are as steep as the real scales, which the package says every time
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 
 SOLVED = ("cd", "cd_window", "grating", "grating_window", "orders_on_wall", "spectrometer")

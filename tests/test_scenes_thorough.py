@@ -11,7 +11,6 @@ from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 
 

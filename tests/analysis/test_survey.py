@@ -25,7 +25,7 @@ from mitsuba_diffraction.tables.store import VARIABLE
 from mitsuba_diffraction.tables.table import DiffractionTable
 from tests.support.directions import rough_patch
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 PERIOD, PIXEL = 1.6, 0.1
 SMALL = {"coherence_width": 6.0, "tolerance": 0.05}

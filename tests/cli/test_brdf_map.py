@@ -13,8 +13,6 @@ from PIL import Image
 
 from mitsuba_diffraction.analysis.maps.picture import ATTRIBUTE
 
-pytestmark = pytest.mark.usefixtures("coarse")
-
 # A map of the grating of `heights` that takes half a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32", "--step", "47"]
 

@@ -11,8 +11,6 @@ import pytest
 from mitsuba_diffraction.analysis import angular_variables
 from mitsuba_diffraction.heights import gratings
 
-pytestmark = pytest.mark.usefixtures("coarse")
-
 PIXEL = ["--pixel-size", str(1.6 / 64)]
 QUICK = ["--coherence-width", "6", "--wavelength-range", "400", "700", "--step", "50"]
 

@@ -6,6 +6,8 @@ import pytest
 
 from tests.fuzz.__main__ import KINDS, ROUND, run_case
 
+pytestmark = pytest.mark.usefixtures("fine")
+
 #: (kind, seed, case): what `python -m tests.fuzz` has found.
 FOUND = [
     # elongated patches, whose look-ups ended in an error of Dr.Jit's loops

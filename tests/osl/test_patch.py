@@ -128,7 +128,8 @@ def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path,
 
 
 def test_patch_has_a_height_scale(tmp_path, some_variant):
-    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, height_scale=0.5, second_order=False))
+    raw = {"energy_conserving": False, "second_order": False}
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, height_scale=0.5, **raw))
     exported = md.osl.export(bsdf, tmp_path, "skin")
     document = json.loads(exported.document.read_text(encoding="utf-8"))
     values = {item["identifier"]: item["default"] for item in document["inputs"]}

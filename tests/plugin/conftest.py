@@ -8,6 +8,8 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
+from mitsuba_diffraction.tables.energy.settings import use_energy_settings
+from tests.support.coarse import coarse_energy
 from tests.support.variants import ALL, runs
 
 
@@ -18,6 +20,14 @@ def every_variant(request: pytest.FixtureRequest) -> str:
         pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
     mi.set_variant(request.param)
     return str(request.param)
+
+
+@pytest.fixture
+def coarsely() -> Iterator[None]:
+    """Energy conserved coarsely, for a test of a module that asks for `fine`."""
+    before = coarse_energy()
+    yield
+    use_energy_settings(before)
 
 
 @pytest.fixture

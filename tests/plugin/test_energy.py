@@ -22,7 +22,7 @@ from tests.support.lanes import evaluated
 # the surfaces are steep on purpose
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant"),
+    pytest.mark.usefixtures("some_variant", "fine"),
 ]
 
 
@@ -53,7 +53,7 @@ def test_only_booleans_are_accepted():
 
 
 @pytest.mark.parametrize("material", ["Al", "none"])
-def test_scales_that_come_and_go_with_the_heights_load_and_update(material, coarse):
+def test_scales_that_come_and_go_with_the_heights_load_and_update(material, coarsely):
     given = {"material": material, "model": "kirchhoff", "coherence_width": 18.5}
     bsdf = mi.load_dict(md.bsdf_dict(steep_sinusoid(), height_scale=0.02, **given))
     parameters = mi.traverse(bsdf)

@@ -27,7 +27,7 @@ from tests.support.lanes import lanes
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("variant"),
+    pytest.mark.usefixtures("variant", "fine"),
 ]
 
 #: Every surface with random numbers of its own.
@@ -185,7 +185,7 @@ def test_kernels_twin_agrees_with_numpy():
         )
 
 
-def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarse):
+def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarsely):
     heights = {
         "type": "bitmap",
         "bitmap": mi.Bitmap(np.linspace(0.002, 0.2, 16, dtype=np.float32).reshape(4, 4, 1)),

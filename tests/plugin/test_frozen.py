@@ -26,7 +26,6 @@ from tests.support.plates import (
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 
 

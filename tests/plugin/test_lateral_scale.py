@@ -86,7 +86,6 @@ def test_values_at_each_place_are_the_reference_s_of_its_factor(mono):
         assert np.abs(values - exact).sum() < 1e-3 * exact.sum()
 
 
-@pytest.mark.usefixtures("coarse")
 def test_energy_is_conserved_at_each_factor_as_by_stretched_heights(mono):
     """A deep mirror grating, whose albedo is 1.43 by the scales of the unstretched patch."""
     factors = np.array([[0.8, 1.0]], np.float32)

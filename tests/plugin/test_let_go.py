@@ -22,7 +22,6 @@ from tests.support.variants import obstacle
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 LOADED = ("scalar_spectral", "llvm_ad_spectral", "llvm_ad_rgb", "llvm_ad_mono")
 GLASS = {"material": None, "energy_conserving": True}

@@ -16,7 +16,6 @@ PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2)
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 
 

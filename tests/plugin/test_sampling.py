@@ -21,7 +21,6 @@ from tests.support.lanes import interaction, lanes, spectra, vectors
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
 ]
 
 #: nm; so far apart that dispersion sends each elsewhere.

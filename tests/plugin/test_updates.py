@@ -14,7 +14,7 @@ from tests.support.directions import Array
 from tests.support.gentle import PATCH, WIDTH, pairs
 from tests.support.lanes import interaction, spectra, vectors
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse", "mono")]
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("mono")]
 
 HOSTILE = [float("nan"), float("inf"), -1.0, 0.0, 0.5, 3.0, 1e30]
 WHITE = {"type": "diffuse", "reflectance": 0.5}

@@ -84,9 +84,9 @@ def run(words: list[str]) -> None:
         del rest[at : at + 2]
     if command == "render" and (not rest[0].endswith(".xml") or "label" in rest[0]):  # large stages
         rest += ["-D", "resx=12", "-D", "resy=10"]
-    if "--preset" in rest and command in ("render", "export-viewer"):
+    if "--preset" in rest:
         at = rest.index("--preset") + 1
-        rest[at] = small_look(rest[at])
+        rest[at] = small_look(command, rest[at])
     if command == "render" and "--frames" in rest:
         rest += ["--frames", "2"]
     assert main([command, *rest]) == 0, words
@@ -108,17 +108,17 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if any(word.startswith("--theta") for word in rest) and command == "solve":
         return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
-    if "--preset" in rest and command in ("brdf-map", "export-osl"):
-        small = [*small, "--coherence-width", "4", "--tolerance", "0.05"]
     # a sheet has a material that light goes through
     return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
 
 
-def small_look(value: str) -> str:
-    """Value of --preset, with the small tree's patch of that name."""
+def small_look(command: str, value: str) -> str:
+    """Value of --preset with a small patch: the tree's of that name, or a look of one period."""
     look = find_preset(value.partition(",")[0].rpartition("=")[2])
     if look.plugin == ORDERS:
         return value
+    if command in ("brdf-map", "export-osl"):  # which take no parameters behind the name
+        return "gold-foil"
     return f"{value},heightfield={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
 
 
@@ -167,8 +167,8 @@ def small_tree(folder: Path) -> Path:
 
 def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a page's commands in a folder of `small_tree`."""
-    # of height scales that a page may be asked for, two
-    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
+    # of height scales that a page may be asked for, one
+    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
     monkeypatch.chdir(tree)
     for words in commands(page):
         run(words)

@@ -34,7 +34,7 @@ SCENES = Path(__file__).parents[3] / "scenes"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def tiny(coarse):
+def tiny():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "QUICK", TINY)
         # as many as the other pictures have: another number is another kernel

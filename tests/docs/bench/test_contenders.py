@@ -20,7 +20,7 @@ from mitsuba_diffraction.analysis.timing import Queries
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.tables.window import base_bin, first_tap
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
 import numpy as np  # isort: skip
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 
 def drawn(bsdf, count=1 << 14):

@@ -84,7 +84,7 @@ def test_a_bad_patch_is_one_line_and_ends_it(tmp_path, capsys, name):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.usefixtures("coarse", "variant")
+@pytest.mark.usefixtures("variant")
 def test_there_is_a_map_for_each_patch_and_light():
     x = np.arange(32) * 0.0625
     fields = [

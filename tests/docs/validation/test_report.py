@@ -13,7 +13,6 @@ from docs.make.validation.pages.report import PAGES, page_path
 pytestmark = pytest.mark.thorough
 
 
-@pytest.mark.usefixtures("coarse")  # figures of energy need not be exact here
 def test_the_report_is_whole(tmp_path, capsys):
     folder = tmp_path / "docs"
     assert main(["report", "--quick", "-o", str(folder)]) == 0

@@ -13,7 +13,7 @@ from tests.support.transmitting import SIDES
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant", "coarse"),
+    pytest.mark.usefixtures("some_variant"),
 ]
 
 FIELDS = {

@@ -21,7 +21,7 @@ from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
 from tests.support.variants import evaluate, runs
 
-pytestmark = pytest.mark.thorough
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("fine")]
 
 
 @pytest.mark.parametrize("kind", SIDES)

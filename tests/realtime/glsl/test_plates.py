@@ -17,7 +17,7 @@ from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.lanes import interaction, spectra, vectors
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 #: Direction towards the eye in the plate's frame, and columns of a vertex that hold its colour.
 VIEW = np.array([0.0, -0.6, 0.8])

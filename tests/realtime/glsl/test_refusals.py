@@ -14,7 +14,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 SENSOR = {"type": "perspective"}
 

@@ -22,7 +22,7 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
 )
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+pytestmark = pytest.mark.thorough
 
 mi = pytest.importorskip("mitsuba")
 

@@ -15,8 +15,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
 ]
 
-#: Tables and samples of each: together more than 10 000.
-TABLES, SAMPLES = 206, 50
+#: Tables, and samples of each.
+TABLES, SAMPLES = 80, 50
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:
