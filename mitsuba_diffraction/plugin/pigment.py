@@ -41,8 +41,14 @@ def pigment_bsdf(text: str | float) -> BSDF:
 
 
 def pigment_range(text: str | float | None) -> tuple[float, float]:
-    """Return the wavelengths, nm, between which a pigment is known; without limits of a colour."""
-    if text is None or Path(str(text)).suffix.lower() not in SPECTRA:
+    """Return the wavelengths, nm, between which a pigment is known; without limits of a colour.
+
+    Raises a DiffractionError if the text is not a pigment.
+    """
+    if text in (None, "none"):
+        return 0.0, math.inf
+    if Path(str(text)).suffix.lower() not in SPECTRA:
+        _reflectance(str(text))
         return 0.0, math.inf
     lam, _ = read_reflectance(str(text))
     return float(lam[0]), float(lam[-1])

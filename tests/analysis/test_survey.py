@@ -147,7 +147,8 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("option", "named"), [("--material", "kerratin"), ("--ext-ior", "melanin")]
+    ("option", "named"),
+    [("--material", "kerratin"), ("--ext-ior", "melanin"), ("--pigment", "blueish")],
 )
 def test_materials_that_are_none_are_refused_before_a_scan_is_measured(
     run, scans, tmp_path, option, named
