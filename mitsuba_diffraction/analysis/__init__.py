@@ -9,6 +9,7 @@ spectra_files  CSV, colours and plot of spectra
 observers      eyes of animals: sensitivities, quantum catches, contrasts
 false_colour   pictures of an eye's quantum catches
 spectral_variables  variables of spectra as biologists publish them
+angular_variables  variables of iridescence over angles (Gruson and others 2019)
 known_wavelengths  wavelengths at which a material and a pigment are known
 crops          crops of one scan
 scans          tables and BSDFs of scans and recipes

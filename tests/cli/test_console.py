@@ -119,7 +119,7 @@ def test_ctrl_c_while_the_package_is_imported_is_no_traceback(entry, slow, tmp_p
 @pytest.mark.parametrize(
     ("raised", "code", "text"),
     [
-        ("KeyboardInterrupt", 130, "interrupted; nothing half-written"),
+        ("KeyboardInterrupt", 130, "interrupted; no half-written"),
         ("MemoryError", 1, "error: out of memory"),
         ("SystemExit(143)", 143, ""),
         ("ValueError", 1, "ValueError"),

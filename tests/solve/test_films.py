@@ -83,7 +83,7 @@ def test_light_under_films_is_reciprocal(profile):
     [
         (lambda: grating(lamellar(0.5, 0.1), [("1.46", 0.0)]), "layer 1: thickness"),
         (lambda: grating(lamellar(0.5, 0.1), [("1.4", 0.1), ("Unobtainium", 1)]), "is unknown"),
-        (lambda: grating(lamellar(0.5, 0.1), [("none", 0.1)]), "layer 1: a perfect conductor"),
+        (lambda: grating(lamellar(0.5, 0.1), [("none", 0.1)]), "layer 1: .*perfect conductor"),
         (lambda: grating(lamellar(0.5, 0.1), LAYERS, "none"), "not on thin sheets or perfect"),
         (lambda: problem_of(grating(blazed(0.5, 0.1)), "chandezon", 20), "method=coupled"),
     ],
