@@ -17,6 +17,10 @@ guanine : A. Levy-Lior et al., Biogenic guanine crystals from the skin of fish m
 water : M. Daimon and A. Masumura, Measurement of the refractive index of distilled water from the
     near-infrared region to the ultraviolet region, Applied Optics 46, 3811-3820 (2007), at 20 °C;
     k is below 1e-6 (G. M. Hale and M. R. Querry, Applied Optics 12, 555-563, 1973) and neglected.
+sio2 : I. H. Malitson, Interspecimen comparison of the refractive index of fused silica, Journal of
+    the Optical Society of America 55, 1205-1208 (1965).
+mgf2 : M. J. Dodge, Refractive properties of magnesium fluoride, Applied Optics 23, 1980-1985
+    (1984), ordinary ray; evaporated films are some per cent rarer.
 """
 
 from __future__ import annotations
@@ -87,13 +91,24 @@ def _cauchy(a: float, b: float) -> Callable[[Reals], Reals]:
     return lambda lam: a + b / lam**2
 
 
-def _water(lam: Reals) -> Reals:
-    square = np.square(1e-3 * lam)
-    terms = (
-        (5.684027565e-1, 5.101829712e-3), (1.726177391e-1, 1.821153936e-2),
-        (2.086189578e-2, 2.620722293e-2), (1.130748688e-1, 1.069792721e1),
-    )  # fmt: skip
-    return np.sqrt(1.0 + sum(c * square / (square - pole) for c, pole in terms))
+def _sellmeier(*terms: tuple[float, float]) -> Callable[[Reals], Reals]:
+    """Return n² = 1 + Σ c λ²/(λ² − pole), λ in µm and poles in µm²."""
+
+    def n(lam: Reals) -> Reals:
+        square = np.square(1e-3 * lam)
+        return np.sqrt(1.0 + sum(c * square / (square - pole) for c, pole in terms))
+
+    return n
+
+
+_WATER = (
+    (5.684027565e-1, 5.101829712e-3), (1.726177391e-1, 1.821153936e-2),
+    (2.086189578e-2, 2.620722293e-2), (1.130748688e-1, 1.069792721e1),
+)  # fmt: skip
+_SILICA = (0.6961663, 0.0684043**2), (0.4079426, 0.1162414**2), (0.8974794, 9.896161**2)
+_FLUORIDE = (
+    (0.48755108, 0.04338408**2), (0.39875031, 0.09461442**2), (2.3120353, 23.793604**2),
+)  # fmt: skip
 
 
 TISSUES = {
@@ -103,7 +118,9 @@ TISSUES = {
         Tissue("chitin", _cauchy(1.517, 8.80e3)),
         Tissue("melanin", _cauchy(1.648, 2.37e4), lambda lam: 0.56 * np.exp(-lam / 270.0)),
         Tissue("guanine", lambda lam: np.full_like(lam, 1.83)),
-        Tissue("water", _water),
+        Tissue("water", _sellmeier(*_WATER)),
+        Tissue("sio2", _sellmeier(*_SILICA)),
+        Tissue("mgf2", _sellmeier(*_FLUORIDE)),
     )
 }
 

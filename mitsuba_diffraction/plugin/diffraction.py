@@ -98,7 +98,8 @@ The material
 ------------
 material : string or float
     A tissue or a liquid, with its index over wavelength: `keratin`, `chitin`, `melanin`, `guanine`,
-    `water`; an index, `1.56` or `1.56+0.05i`; a conductor by symbol, as in `roughconductor`, or
+    `water`, `SiO2`, `MgF2`; an index, `1.56` or `1.56+0.05i`; a conductor by symbol, as in
+    `roughconductor`, or
     plain name: `Au`, `gold`; or `none`, which reflects all light.
 eta, k : spectra ∂
     Instead: the conductor's complex refractive index.

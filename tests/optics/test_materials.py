@@ -24,6 +24,8 @@ from mitsuba_diffraction.optics.materials import (
         ("keratin", [400.0, 500.0, 600.0], [1.569, 1.556, 1.548]),
         # IAPWS R9-97 at 20 °C, 0.1 MPa and sodium's D line, and at 404.7 nm
         ("water", [404.66, 589.26], [1.3428, 1.3330]),
+        ("sio2", [404.66, 587.56], [1.46962, 1.45846]),  # table 1 of the paper
+        ("mgf2", [589.3], [1.3777]),
     ],
 )
 def test_indices_are_as_published(name, wavelengths, published):
