@@ -99,7 +99,8 @@ def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
     cosine, square : of the angle of incidence, and of its sine the square.
     """
     if not isinstance(index, Filmed):
-        epsilon = index * index
+        n: Number = index
+        epsilon = n * n
         inside = decaying_root(epsilon - square)
         xp = of(inside)
         p = xp.reciprocal(epsilon * cosine + inside)

@@ -81,8 +81,12 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     optical = 1.0 if coat is None else float(dr.slice(coat.eta))
     surface = read_surface(props, provider, optical, may_have_second_order)
 
-    filmed = film_of(props, material, surface.wavelength, surface.table.wavelength_range[0])
-    filmed = stack_of(props, filmed, surface.wavelength, surface.table.wavelength_range)
+    filmed = stack_of(
+        props,
+        film_of(props, material, surface.wavelength, surface.table.wavelength_range[0]),
+        surface.wavelength,
+        surface.table.wavelength_range,
+    )
     if isinstance(filmed, UnderStack) and filmed.absorbs:
         check_combination(dict(_asked(props, nested)), [support.OPAQUE])
     if isinstance(filmed, UnderFilm) and filmed.absorbs:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -151,12 +152,13 @@ def stack_of(
     assert isinstance(material, Dielectric | Conductor)  # `support` refuses others
     medium = Dielectric(read_index(props, "ext_ior", _above(props)), 1.0, "ext_eta")
     layers = read_layers(Path(str(mi.file_resolver().resolve(name))))
-    return UnderStack(
-        material, partial(indices_of, material), layers, plain(medium.eta), wavelength, wavelengths
-    )
+    index: Any = partial(indices_of, material)
+    return UnderStack(material, index, layers, plain(medium.eta), wavelength, wavelengths)
 
 
-def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, scale: float) -> None:
+def warn_of_film(
+    material: Reflectance | UnderFilm | UnderStack, table: DiffractionTable, scale: float
+) -> None:
     """Warn of a film whose fringes are finer than the model can follow on these heights."""
     if not isinstance(material, UnderFilm) or not isinstance(material.material, Conductor):
         return

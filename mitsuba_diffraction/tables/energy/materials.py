@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +107,7 @@ def rounded(index: NDArray[np.complex128] | Filmed | Stacked | None) -> list[str
     """Round indices to five digits: single precision's noise makes no other material."""
     if index is None:
         return None
+    parts: Sequence[Any] = index.parts if isinstance(index, Filmed) else [index]
     if isinstance(index, Stacked):
-        index = index.table.ravel() + 0j
-    if isinstance(index, Filmed):
-        index = np.concatenate([np.ravel(part) for part in index.parts])
-    return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
+        parts = [index.table + 0j]
+    return [f"{n.real:.5g} {n.imag:.5g}" for part in parts for n in np.ravel(part)]
