@@ -23,10 +23,12 @@ LARGEST_TEXT = 1_000_000
 TABLE_ATTRIBUTE = "mitsuba_diffraction"
 #: Attribute that tells tables of orders from other NetCDF files.
 ORDERS_ATTRIBUTE = "mitsuba_diffraction_orders"
-#: Suffixes of mesh files that Mitsuba reads.
-MESHES = (".ply", ".obj", ".serialized")
-#: Suffixes of mesh files that have to be converted first: Mitsuba reads neither STL nor glTF.
-OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
+#: Suffixes of glTF and USD, which optional packages read.
+GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
+#: Suffixes of mesh files; the first three are read by Mitsuba.
+MESHES = (".ply", ".obj", ".serialized", *GLTF, *USD)
+#: Suffixes of mesh files that have to be converted first.
+OTHER_MESHES = (".stl", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
 class FileKind(StrEnum):

@@ -26,7 +26,9 @@ with (ROOT / "pyproject.toml").open("rb") as file:
         ("imgui_bundle", "imgui-bundle"),
         ("moderngl", "moderngl"),
         ("moderngl_window", "moderngl-window"),
+        ("pxr.Usd", "usd-core"),
         ("pyoidn", "pyoidn"),
+        ("trimesh", "trimesh"),
     ],
 )
 def test_missing_package_names_an_extra_that_has_it(

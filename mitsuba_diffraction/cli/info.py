@@ -26,7 +26,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "info", run, "describe a table, a height field, a recipe or a mesh",
         "Describe a table, a table of orders, a file of heights, a recipe, or a mesh (PLY, OBJ, "
-        "serialized) and whether its tangents suit a measured patch.",
+        "glTF, USD, serialized) and whether its tangents suit a measured patch.",
     )  # fmt: skip
     parser.add_argument(
         "file", metavar="FILE", type=Path, help="table, table of orders, heights, recipe or mesh"

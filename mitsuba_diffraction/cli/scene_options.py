@@ -38,7 +38,7 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     """Add a scene, its parameters, variant and sensor."""
     parser.add_argument(
         "scene", metavar="SCENE", type=Path,
-        help="Mitsuba XML file; or, with --patch, a mesh (PLY, OBJ), which is put into a studio",
+        help="Mitsuba XML file; or, with --patch, a mesh (PLY, OBJ, glTF, USD) for the studio",
     )  # fmt: skip
     parser.add_argument(
         "--patch", metavar="FILE", type=Path,

@@ -21,7 +21,7 @@ _NAMED = 6  # singular points that are named
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "tangents", run, "give a mesh a smooth field of directions for its patch",
-        "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "
+        "Write a mesh (PLY, OBJ, glTF, USD) as a PLY whose attribute vertex_orientation lays "
         "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "(a torus excepted) every field has singular points, around which the patch turns.",

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
+from .orientation.interchange import stated_up
 from .orientation.mesh_files import load_mesh, load_orientation
 from .orientation.tangents import check_tangents
 from .orientation.trimesh import TriangleMesh, oriented_mesh, vertex_normals
@@ -176,8 +177,11 @@ def _upright(up: str) -> Floats:
 def _guessed_up(positions: Floats, file: Path) -> str:
     """Return y or z: the convention of the format, unless the mesh stands better on the other.
 
-    Blender, scanners and CAD write PLY with z up; OBJ has y up in most programs.
+    Blender, scanners and CAD write PLY with z up; OBJ has y up in most programs. glTF and USD state
+    the axis.
     """
+    if (stated := stated_up(file)) is not None:
+        return stated
     usual, other = ("z", "y") if file.suffix.lower() == ".ply" else ("y", "z")
     areas = {up: _resting_area(positions @ _upright(up).T) for up in (usual, other)}
     return other if areas[other] > _CLEARLY * areas[usual] else usual

@@ -149,8 +149,7 @@ def test_a_file_that_is_no_mesh_is_one_line(run, tmp_path, content):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("a.stl", "must end in .ply, .obj, .serialized; convert it to PLY or OBJ"),
-        ("a.GLB", "convert it to PLY or OBJ"),
+        ("a.stl", "convert it to PLY or OBJ"),
         ("a.xml", "is a scene, which `mitsuba-diffraction render` renders; info describes"),
     ],
 )

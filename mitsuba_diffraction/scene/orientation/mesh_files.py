@@ -1,4 +1,4 @@
-"""Mesh files: read and written by Mitsuba, PLY files of polygons cut into triangles first."""
+"""Mesh files, most of them read by Mitsuba, PLY files of polygons cut into triangles first."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
-from ...files import read_bytes, readable_file
+from ...files import GLTF, MESHES, USD, read_bytes, readable_file
 from ...plugin.meshes import MeshArrays, mesh_arrays, mesh_faces
 from ...plugin.textures import ORIENTATION
+from .interchange import interchange_mesh
 from .trimesh import TriangleMesh
 
 Floats = NDArray[np.float64]
@@ -41,20 +42,33 @@ _CODES = {
 def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     """Read a mesh file.
 
-    Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons. Normals of an OBJ
-    file are rebuilt, with a warning, if one has length 0.
+    Reads what Mitsuba reads, .ply, .obj, .serialized, PLY files of polygons, glTF and USD. Normals
+    of an OBJ file are rebuilt, with a warning, if one has length 0.
 
     Raises a DiffractionError if the file cannot be read, or is not a mesh of these kinds.
     """
     file = Path(path)
-    kind = KINDS.get(file.suffix.lower())
-    if kind is None:
+    if file.suffix.lower() not in MESHES:
         raise DiffractionError(
-            f"mesh '{file}': its name must end in {', '.join(KINDS)}; convert it to PLY or OBJ"
+            f"mesh '{file}': its name must end in {', '.join(MESHES)}; convert it to PLY or OBJ"
         )
     readable_file(file)
+    if _is_interchange(file):
+        mesh = interchange_mesh(file)
+        _check_faces(file, len(mesh.positions), mesh.faces)
+        return mesh
     _need_variant()
-    vertices, faces = _vertices_and_faces(file, kind)
+    kind = KINDS[file.suffix.lower()]
+    _check_faces(file, *_vertices_and_faces(file, kind))
+    return mesh_arrays(_load(file, kind, face_normals=False))
+
+
+def _is_interchange(file: Path) -> bool:
+    return file.suffix.lower() in (*GLTF, *USD)
+
+
+def _check_faces(file: Path, vertices: int, faces: Ints) -> None:
+    """Refuse a mesh without triangles, or with a triangle that names no vertex."""
     if not len(faces):
         raise DiffractionError(f"mesh '{file}': it has no triangles")
     if faces.max() >= vertices:
@@ -62,7 +76,6 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
             f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
             f"{vertices}; export the mesh again"
         )
-    return mesh_arrays(_load(file, kind, face_normals=False))
 
 
 def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
@@ -79,6 +92,8 @@ def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
     """Whether the file of a mesh holds vertex normals; otherwise Mitsuba makes smooth ones."""
     file = Path(path)
+    if _is_interchange(file):
+        return interchange_mesh(file).normals is not None
     content = read_bytes(file)
     if file.suffix.lower() == ".ply":
         header = content[: content.find(b"end_header")]
@@ -111,6 +126,8 @@ def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
     """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
     file = readable_file(path)
+    if _is_interchange(file):
+        return None
     mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
     if not mesh.has_attribute(ORIENTATION):
         return None
