@@ -29,8 +29,11 @@ def picture(tab: Any, *, shadows: bool = False, samples: int = 1) -> NDArray[np.
     return np.frombuffer(base64.b64decode(text), np.float32).reshape(height, width, 4)[::-1]
 
 
-def of_the_desktop(scene: Any, frames: int) -> NDArray[np.float32]:
-    """What `Renderer` draws of all direct light; skips the test where shaders do not run."""
+def of_the_desktop(scene: Any, frames: int, bounces: bool = False) -> NDArray[np.float32]:
+    """What `Renderer` draws of all direct light, and on request of light between surfaces.
+
+    Skips the test where shaders do not run.
+    """
     pytest.importorskip("moderngl")
     from mitsuba_diffraction.realtime.glsl import Renderer
 
@@ -38,7 +41,7 @@ def of_the_desktop(scene: Any, frames: int) -> NDArray[np.float32]:
         renderer = Renderer(scene)
     except DiffractionError as error:
         pytest.skip(str(error))
-    light = renderer.progressive("fast")
+    light = renderer.progressive("fast", bounces=bounces)
     light.advance(frames)
     found: NDArray[np.float32] = light.image
     light.release()

@@ -3,7 +3,8 @@
 Two kinds of frames alternate. The first draws one light with its shadows (`emitters`, `shadows`).
 The second looks up the surroundings along each pixel's lobes (`surroundings`), and draws the
 background and shapes that emit light. The balance heuristic weights the two. Every frame samples
-another point of each pixel and of the lens, so that edges become smooth with the light.
+another point of each pixel and of the lens, so that edges become smooth with the light. On request,
+frames of the second kind add light that surfaces send to each other (`bounces`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...extras import optional
+from .bounces import pack_bounces
 from .camera import Camera
 from .context import Bindings, Target, compile_plain, set_uniforms
 from .emitters import Emitters
@@ -65,6 +67,8 @@ class Stage:
 
     def __init__(self, renderer: Drawing) -> None:
         self._context, self._scene = renderer.context, renderer.scene
+        self._mitsuba_scene = renderer.mitsuba_scene
+        self._with_bounces: list[Joined] | None = None
         self._resources: list[Any] = []
         self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
         self._add_glowing(renderer.buffers)
@@ -120,6 +124,13 @@ class Stage:
             extras.append(Joined(parts))
         return extras
 
+    def with_bounces(self) -> list[Joined]:
+        """Return `extras` with the light between surfaces, traced at the first call."""
+        if self._with_bounces is None:
+            traced = self._bound(pack_bounces(self._mitsuba_scene, self._scene))
+            self._with_bounces = [Joined([*extra.parts, traced]) for extra in self.extras]
+        return self._with_bounces
+
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
         """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
         moderngl = optional("moderngl")
@@ -154,7 +165,7 @@ def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[
     """Pack the environment and flat shapes for shaders/surroundings.glsl."""
     extent = float(np.ptp([scene.low, scene.high]))
     packed = pack_flats(flats, emitters.share_of)
-    packed |= Packed((), {"least_distance": 1e-6 * extent})
+    packed |= Packed((), {"least_distance": 1e-6 * extent, "surroundings_lit": (1.0, 1.0)})
     environment = emitters.environment
     if environment is not None:
         packed |= environment.packed(emitters.share_of(environment.emitter))
@@ -176,12 +187,12 @@ class Joined:
     """Several bindings, used as one."""
 
     def __init__(self, parts: list[Bindings]) -> None:
-        self._parts = parts
+        self.parts = parts
         self.definitions = {k: v for part in parts for k, v in part.definitions.items()}
 
     def use(self, program: Any, first_unit: int = 0) -> int:
         """Bind all parts in a program, and return the next free texture unit."""
-        for part in self._parts:
+        for part in self.parts:
             first_unit = part.use(program, first_unit)
         return first_unit
 
@@ -191,16 +202,19 @@ class ProgressiveLight:
 
     lights : lights to draw instead of the scene's emitters and surroundings.
     shadow_size : texels a side of a shadow map.
+    bounces : whether light between surfaces is added to that of the scene's emitters.
     """
 
     def __init__(
         self, renderer: Drawing, method: str, camera: Camera, stage: Stage, *,
-        lights: Sequence[Light] = (), shadow_size: int = SIZE,
+        lights: Sequence[Light] = (), shadow_size: int = SIZE, bounces: bool = False,
     ) -> None:  # fmt: skip
         self._renderer, self._method, self._camera = renderer, method, camera
         self._stage = stage
         self._fixed = [replace(light, spectrum=len(lights) * light.spectrum) for light in lights]
-        self._looks_up = stage.looks_up and not lights
+        bounces = bounces and not lights
+        self._looks_up = (stage.looks_up or bounces) and not lights
+        self._surroundings = stage.with_bounces() if bounces else stage.extras
         self._surface: dict[str, float | None] = {}
         context = renderer.context
         self._map = ShadowMap(stage.casters, shadow_size)
@@ -285,7 +299,7 @@ class ProgressiveLight:
         return [
             Extra(extra, {**body, **shadow}, texture)
             for extra, body, shadow in zip(
-                self._stage.extras, bodies, in_map or [{}] * len(bodies), strict=True
+                self._surroundings, bodies, in_map or [{}] * len(bodies), strict=True
             )
         ]
 

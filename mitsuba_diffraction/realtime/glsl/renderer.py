@@ -183,6 +183,7 @@ class Renderer:
         camera: Camera | None = None,
         lights: Sequence[Light] = (),
         shadow_size: int = SIZE,
+        bounces: bool = False,
     ) -> ProgressiveLight:
         """Return a picture that accumulates frames of all direct light with shadows.
 
@@ -195,12 +196,15 @@ class Renderer:
         camera : by default the scene's camera.
         lights : lights to draw instead of the scene's emitters.
         shadow_size : texels a side of a shadow map.
+        bounces : add light between surfaces (`bounces`), which takes seconds to trace; not with
+            `lights`.
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
         return ProgressiveLight(
-            self, method, resized, self.stage(), lights=lights, shadow_size=shadow_size
-        )
+            self, method, resized, self.stage(), lights=lights, shadow_size=shadow_size,
+            bounces=bounces,
+        )  # fmt: skip
 
     def stage(self) -> Stage:
         """Return the scene's emitters, surroundings and shadow casters, built at the first call."""

@@ -86,7 +86,7 @@ def fragment_parts(
     if "GLOSS" in known:
         shared.append("gloss.glsl")
     if "WEIGHTED" in known or "LOOKED_UP" in known:
-        shared += ["obstacles.glsl", "surroundings.glsl", "lobes.glsl"]
+        shared += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
     shared += method_files(method, known)
     return parts + [(name, part(name, known)) for name in (*shared, main)]
 

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_erosion, label, uniform_filter
 
 from ...extras import optional
 from ...optics.colour import delta_e, encode_srgb
 
 Image = NDArray[np.floating]
 
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 #: Percentiles of ΔE2000 that a comparison reports.
 PERCENTILES = (50, 90, 99)
 
@@ -94,6 +95,21 @@ def difference(
         flip=flip,
         relative_rmse=float(np.linalg.norm(second - first)) / norm if norm > 0.0 else math.nan,
     )
+
+
+def dark_region(reference: Image, other: Image) -> float:
+    """Return the share of the picture of the largest connected region that is darker than half.
+
+    There `other` is less than half as bright as `reference`, both averaged over squares of 3 % of
+    the picture's width, against noise.
+    """
+    side = max(1, round(0.03 * np.shape(reference)[1]))
+    first, second = (
+        uniform_filter(np.asarray(image, float) @ _LUMINANCE, side, mode="nearest")
+        for image in (reference, other)
+    )
+    regions, count = label(second < 0.5 * first)
+    return float(np.bincount(regions.ravel(), minlength=2)[1:].max() / first.size) if count else 0.0
 
 
 class Visibility(NamedTuple):

@@ -104,6 +104,7 @@ def markdown(document: dict[str, Any]) -> str:
             f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
             f"{_samples(document)} samples a pixel, against {document['spp']} of the path tracer; "
             f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
+            *_dark_regions(lit),
             "",
             _HEAD.format(first=first),
             *rows,
@@ -113,6 +114,22 @@ def markdown(document: dict[str, Any]) -> str:
             f"ΔE2000 {plain_number(document['noise_delta_e_mean'])}.",
         ]
     )
+
+
+def _dark_regions(methods: dict[str, Any]) -> list[str]:
+    """Return a sentence on regions that light between surfaces leaves dark, where measured."""
+    shares = [
+        f"{plain_number(100.0 * entry['whole']['dark_region'])} % by `{method}`"
+        for method, entry in methods.items()
+        if entry["whole"].get("dark_region") is not None
+    ]
+    if not shares:
+        return []
+    return [
+        "",
+        "With light between surfaces, largest region of the picture less than half as bright as in "
+        f"full transport: {', '.join(shares)}.",
+    ]
 
 
 def _samples(document: dict[str, Any]) -> int:

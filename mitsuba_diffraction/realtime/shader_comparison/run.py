@@ -21,7 +21,7 @@ from ..glsl.renderer import Renderer
 from ..glsl.scene import load
 from ..glsl.source import THESIS_METHODS
 from ..glsl.timing import fragment_times
-from .measures import difference, exposure_of, regions
+from .measures import dark_region, difference, exposure_of, regions
 from .path_traced import box_sensor, direct_light, visibility, with_lights
 from .report import write_sheet
 
@@ -144,7 +144,7 @@ class Comparison:
     seed: int = 0
     progress: Progress = silent
     same_lights: SameLights = field(init=False)
-    _progressive: dict[tuple[str, int], ProgressivePicture] = field(
+    _progressive: dict[tuple[str, int, bool], ProgressivePicture] = field(
         init=False, repr=False, default_factory=dict
     )
 
@@ -221,6 +221,10 @@ class Comparison:
         exposure = exposure_of(direct.mean)
         errors = difference(direct.mean, picture.mean, None, exposure)
         self._write(picture.mean, f"{method}_whole", self.frames)
+        bounced = None
+        if full is not None:
+            bounced = self._draw_progressive(method, frames, bounces=True).picture.mean
+            self._write(bounced, f"{method}_bounces", frames)
         write_sheet(
             self.folder / f"{method}.png", direct.mean, picture.mean, full, method=method,
             errors=errors, compared=None, exposure=exposure,
@@ -229,9 +233,8 @@ class Comparison:
         fine = (side * renderer.camera.size[0], side * renderer.camera.size[1])
         return {
             "direct": errors,
-            "full": None
-            if full is None
-            else difference(full, picture.mean, None, exposure_of(full)),
+            "full": None if full is None else difference(full, bounced, None, exposure_of(full)),
+            "dark_region": None if full is None else dark_region(full, bounced),
             "noise": picture.noise(exposure),
             "frames": frames,
             "samples": self.frames * side**2,
@@ -239,14 +242,17 @@ class Comparison:
             "plain_frame_ms": 1e3 * renderer.frame_time(method, size=fine, frames=3),
         }
 
-    def _draw_progressive(self, method: str, frames: int) -> ProgressivePicture:
+    def _draw_progressive(
+        self, method: str, frames: int, bounces: bool = False
+    ) -> ProgressivePicture:
         """Draw frames of progressive light; results are cached."""
-        if (method, frames) in self._progressive:
-            return self._progressive[method, frames]
+        if (method, frames, bounces) in self._progressive:
+            return self._progressive[method, frames, bounces]
         renderer = self.same_lights.renderer
         width, height = renderer.camera.size
         side = min(self.supersampling, math.isqrt(max(_IN_FRAME // (width * height), 1)))
-        light = renderer.progressive(method, size=(side * width, side * height))
+        size = side * width, side * height
+        light = renderer.progressive(method, size=size, bounces=bounces)
         clock = clock_of(renderer.driver)
         light.advance(2)  # compiles
         light.restart()
@@ -260,8 +266,8 @@ class Comparison:
         seconds = clock() - start
         light.release()
         picture = Halves(halves[0], 2.0 * halves[1] - halves[0])
-        self._progressive[method, frames] = ProgressivePicture(picture, side, seconds)
-        return self._progressive[method, frames]
+        self._progressive[method, frames, bounces] = ProgressivePicture(picture, side, seconds)
+        return self._progressive[method, frames, bounces]
 
     def _compare_same_lights(
         self, methods: Sequence[str], reference: Any, exposure: float

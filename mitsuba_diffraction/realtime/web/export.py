@@ -82,6 +82,7 @@ def make_page(
     methods: Sequence[str] = WEB_METHODS,
     sensor: int = 0,
     view: str = "natural",
+    bounces: bool = True,
     progress: Progress = silent,
 ) -> Page:
     """Build the page of a scene.
@@ -97,6 +98,7 @@ def make_page(
         ones where it would have more than 25 MB.
     sensor : index of the camera.
     view : view of the page's picture, one of `optics.display.VIEWS`.
+    bounces : add light between surfaces, which takes seconds to trace.
     progress : called as progress(done, total, text).
     """
     unknown = [method for method in methods if method not in WEB_METHODS]
@@ -108,7 +110,7 @@ def make_page(
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if is_file else "Diffraction"
-    header, data = _packed(load(scene), sensor, title, methods, view, progress)
+    header, data = _packed(load(scene), sensor, title, methods, view, bounces, progress)
     text = _filled(header, data)
     if len(text.encode()) > MAX_BYTES:
         raise DiffractionError(
@@ -241,7 +243,13 @@ def _asset(name: str) -> str:
 
 
 def _packed(
-    loaded: Any, sensor: int, title: str, methods: Sequence[str], view: str, progress: Progress
+    loaded: Any,
+    sensor: int,
+    title: str,
+    methods: Sequence[str],
+    view: str,
+    bounces: bool,
+    progress: Progress,
 ) -> tuple[Header, bytes]:
     """Return the page's header, and all arrays and pictures, compressed.
 
@@ -262,7 +270,8 @@ def _packed(
         mesh = sections_of(packed_mesh(surface.vertices), sections.add)
         stored.append((common, mesh, packed_parts(common, sections)))
     light = packed_light(scene, emitters, sections)
-    around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections)
+    progress(0, 0, "light between surfaces")
+    around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections, bounces)
     room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
     sources: list[str] = []

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
+from ..glsl.bounces import pack_bounces
 from ..glsl.emitters import Emitters
 from ..glsl.lights import Light
 from ..glsl.materials import Diffracting
@@ -106,18 +107,23 @@ def packed_surroundings(
     emitters: Emitters | None,
     tables: Sequence[Diffracting],
     sections: Sections,
+    bounces: bool,
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
     """Return the page's data of surroundings, as JSON types, and definitions for the shaders.
 
     tables : one surface of each table, for directions of its lobes.
+    bounces : whether light between surfaces is added.
 
-    The data is None for a scene without environment and without shapes that emit light.
+    The data is None for a scene without light, and without `bounces` for a scene without
+    environment and without shapes that emit light.
     """
     environment = None if emitters is None else emitters.environment
-    if emitters is None or not (scene.glows or environment):
+    if emitters is None or not (scene.glows or environment or bounces):
         return None, {}
     flats = flat_shapes(mitsuba_scene)
     packed, solid = pack_surroundings(scene, emitters, flats), pack_solid(scene, flats)
+    if bounces:
+        packed |= pack_bounces(mitsuba_scene, scene)
     lobes = [_lobes(surface) for surface in tables]
     definitions = {k: v for part in (packed, solid, *lobes) for k, v in part.definitions.items()}
     background = None

@@ -25,7 +25,7 @@ def page() -> Page:
             "mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0)
         )  # seconds each
         # the title is the worst that a file can be called
-        return make_page(load_scene(), title="</script><script>throw 1</script>")
+        return make_page(load_scene(), title="</script><script>throw 1</script>", bounces=False)
 
 
 @pytest.fixture(scope="session")

@@ -79,8 +79,8 @@ def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) ->
 
 @pytest.fixture(scope="module")
 def expected(room: Any) -> NDArray[np.float32]:
-    """The desktop's picture of all direct light."""
-    return of_the_desktop(room, 2 * SAMPLES)
+    """The desktop's picture of all direct light and light between surfaces."""
+    return of_the_desktop(room, 2 * SAMPLES, bounces=True)
 
 
 def test_lobes_mirror_lamp_and_sky_as_on_the_desktop(

@@ -1,4 +1,4 @@
-// Whether the scene obstructs a ray; see surroundings.py.
+// Whether the scene obstructs a ray, and where; see surroundings.py.
 
 #ifdef OBSTACLES
 uniform sampler2D obstacles;      // distance of the nearest surface, in units of OBSTACLES cells
@@ -6,19 +6,22 @@ uniform vec3 obstacles_low;
 uniform float obstacles_cell;
 uniform ivec3 obstacles_size;
 
-bool hidden(vec3 position, vec3 normal, vec3 direction, float farthest)
+// Whether a surface is nearer than `farthest`, which then becomes its distance.
+bool hidden(vec3 position, vec3 normal, vec3 direction, inout float farthest)
 {
     // start beyond the cells of the surface at `position`
     vec3 place = (position - obstacles_low) / obstacles_cell + 1.75 * normal;
     float gone = 0.0;
-    farthest /= obstacles_cell;
     for (int i = 0; i < 96; ++i) {
         ivec3 cell = ivec3(floor(place + gone * direction));
-        if (gone > farthest || any(lessThan(cell, ivec3(0)))
+        if (gone * obstacles_cell > farthest || any(lessThan(cell, ivec3(0)))
             || any(greaterThanEqual(cell, obstacles_size))) return false;
         int number = (cell.z * obstacles_size.y + cell.y) * obstacles_size.x + cell.x;
         float apart = OBSTACLES * entry(obstacles, number).r;
-        if (apart == 0.0) return true;
+        if (apart == 0.0) {
+            farthest = gone * obstacles_cell;
+            return true;
+        }
         gone += max(apart - 1.0, 0.5);  // less 1: distances are those between cells' middles
     }
     return false;

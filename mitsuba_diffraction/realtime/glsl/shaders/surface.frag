@@ -173,6 +173,13 @@ void main()
     if (masked(v_texcoord)) discard;
     vec3 radiance = vec3(0.0);
 #ifdef LOOKED_UP
+#ifdef BOUNCES
+    vec3 shift = fract(drawn_numbers().xyx * vec3(57.0, 83.0, 131.0)) - 0.5;
+#ifdef PIGMENTED
+    if (seen) radiance += light_colour[0] * pigment * transmission(wi, vec3(0.0, 0.0, 1.0), rotation)
+            * bounced(ARRIVING, v_position, side * n, shift);
+#endif
+#endif
 #ifdef LOBES
     vec3 wo = lobe_direction(wi, rotation, drawn_numbers());
     vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
@@ -181,19 +188,31 @@ void main()
         float distance;
         vec4 light = arriving(v_position, direction, distance);
         float density = lobe_density(wi, wo, rotation);
+        bool met = distance < 1e30 && light.rgb == vec3(0.0);
+        light *= distance < 1e30 ? surroundings_lit.y : surroundings_lit.x;
+        if (distance >= 1e30 && dot(direction, dome.xyz) > 0.0) light.rgb += dome.w;
 #ifdef OBSTACLES
-        if (hidden(v_position, flat_normal, direction, distance)) light = vec4(0.0);
+        if (hidden(v_position, flat_normal, direction, distance)) {
+            light = vec4(0.0);
+            met = true;
+        }
+#endif
+#ifdef BOUNCES
+        if (met) light.rgb = bounced(LEAVING, v_position + distance * direction, -direction, shift);
+#endif
+#ifdef MONOCHROME
+        light.rgb = vec3(dot(light.rgb, vec3(0.2126, 0.7152, 0.0722)));
 #endif
 #ifdef MIRROR
         light.w = 0.0;
 #endif
         if (density > 0.0 && light.rgb != vec3(0.0))
-            radiance = light.rgb * lobes(wi, wo, rotation, 0)
+            radiance += light.rgb * lobes(wi, wo, rotation, 0)
                 * (kept_by_facet(n, smooth_normal, direction) / (density + light.w));
     }
 #endif
 #ifdef EMITTING
-    if (dot(v_normal, towards_eye) > 0.0) radiance += emission;
+    if (dot(v_normal, towards_eye) > 0.0) radiance += surroundings_lit.y * emission;
 #endif
 #else
     for (int i = 0; i < LIGHTS_LIT; ++i) {

@@ -3,6 +3,8 @@
 
 uniform vec2 sequence;            // numbers of the frame, from 0 to 1
 uniform float least_distance;     // least distance from a plane: a surface does not see itself
+uniform vec2 surroundings_lit;    // factors on the environment and on area lights: 1, or 0 if off
+uniform vec4 dome;                // direction upwards, and radiance from above of a page's own light
 
 #ifdef ENVIRONMENT
 uniform sampler2D environment;    // radiance, linear sRGB: angle around the z axis, angle from it

@@ -10,6 +10,7 @@ const KINDS = { scene: "The scene's", sun: "Sun", lamp: "Lamp", window: "Window"
 const FILL = 0.12; // share of light from a dome beside a light that replaces the scene's
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const DARK = [0, 0, 0];
+const DOME = 1e-20; // density of lights of the dome, so low that lobes are left to look it up
 
 // Evenly distributed points, from the middle on, by the plastic number (M. Roberts 2018).
 const even = (n) => [(0.5 + n * 0.7548776662) % 1, (0.5 + n * 0.569840291) % 1];
@@ -108,6 +109,11 @@ class Lights {
     return { lights: only ? [] : [this.made(-1)], sky };
   }
 
+  // Radiance of the dome of a light that replaces the scene's.
+  get dome() {
+    return this.kind === "scene" ? 0 : ((this.kind === "sky" ? 1 : FILL) * this.level) / Math.PI;
+  }
+
   // Number of different lights in the sequence.
   get count() {
     return this.kind === "scene" ? this.header.light.samples.length : 256;
@@ -138,7 +144,7 @@ class Lights {
       const { up } = this.camera, cosine = 1 - x, sine = Math.sqrt(1 - cosine * cosine);
       const [right, away] = this.frame();
       const d = plus(plus(times(up, cosine), right, sine * Math.cos(2 * Math.PI * y)), away, sine * Math.sin(2 * Math.PI * y));
-      return light([...d, 0], (this.kind === "sky" ? 2 : 8 * FILL) * brightness);
+      return { ...light([...d, 0], (this.kind === "sky" ? 2 : 8 * FILL) * brightness), density: DOME };
     }
     const radius = n < 0 ? 0 : Math.sqrt(x), turn = 2 * Math.PI * y;
     const round = plus(times(across, radius * Math.cos(turn)), upwards, radius * Math.sin(turn));

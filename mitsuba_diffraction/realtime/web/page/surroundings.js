@@ -10,6 +10,7 @@ class Surroundings {
     const around = new Surroundings(), { parts, lobes, emitting, glow, background, whole } = header.around;
     around.gl = gl;
     around.part = await Part.load(gl, data, parts);
+    around.bounces = around.part.textures.some(([name]) => name === "bounces");
     around.lobes = [];
     for (const one of lobes) around.lobes.push(await Part.load(gl, data, one));
     around.glowing = [];

@@ -59,9 +59,9 @@ class Viewer {
     return this.drawing.around && this.wavelength === null && this.lights.whole;
   }
 
-  // Whether lobes look up the surroundings.
+  // Whether lobes look up the surroundings: all, or where `around` is false other surfaces alone.
   get looksUp() {
-    return this.around && this.shadows;
+    return this.shadows && (this.around || (this.drawing.around?.bounces ?? false));
   }
 
   // Definitions of the light for programs: a few lights at once, or one.
@@ -70,7 +70,7 @@ class Viewer {
     const one = this.wavelength === null ? "" : MONOCHROME;
     const few = LIGHT.few(lights.length, sky.some((x) => x)) + one, glance = few + GLANCE;
     return this.looksUp
-      ? { glance, few, one: LIGHT.one + WEIGHTED, lookup: LIGHT.one + LOOKED_UP }
+      ? { glance, few, one: LIGHT.one + one + WEIGHTED, lookup: LIGHT.one + one + LOOKED_UP }
       : { glance, few, one: LIGHT.one + one };
   }
 
@@ -126,7 +126,11 @@ class Viewer {
     const sun = around && lights.own.find(({ name }) => name.startsWith("sun of "));
     if (sun) view.uniforms.sun = [...unit(sun.place), this.header.around.parts.uniforms.sun[3]]; // may have been moved
     if (lookup) view.uniforms.sequence = drawnNumbers(this.count);
-    else view.uniforms.light_density = chosen[0]?.density ?? 0;
+    const shown = [lights.kind === "scene" ? 1 : 0, lights.whole ? 1 : 0];
+    // only light that lobes look up shares them with lights drawn
+    const density = (looksUp && chosen[0]?.density) || 0;
+    if (!lookup) view.uniforms.light_density = density > DOME && !shown[1] ? 0 : density;
+    Object.assign(view.uniforms, { surroundings_lit: shown, dome: [...this.camera.up, lights.dome] });
     const lit = this.lit[lookup ? "lookup" : one ? "one" : moving ? "glance" : "few"], bright = lookup || !(one && looksUp);
     this.sample = { ...view, method, width, height, preview, moving, detail, lit, around, looksUp: looksUp && one, lookup, bright, row: 0, time: 0 };
   }
