@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
+import tempfile
 import time
 from pathlib import Path
 
 from ..errors import DiffractionError
 from . import options
 from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
-from .console import Bar, mitsuba_warnings
+from .console import Bar, mitsuba_warnings, say_warning
+from .options import path_ending_in
 from .report import check_outputs, save_report
 
 
@@ -19,9 +21,19 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "export-osl", run,
         "write a surface as a shader for Blender's Cycles (OSL)",
         "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
-        "the material to a .blend file: docs/blender.md.",
+        "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
+        "all named looks, as an add-on that Blender installs.",
     )  # fmt: skip
     add_surface_source(parser)
+    parser.add_argument(
+        "--addon", metavar="ZIP", type=path_ending_in(".zip"),
+        help="write this add-on for Blender, with a panel and an asset library, and no folder; "
+        "without SOURCE and --preset it has all named looks that the shaders show",
+    )  # fmt: skip
+    parser.add_argument(
+        "--with", metavar="FOLDER", dest="folders", type=Path, action="append", default=[],
+        help="exported folder that the add-on has, too; may be given several times",
+    )  # fmt: skip
     options.add_output(
         parser, "to write into, made if it is missing; default: SOURCE's name with -osl in the "
         "current folder",
@@ -38,6 +50,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
+    if args.addon is not None:
+        return _addon(args)
+    if args.folders:
+        args.parser.error("argument --with: is for --addon")
     take_source(args)
     folder = args.output or Path(f"{args.source.stem}-osl")
     if folder.exists() and not folder.is_dir():
@@ -67,3 +83,53 @@ def run(args: argparse.Namespace) -> int:
                        "surface": exported.surface, "error": exported.error,
                        "bytes": size})  # fmt: skip
     return 0
+
+
+def _addon(args: argparse.Namespace) -> int:
+    """Pack the add-on, and return the exit code."""
+    if args.source is not None or args.preset is not None or args.output is not None:
+        args.parser.error(
+            "argument --addon: export SOURCE or --preset into a folder first, and name it by --with"
+        )
+    check_outputs([args.addon], [], "add-on")
+
+    from ..osl import make_addon
+
+    start = time.perf_counter()
+    folders = {folder.resolve().name.removesuffix("-osl"): folder for folder in args.folders}
+    with tempfile.TemporaryDirectory() as temporary:
+        if not folders:
+            folders = _exported_looks(args, Path(temporary))
+        make_addon(folders, args.addon)
+    size = args.addon.stat().st_size
+    print(
+        f"{args.addon}: {', '.join(folders)}: {size / 1e6:.1f} MB, "
+        f"{time.perf_counter() - start:.1f} s"
+    )
+    save_report(args, {"files": [args.addon], "looks": list(folders), "bytes": size})
+    return 0
+
+
+def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
+    """Export all named looks that the shaders show; say in a line which they do not."""
+    import mitsuba as mi
+
+    from ..osl import export
+    from ..osl.export import OSL
+    from ..plugin.description import describe
+    from ..plugin.presets import presets
+    from ..scene.load import set_variant
+
+    set_variant(args.mode)
+    folders = {}
+    with mitsuba_warnings(), Bar(args) as bar:
+        for done, preset in enumerate(presets().values()):
+            bar(done, len(presets()), preset.name)
+            bsdf = mi.load_dict(preset.changed({}))
+            described = describe(bsdf)
+            if described is not None and (refusal := OSL.refusal(described, preset.name)):
+                say_warning(f"the add-on goes without {refusal}")
+                continue
+            folders[preset.name] = folder / preset.name
+            export(bsdf, folders[preset.name], preset.name.replace("-", "_") + "_look")
+    return folders

@@ -8,6 +8,8 @@ patch             textures and constants of a patch of heights
 formulas          formulas of optics that the shaders call, as functions in OSL
 spectrum          wavelengths that a shader draws, and their colours
 sockets           inputs of the shaders, with names and tooltips
+addon             zip of exported surfaces that Blender installs
+blender_addon     the add-on's own code, which runs in Blender
 blender_material  script that runs in Blender and adds the material to a file
 
 Sources in OSL are in the folder shaders.
@@ -15,6 +17,7 @@ Sources in OSL are in the folder shaders.
 
 from __future__ import annotations
 
+from .addon import make_addon
 from .export import Exported, export
 
-__all__ = ["Exported", "export"]
+__all__ = ["Exported", "export", "make_addon"]

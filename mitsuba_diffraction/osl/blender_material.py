@@ -4,9 +4,9 @@ In Blender: open this file in the Text editor and run it. From a terminal:
 
     blender file.blend --python blender_material.py -- --object Disc
 
-or with Python and the package `bpy`, which needs an output file:
+or with Python and the package `bpy`, which adds to a file, or writes a new one by --output:
 
-    python blender_material.py --output disc.blend
+    python blender_material.py --blend scene.blend --object Disc
 
 The script switches Cycles and OSL on and adds a node group with labelled inputs, and a material
 that uses it. Run it again after a new export: materials that use the group change with it.
@@ -25,8 +25,9 @@ from typing import Any
 
 try:
     import bpy
+    import mathutils
 except ModuleNotFoundError:  # `main` says so
-    bpy = None
+    bpy = mathutils = None
 
 #: Folder of the exported shader, if this text was pasted and not opened as a file.
 FOLDER = ""
@@ -42,7 +43,15 @@ class MaterialError(Exception):
     """The material cannot be added; the message is one line."""
 
 
-def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str = "uv") -> Any:
+def add_material(
+    folder: str | os.PathLike[str],
+    *,
+    name: str = "",
+    tangent: str = "uv",
+    orientation: str | os.PathLike[str] | None = None,
+    stretch: str | os.PathLike[str] | None = None,
+    weight: str | os.PathLike[str] | None = None,
+) -> Any:
     """Return a new material that shows the shader of an exported folder.
 
     Parameters
@@ -53,6 +62,9 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
         others Blender adds a number to the name.
     tangent : key of `TANGENTS`: direction of the patch's x axis before Rotation. `uv` is along
         the first texture coordinate, `radial-z` runs around the object's z axis.
+    orientation, stretch, weight : pictures of a hologram, as `mitsuba-diffraction hologram` writes
+        them: cosine and sine of the patch's angle, factor on its lengths, and 1 where it lies; the
+        rest is plain glossy metal.
     """
     check_blender()
     exported = read_folder(Path(folder))
@@ -68,7 +80,9 @@ def add_material(folder: str | os.PathLike[str], *, name: str = "", tangent: str
     surface.node_tree = group
     surface.label, surface.width = group.name, 240
     _link_tangent(nodes, links, surface, tangent)
-    links.new(surface.outputs[0], _node(nodes, "ShaderNodeOutputMaterial", (320, 0)).inputs[0])
+    _link_hologram(nodes, links, surface, orientation, stretch)
+    last = surface if weight is None else _masked(nodes, links, surface, weight)
+    links.new(last.outputs[0], _node(nodes, "ShaderNodeOutputMaterial", (520, 0)).inputs[0])
     return material
 
 
@@ -187,7 +201,10 @@ def _describe(outer: Any, socket: Any, entry: dict[str, Any]) -> None:
     for key in ("min_value", "max_value"):
         if entry.get(key) is not None:
             setattr(outer, key, entry[key])
-    if not socket.hide_value:
+    if entry.get("kind") == "color":
+        colour = mathutils.Color(entry["default"]).from_rec709_linear_to_scene_linear()
+        outer.default_value = (*colour, 1.0)
+    elif not socket.hide_value:
         outer.default_value = socket.default_value
 
 
@@ -197,6 +214,52 @@ def _link_tangent(nodes: Any, links: Any, surface: Any, tangent: str) -> None:
         node = _node(nodes, "ShaderNodeTangent", (-240, -120))
         node.direction_type, node.axis = TANGENTS[tangent]
         links.new(node.outputs[0], surface.inputs["Tangent"])
+
+
+def _link_hologram(nodes: Any, links: Any, surface: Any, orientation: Any, stretch: Any) -> None:
+    """Link pictures of a hologram to the inputs of a group."""
+    if orientation is not None:
+        channels = _node(nodes, "ShaderNodeSeparateColor", (-700, 200))
+        links.new(_picture(nodes, orientation, (-1000, 200)).outputs["Color"], channels.inputs[0])
+        angle, degrees = (_node(nodes, "ShaderNodeMath", (x, 200)) for x in (-520, -360))
+        angle.operation, degrees.operation = "ARCTAN2", "DEGREES"
+        links.new(channels.outputs[1], angle.inputs[0])
+        links.new(channels.outputs[0], angle.inputs[1])
+        links.new(angle.outputs[0], degrees.inputs[0])
+        links.new(degrees.outputs[0], surface.inputs["Rotation (°)"])
+    if stretch is not None:
+        if "Stretch" not in surface.inputs:
+            raise MaterialError(
+                "solved orders cannot be stretched; export a patch of heights for --stretch"
+            )
+        channels = _node(nodes, "ShaderNodeSeparateColor", (-700, -320))
+        links.new(_picture(nodes, stretch, (-1000, -320)).outputs["Color"], channels.inputs[0])
+        links.new(channels.outputs[0], surface.inputs["Stretch"])
+
+
+def _masked(nodes: Any, links: Any, surface: Any, weight: Any) -> Any:
+    """Return a mix of plain metal and a group, by a picture of the group's share."""
+    mix, blank = _node(nodes, "ShaderNodeMixShader", (320, 0)), None
+    blank = _node(nodes, "ShaderNodeBsdfAnisotropic", (60, 300))
+    blank.inputs["Roughness"].default_value = 0.25  # of the slopes: α = 0.06
+    blank.inputs["Color"].default_value = (0.9, 0.9, 0.9, 1.0)
+    links.new(_picture(nodes, weight, (-300, 400)).outputs["Color"], mix.inputs[0])
+    links.new(blank.outputs[0], mix.inputs[1])
+    links.new(surface.outputs[0], mix.inputs[2])
+    return mix
+
+
+def _picture(nodes: Any, file: Any, location: tuple[float, float]) -> Any:
+    """Return a node of a picture whose texels are numbers and are not interpolated."""
+    path = Path(file).resolve()
+    try:
+        image = bpy.data.images.load(str(path), check_existing=True)
+    except RuntimeError as error:
+        raise MaterialError(f"cannot read the picture '{file}'") from error
+    image.colorspace_settings.name = "Non-Color"
+    node = _node(nodes, "ShaderNodeTexImage", location)
+    node.image, node.interpolation = image, "Closest"
+    return node
 
 
 def _node(nodes: Any, kind: str, location: tuple[float, float]) -> Any:
@@ -222,7 +285,17 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--tangent", choices=TANGENTS, default="uv", help="direction of the patch's x axis"
     )
-    parser.add_argument("--output", type=Path, help=".blend file to write")
+    pictures = {
+        "orientation": "cosine and sine of the angle", "stretch": "factor on lengths",
+        "weight": "share of the patch",
+    }  # fmt: skip
+    for key, content in pictures.items():
+        parser.add_argument(f"--{key}", type=Path, help=f"picture of a hologram: {content}")
+    parser.add_argument("--working-space", help="working space of the file; default: as it is")
+    parser.add_argument("--blend", type=Path, help=".blend file to add to; default: the open one")
+    parser.add_argument(
+        "--output", type=Path, help=".blend file to write; default: that of --blend"
+    )
     return parser.parse_args(words)
 
 
@@ -230,9 +303,16 @@ def run(words: Sequence[str]) -> None:
     """Add the material to the open file as the command line says."""
     arguments = _arguments(words)
     check_blender()
+    if arguments.blend:
+        _open(arguments.blend)
+    if arguments.working_space:
+        _set_working_space(arguments.working_space)
     folders = [arguments.folder] if arguments.folder else _folders()
     folder = next((path for path in folders if any(path.glob("*.osl"))), folders[0])
-    material = add_material(folder, name=arguments.name, tangent=arguments.tangent)
+    material = add_material(
+        folder, name=arguments.name, tangent=arguments.tangent,
+        orientation=arguments.orientation, stretch=arguments.stretch, weight=arguments.weight,
+    )  # fmt: skip
     if arguments.object:
         target = bpy.data.objects.get(arguments.object)
         if target is None or target.type != "MESH":
@@ -243,9 +323,31 @@ def run(words: Sequence[str]) -> None:
         target.material_slots[0].material = material
     else:
         material.use_fake_user = True  # kept in the file while no object has it
-    if arguments.output:
-        _save(arguments.output)
+    if output := arguments.output or arguments.blend:
+        _save(output)
     print(f"added the material '{material.name}' of {folder}")
+
+
+def _open(file: Path) -> None:
+    """Open a .blend file in place of the open one."""
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(file.resolve()), load_ui=False)
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ")
+        raise MaterialError(f"cannot open '{file}': {reason}") from error
+
+
+def _set_working_space(name: str) -> None:
+    """Set the working space of the open file, and convert its colours."""
+    try:
+        bpy.ops.wm.set_working_color_space(working_space=name)
+    except TypeError as error:  # the message lists the names
+        names = str(error).rpartition(" not found in ")[2] or "those of Blender's panel"
+        raise MaterialError(f"working space '{name}' is unknown; choose one of {names}") from error
+    for group in bpy.data.node_groups:
+        if _SHADER in group:
+            for node in (n for n in group.nodes if n.type == "SCRIPT"):
+                node.inputs["Working Space"].default_value = name
 
 
 def _save(output: Path) -> None:

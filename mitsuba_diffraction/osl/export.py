@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.boundary import MODELS
-from ..optics.colour import WORKING_SPACES
+from ..optics.colour import WORKING_SPACES, linear_srgb, response
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.orders import OrderTable
 from .formulas import order_formulas, patch_formulas, shader_file
@@ -35,6 +35,7 @@ from .sockets import (
     array_parameter,
     common_sockets,
     height_socket,
+    stretch_socket,
     window_socket,
 )
 from .solved import interpolation_error, order_constants, order_texture
@@ -51,16 +52,17 @@ OSL = Consumer(
             Feature.HEIGHTS, Feature.ORDERS, Feature.MIRROR, Feature.DIELECTRIC, Feature.RARER,
             Feature.CONDUCTOR, Feature.SMALL_SLOPE, Feature.KIRCHHOFF, Feature.HEIGHT_SCALE,
             Feature.LATERAL_SCALE, Feature.ORIENTATION, Feature.ENERGY_SCALE,
-            Feature.OWN_MODEL,
+            Feature.OWN_MODEL, Feature.COAT, Feature.NESTED,
         }
     ),
     "export the surface without, or render it with Mitsuba",
     remedies={
         Feature.LIMITED: "export a table of all orders, or the height field",
         Feature.MIX: "export its surfaces one by one, and mix their shaders in Blender",
-        Feature.NESTED: "leave it out, and set its colour as Pigment in Blender",
-        Feature.VARYING_ORIENTATION: "export a number, and link a texture to Rotation or Tangent "
-        "in Blender",
+        Feature.VARYING_ORIENTATION: "export a number, and give the texture to the script in "
+        "Blender: --orientation FILE",
+        Feature.VARYING_LENGTH: "export a number, and give the texture to the script in Blender: "
+        "--stretch FILE",
         Feature.TRANSMISSION: "export a table of the reflecting side, or render it with Mitsuba",
     },
     left_out={
@@ -135,7 +137,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     Parameters
     ----------
     bsdf : BSDF of the plugin `diffraction` or `diffraction_orders`, from `mi.load_dict`, without
-        coat, film or nested BSDF.
+        film or nested BSDF.
     folder : made if it is missing.
     name : of the shader and its files; letters, digits and underscores.
     """
@@ -208,7 +210,10 @@ def _orders(described: Surface, table: OrderTable) -> Shader:
         order_formulas(),
         order_constants(table, texture),
         [array_parameter("int", "Starts", texture.starts)],
-        [window_socket(described.coherence_width), *common_sockets(described.orientation.number)],
+        [
+            window_socket(described.coherence_width),
+            *common_sockets(described.orientation.number, pigment_of(described)),
+        ],
         {"OrdersFile": texture.pixels},
         str(table),
         {"mean": error.mean, "largest of 99.9 %": error.worst},
@@ -232,26 +237,75 @@ def _patch(described: Surface) -> Shader:
         "Statistic": statistic.nodes,
         "Order0": textures.order_0,
     }
-    constants = patch_constants(table, textures, statistic, described.lateral_scale.number)
+    constants = patch_constants(table, textures, statistic)
+    if described.coat is not None:
+        constants["COAT"] = float(described.coat)
     files: dict[str, NDArray[Any]] = {"PowersFile": textures.powers, "DrawsFile": textures.draws}
     if (energy := energy_texture(described)) is not None:
         constants |= energy.constants
         files["EnergyFile"] = energy.pixels
-    constants["PIGMENT_SHARE"] = mean_transmittance(index)
+    constants["PIGMENT_SHARE"] = mean_transmittance(index, described.coat)
     return Shader(
         "patch.osl",
-        patch_formulas(model),
+        patch_formulas(model, described.coat is not None),
         constants,
         [array_parameter("float", name, values) for name, values in arrays.items()],
         [
             window_socket(table.coherence_width),
             height_socket(described.height_scale.number, table.height_scale_max),
-            *common_sockets(described.orientation.number),
+            stretch_socket(described.lateral_scale.number),
+            *common_sockets(described.orientation.number, pigment_of(described)),
         ],
         files,
         f"patch of {table.source.get('name', 'heights')}, {described.text}",
         patch_error(table, textures),
     )
+
+
+def pigment_of(described: Surface) -> tuple[float, float, float]:
+    """Return the colour beneath a surface, linear sRGB in daylight; black without a BSDF there.
+
+    Raises a DiffractionError if the BSDF beneath is not diffuse, or varies.
+    """
+    if described.nested is None:
+        return 0.0, 0.0, 0.0
+    bsdf, lam = described.nested.bsdf, np.linspace(380.0, 740.0, 36)
+    refusal = (
+        "the BSDF beneath the surface has no single diffuse colour, which OSL cannot show; leave "
+        "it out, and link its picture to Pigment in Blender"
+    )
+    if bsdf.class_name() != "SmoothDiffuse":
+        raise DiffractionError(refusal)
+    places = [_reflectance(bsdf, uv, lam) for uv in ((0.3, 0.3), (0.7, 0.2), (0.6, 0.9))]
+    if np.ptp(places, axis=0).max() > 1e-4:  # rounding of single precision is far below
+        raise DiffractionError(refusal)
+    colour = places[0]
+    if len(colour) > 3:
+        weights = linear_srgb(response(lam))
+        colour = colour @ weights / weights.sum(axis=0)
+    red, green, blue = (float(max(value, 0.0)) for value in colour)
+    return red, green, blue
+
+
+def _reflectance(
+    bsdf: Any, uv: tuple[float, float], wavelengths: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Return the diffuse reflectance of a BSDF at wavelengths (n,), or (3,) in RGB variants."""
+    import drjit as dr
+    import mitsuba as mi
+
+    parts = []
+    for start in range(0, len(wavelengths), 4):
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.uv, si.wi = mi.Point2f(*uv), mi.Vector3f(0.0, 0.0, 1.0)
+        if mi.is_spectral:
+            four = wavelengths[start : start + 4]
+            si.wavelengths = mi.Spectrum(*(float(wavelength) for wavelength in four))
+        value = mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si))
+        parts.append(np.array(value, np.float64).ravel())
+        if not mi.is_spectral:
+            break
+    return np.concatenate(parts)
 
 
 def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:

@@ -8,7 +8,14 @@ from importlib import resources
 from typing import Any
 
 from ..optics.boundary import Model
-from ..optics.coat import face_transmittance, pair_power
+from ..optics.coat import (
+    Coat,
+    coated_reflectance,
+    cosine_within,
+    face_transmittance,
+    pair_power,
+    refracted,
+)
 from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
 from ..optics.orders import (
@@ -38,18 +45,24 @@ def order_formulas() -> str:
     return program.text
 
 
-def patch_formulas(model: Model | None) -> str:
+def patch_formulas(model: Model | None, coated: bool = False) -> str:
     """Return the functions of `optics` that `shaders/patch.osl` calls.
 
     model : of the boundary; None of a perfect reflector.
+    coated : whether the structure lies under a coat.
 
     Raises a DiffractionError if the model's formula cannot be written in OSL.
     """
     program = _program()
     jones = None if model is None else model.jones
     program.add(
-        pair_power, jones, "vector", "vector", "complex", "float", "float", name="boundary_factor"
-    )
+        pair_power, jones, "vector", "vector", "complex", "float", "float",
+        Coat("float", "float", "float") if coated else None, name="boundary_factor",
+    )  # fmt: skip
+    if coated:
+        program.add(refracted, "vector", "float")
+        for formula in (face_transmittance, coated_reflectance, cosine_within):
+            program.add(formula, "float", "float")
     flat = reflectance if model is not None else _everything
     program.add(flat, "float", "complex", name="flat_reflectance")
     return program.text

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ..optics.coat import coated_reflectance, cosine_within, face_transmittance
 from ..optics.fresnel import reflectance
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
@@ -100,12 +101,21 @@ def energy_texture(described: Surface) -> EnergyTexture | None:
     return EnergyTexture(values.reshape(-1, *values.shape[2:]), nodes, lam)
 
 
-def mean_transmittance(index: NDArray[np.complexfloating] | None) -> float:
-    """Return the mean of 1 − R over diffuse light, 0 of what lets no light through."""
+def mean_transmittance(
+    index: NDArray[np.complexfloating] | None, coat: float | None = None
+) -> float:
+    """Return the mean of 1 − R over diffuse light, 0 of what lets no light through.
+
+    index, coat : indices of the material under its coat, if any, and of that coat.
+    """
     if index is None or np.any(np.imag(index) > 0.0):
         return 0.0
     cosine = np.sqrt((np.arange(64) + 0.5) / 64)
-    return float(np.mean(1.0 - reflectance(cosine, float(np.real(index[0])))))
+    inside = cosine if coat is None else cosine_within(cosine, coat)
+    found = reflectance(inside, float(np.real(index[0])))
+    if coat is not None:
+        found = coated_reflectance(1.0 - face_transmittance(cosine, coat), found)
+    return float(np.mean(1.0 - found))
 
 
 def patch_textures(table: DiffractionTable) -> PatchTextures:
@@ -166,12 +176,11 @@ def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, f
 
 
 def patch_constants(
-    table: DiffractionTable, textures: PatchTextures, statistic: RoughnessTable, stretch: float
+    table: DiffractionTable, textures: PatchTextures, statistic: RoughnessTable
 ) -> dict[str, float | int]:
     """Return the constants of `shaders/patch.osl`; lengths in µm.
 
     statistic : of the heights, see `boundary.Model`.
-    stretch : factor on lengths in the patch's plane.
     """
     rows, columns = table.grid.shape
     return {
@@ -181,8 +190,8 @@ def patch_constants(
         "ROWS": rows,
         "LAST_X": table.grid.last[0],
         "LAST_Y": table.grid.last[1],
-        "SPACING_X": table.spacing[0] / stretch,
-        "SPACING_Y": table.spacing[1] / stretch,
+        "SPACING_X": table.spacing[0],
+        "SPACING_Y": table.spacing[1],
         "KAPPA_MAX": table.expansion.kappa_max,
         "INTERVALS": textures.intervals,
         "SCALE": textures.scale,

@@ -94,10 +94,20 @@ def height_socket(scale: float, most: float) -> Socket:
     )  # fmt: skip
 
 
-def common_sockets(orientation: float) -> list[Socket]:
+def stretch_socket(scale: float) -> Socket:
+    """Return the socket of the factor on lengths in the patch's plane."""
+    return Socket(
+        "Stretch", "Stretch", "float", scale,
+        "Factor on the lengths of the patch: colours come nearer to the mirror direction above 1, "
+        "and go away from it below",
+    )  # fmt: skip
+
+
+def common_sockets(orientation: float, pigment: tuple[float, float, float]) -> list[Socket]:
     """Return the sockets that all shaders have.
 
     orientation : degrees from the tangent to the patch's x axis.
+    pigment : colour beneath, linear sRGB.
     """
     return [
         Socket(
@@ -105,7 +115,7 @@ def common_sockets(orientation: float) -> list[Socket]:
             "Angle in degrees from the tangent to the x axis of the patch, across the grooves",
         ),
         Socket(
-            "Pigment", "Pigment", "color", (0.0, 0.0, 0.0),
+            "Pigment", "Pigment", "color", pigment,
             "Colour beneath, which receives the light that is not reflected; black for metals",
         ),
         Socket(

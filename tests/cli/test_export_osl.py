@@ -59,3 +59,15 @@ def test_wrong_input_is_one_line_and_leaves_nothing(
     assert words in said[-1]
     assert "Traceback" not in "".join(said)
     assert list(tmp_path.iterdir()) == [source]
+
+
+def test_an_addon_holds_the_folders_that_are_named(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
+) -> None:
+    out, file = tmp_path / "grating-osl", tmp_path / "looks.zip"
+    assert main(["export-osl", str(source), "-o", str(out)]) == 0
+    assert main(["export-osl", "--addon", str(file), "--with", str(out)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith(f"{file}: grating: ")
+    assert main(["export-osl", str(source), "--addon", str(file)]) == 2
+    assert main(["export-osl", "--addon", str(file), "--with", str(tmp_path)]) == 1
+    assert "export-osl" in capsys.readouterr().err.splitlines()[-1]

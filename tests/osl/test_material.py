@@ -8,6 +8,7 @@ import pytest
 import mitsuba_diffraction as md
 from docs.make.blender.compare import compare
 from docs.make.blender.views import Surface, View
+from tests.support import ROOT
 from tests.support.blender import blender, result_of, run_in_blender
 from tests.support.orders import thin_grating
 
@@ -31,6 +32,18 @@ result = {
     "tips": tips,
     "linked": [link.to_socket.name for link in material.node_tree.links],
     "files": [s.default_value for s in script.inputs if "Texture" in s.name],
+}
+"""
+
+_IN_FILE = """
+import bpy
+bpy.ops.wm.open_mainfile(filepath=file)
+group = next(n for n in bpy.data.materials["card"].node_tree.nodes if n.type == "GROUP")
+result = {
+    "spaces": {g.name: [n.inputs["Working Space"].default_value for n in g.nodes
+                        if n.type == "SCRIPT"] for g in bpy.data.node_groups},
+    "cube": bpy.data.objects["Cube"].active_material.name,
+    "linked": sorted(s.name for s in group.inputs if s.is_linked),
 }
 """
 
@@ -66,6 +79,36 @@ def test_script_adds_a_material_with_labelled_inputs(tmp_path, grating):
     assert added["files"] == [str(path.resolve()) for path in folder.glob("*.exr")]
 
 
+def test_materials_are_added_to_a_file_in_its_working_space(tmp_path, grating):
+    folder, file = tmp_path / "exported", tmp_path / "made.blend"
+    exported(grating, folder, "grating")
+    script = folder / "blender_material.py"
+    assert run_in_blender(script, "--object", "Cube", "--output", file).returncode == 0
+    picture = ROOT / "scenes" / "textures" / "hologram_orientation.exr"
+    done = run_in_blender(
+        script, "--blend", file, "--name", "card", "--working-space", "Linear Rec.2020",
+        "--orientation", picture,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = result_of(_IN_FILE, tmp_path, file=str(file))
+    # both materials are there, each with a group of its own, in the file's working space
+    assert found["spaces"] == {"card": ["Linear Rec.2020"], "grating": ["Linear Rec.2020"]}
+    assert found["cube"] == "grating"
+    assert found["linked"] == ["Rotation (°)", "Tangent"]
+
+
+@pytest.mark.parametrize("content", [None, b"no file of Blender"])
+def test_a_file_that_cannot_be_opened_is_one_line(tmp_path, grating, content):
+    exported(grating, tmp_path / "exported", "grating")
+    file = tmp_path / "scene.blend"
+    if content is not None:
+        file.write_bytes(content)
+    done = run_in_blender(tmp_path / "exported" / "blender_material.py", "--blend", file)
+    assert done.returncode != 0
+    assert f"cannot open '{file}'" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_unknown_object_is_one_line(tmp_path, grating):
     exported(grating, tmp_path, "grating")
     done = run_in_blender(tmp_path / "blender_material.py", "--object", "Ring")
@@ -82,12 +125,12 @@ def test_pictures_agree_with_mitsuba(tmp_path, grating):
     for name, shape, light, source, inputs, beneath in (
         ("disc", "disk", "lamp", grating, {"Rotation (°)": -90.0}, {}),
         ("grating", "rectangle", "sky", grating, {}, {}),
-        ("skin", "sphere", "sky", scale, {"Pigment": [0.1, 0.05, 0.02]}, {"nested": pigment}),
+        ("skin", "sphere", "sky", scale, {}, {"coat_ior": 1.33, "pigment": pigment}),
     ):
-        bsdf = exported(source, tmp_path / name, name)
+        bsdf = exported(source, tmp_path / name, name, **beneath)
         tangent = "radial-z" if shape == "disk" else "uv"
         cycles = {"folder": str(tmp_path / name), "tangent": tangent, "inputs": inputs}
-        views.append(View(shape, light, Surface(bsdf | beneath, cycles), 12, 8))
+        views.append(View(shape, light, Surface(bsdf, cycles), 12, 8))
     compared = compare(views, tmp_path, mitsuba_samples=8192, cycles_samples=4096)
     for view, comparison in zip(views, compared, strict=True):
         assert comparison.beyond_noise <= 2.0, view.shape

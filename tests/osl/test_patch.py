@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import mitsuba as mi
 import numpy as np
@@ -64,9 +65,10 @@ def test_draws_have_the_probabilities_that_weigh_them():
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"coat_ior": 1.4}, {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
+        {"film_ior": 1.3, "film_thickness": 0.3}, {"coherence": "patch"},
         {"shadowing": "vcavity"},
-        {"beneath": {"type": "diffuse"}},
+        {"beneath": {"type": "plastic"}},
+        {"pigment": {"type": "diffuse", "reflectance": {"type": "checkerboard"}}},
         {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
     ],
     ids=lambda value: next(iter(value)),
@@ -134,4 +136,22 @@ def test_patch_has_a_height_scale(tmp_path, some_variant):
     document = json.loads(exported.document.read_text(encoding="utf-8"))
     values = {item["identifier"]: item["default"] for item in document["inputs"]}
     assert values["HeightScale"] == 0.5
+    assert values["Stretch"] == 1.0
+    assert values["Pigment"] == [0.0, 0.0, 0.0]
+
+
+def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_variant):
+    colour = [0.3, 0.1, 0.02]
+    pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour}}
+    bsdf = md.bsdf_dict(
+        PATCH, **DEFAULTS, coat_ior=1.25, pigment=pigment, lateral_scale=0.8, second_order=False
+    )
+    exported = md.osl.export(mi.load_dict(bsdf), tmp_path, "skin")
+    document = json.loads(exported.document.read_text(encoding="utf-8"))
+    values = {item["identifier"]: item["default"] for item in document["inputs"]}
+    assert values["Stretch"] == pytest.approx(0.8)
+    # spectral variants have upsampled the colour, within a per cent or two
+    assert values["Pigment"] == pytest.approx(colour, abs=0.01)
+    coat = re.search(r"#define COAT (\S+)", exported.shader.read_text(encoding="utf-8"))
+    assert float(coat[1]) == pytest.approx(1.25, abs=1e-3)
     assert set(document["textures"]) == {"PowersFile", "DrawsFile"}
