@@ -115,8 +115,6 @@ def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
     import mitsuba as mi
 
     from ..osl import export
-    from ..osl.export import OSL
-    from ..plugin.description import describe
     from ..plugin.presets import presets
     from ..scene.load import set_variant
 
@@ -125,11 +123,11 @@ def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
     with mitsuba_warnings(), Bar(args) as bar:
         for done, preset in enumerate(presets().values()):
             bar(done, len(presets()), preset.name)
-            bsdf = mi.load_dict(preset.changed({}))
-            described = describe(bsdf)
-            if described is not None and (refusal := OSL.refusal(described, preset.name)):
-                say_warning(f"the add-on goes without {refusal}")
-                continue
-            folders[preset.name] = folder / preset.name
-            export(bsdf, folders[preset.name], preset.name.replace("-", "_") + "_look")
+            name = preset.name.replace("-", "_") + "_look"
+            try:
+                export(mi.load_dict(preset.changed({})), folder / preset.name, name)
+            except DiffractionError as error:
+                say_warning(f"the add-on goes without '{preset.name}': {error}")
+            else:
+                folders[preset.name] = folder / preset.name
     return folders

@@ -6,12 +6,13 @@ Needs Blender 5.0 or newer alone.
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
-import bpy
-
 from . import blender_material
+
+bpy = blender_material.bpy  # None outside of Blender
 
 HERE = Path(__file__).parent
 #: Name of the asset library in Blender's preferences.
@@ -67,76 +68,77 @@ def _blocks() -> tuple[Any, Any]:
     return bpy.data.materials, bpy.data.node_groups
 
 
-class MATERIAL_OT_diffraction_look(bpy.types.Operator):
-    """Give the active object a diffracting material."""
+@functools.cache
+def classes() -> tuple[Any, ...]:
+    """Return the operators and the panel, of classes that exist in Blender alone."""
 
-    bl_idname, bl_label = "material.diffraction_look", "Add Diffracting Material"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - as Blender reads it
+    class MATERIAL_OT_diffraction_look(bpy.types.Operator):
+        """Give the active object a diffracting material."""
 
-    look: bpy.props.EnumProperty(name="Look", items=[(n, n, "") for n in looks()])  # type: ignore
-    tangent: bpy.props.EnumProperty(  # type: ignore
-        name="Direction",
-        items=[
-            ("uv", "Along u", "x axis of the patch along the first texture coordinate"),
-            ("radial-z", "Around z", "for discs, with Rotation −90°"),
-        ],
-    )
+        bl_idname, bl_label = "material.diffraction_look", "Add Diffracting Material"
+        bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - as Blender reads it
 
-    def execute(self, context: Any) -> set[str]:
-        """Add the material, to the active mesh if there is one."""
-        try:
-            material = blender_material.add_material(
-                HERE / "looks" / self.look, name=self.look, tangent=self.tangent
-            )
-        except blender_material.MaterialError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        target = context.object
-        if target is not None and target.type == "MESH":
-            target.active_material = material
-        else:
-            material.use_fake_user = True
-        return {"FINISHED"}
+        look: bpy.props.EnumProperty(name="Look", items=[(n, n, "") for n in looks()])  # type: ignore
+        tangent: bpy.props.EnumProperty(  # type: ignore
+            name="Direction",
+            items=[
+                ("uv", "Along u", "x axis of the patch along the first texture coordinate"),
+                ("radial-z", "Around z", "for discs, with Rotation −90°"),
+            ],
+        )
 
+        def execute(self, context: Any) -> set[str]:
+            """Add the material, to the active mesh if there is one."""
+            try:
+                material = blender_material.add_material(
+                    HERE / "looks" / self.look, name=self.look, tangent=self.tangent
+                )
+            except blender_material.MaterialError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            target = context.object
+            if target is not None and target.type == "MESH":
+                target.active_material = material
+            else:
+                material.use_fake_user = True
+            return {"FINISHED"}
 
-class MATERIAL_OT_diffraction_assets(bpy.types.Operator):
-    """Write all looks into an asset library."""
+    class MATERIAL_OT_diffraction_assets(bpy.types.Operator):
+        """Write all looks into an asset library."""
 
-    bl_idname, bl_label = "material.diffraction_assets", "Make Asset Library"
+        bl_idname, bl_label = "material.diffraction_assets", "Make Asset Library"
 
-    def execute(self, context: Any) -> set[str]:
-        """Write the library."""
-        try:
-            file = make_library()
-        except (blender_material.MaterialError, OSError, RuntimeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(looks())} materials in {file}")
-        return {"FINISHED"}
+        def execute(self, context: Any) -> set[str]:
+            """Write the library."""
+            try:
+                file = make_library()
+            except (blender_material.MaterialError, OSError, RuntimeError) as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            self.report({"INFO"}, f"{len(looks())} materials in {file}")
+            return {"FINISHED"}
 
+    class MATERIAL_PT_diffraction(bpy.types.Panel):
+        """Panel among the properties of a material."""
 
-class MATERIAL_PT_diffraction(bpy.types.Panel):
-    """Panel among the properties of a material."""
+        bl_label, bl_space_type, bl_region_type = "Diffraction", "PROPERTIES", "WINDOW"
+        bl_context = "material"
 
-    bl_label, bl_space_type, bl_region_type = "Diffraction", "PROPERTIES", "WINDOW"
-    bl_context = "material"
+        def draw(self, context: Any) -> None:
+            """Draw the two buttons."""
+            self.layout.operator_menu_enum(MATERIAL_OT_diffraction_look.bl_idname, "look")
+            self.layout.operator(MATERIAL_OT_diffraction_assets.bl_idname)
 
-    def draw(self, context: Any) -> None:
-        """Draw the two buttons."""
-        self.layout.operator_menu_enum(MATERIAL_OT_diffraction_look.bl_idname, "look")
-        self.layout.operator(MATERIAL_OT_diffraction_assets.bl_idname)
-
-
-_CLASSES = MATERIAL_OT_diffraction_look, MATERIAL_OT_diffraction_assets, MATERIAL_PT_diffraction
+    return MATERIAL_OT_diffraction_look, MATERIAL_OT_diffraction_assets, MATERIAL_PT_diffraction
 
 
 def register() -> None:
     """Register the panel and its operators; Blender calls this when the add-on is enabled."""
-    for cls in _CLASSES:
+    for cls in classes():
         bpy.utils.register_class(cls)
 
 
 def unregister() -> None:
     """Undo `register`."""
-    for cls in reversed(_CLASSES):
+    for cls in reversed(classes()):
         bpy.utils.unregister_class(cls)

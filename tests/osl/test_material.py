@@ -48,6 +48,25 @@ result = {
 """
 
 
+_INSTALLED = """
+import os
+os.environ["BLENDER_USER_RESOURCES"] = home
+import bpy
+bpy.ops.extensions.package_install_files(filepath=file, repo="user_default", enable_on_install=True)
+before = sorted(m.name for m in bpy.data.materials)
+bpy.ops.material.diffraction_look(look="grating")
+added = bpy.context.object.active_material.name
+bpy.ops.material.diffraction_assets()
+folder = [entry.path for entry in bpy.context.preferences.filepaths.asset_libraries
+          if entry.name == "Diffraction"]
+library = os.path.join(folder[0], "looks.blend")
+with bpy.data.libraries.load(library, assets_only=True) as (there, _):
+    assets = list(there.materials)
+result = {"before": before, "added": added, "assets": assets,
+          "after": sorted(m.name for m in bpy.data.materials)}
+"""
+
+
 @pytest.fixture(autouse=True)
 def _blender(some_variant):
     blender()
@@ -107,6 +126,18 @@ def test_a_file_that_cannot_be_opened_is_one_line(tmp_path, grating, content):
     assert done.returncode != 0
     assert f"cannot open '{file}'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_blender_installs_the_addon_and_has_assets(tmp_path, grating):
+    exported(grating, tmp_path / "exported", "grating")
+    file, home = tmp_path / "looks.zip", tmp_path / "home"
+    md.osl.make_addon({"grating": tmp_path / "exported"}, file)
+    home.mkdir()
+    found = result_of(_INSTALLED, tmp_path, file=str(file), home=str(home))
+    assert found["added"] == "grating"
+    assert found["assets"] == ["grating"]
+    # the open file has the material that was added, and none of the library's
+    assert found["after"] == sorted([*found["before"], "grating"])
 
 
 def test_unknown_object_is_one_line(tmp_path, grating):
