@@ -87,7 +87,8 @@ def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
         if not isinstance(mesh, trimesh.Trimesh):  # points and lines
             continue
         uv = getattr(mesh.visual, "uv", None)
-        stored = "vertex_normals" in mesh._cache  # computed ones appear at the first access
+        # computed normals appear there at the first access
+        stored = "vertex_normals" in mesh._cache  # noqa: SLF001 - of no public attribute
         yield _placed(
             np.array(matrix, np.float64),
             np.array(mesh.vertices, np.float64),

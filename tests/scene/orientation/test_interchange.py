@@ -11,7 +11,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.fitted_mesh import fit_of
-from mitsuba_diffraction.scene.orientation.files import has_own_normals, load_mesh
+from mitsuba_diffraction.scene.orientation.mesh_files import has_own_normals, load_mesh
 from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
 
 # a bent sheet, of which no axis and no side looks like another
