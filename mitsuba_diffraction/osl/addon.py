@@ -39,7 +39,7 @@ def make_addon(folders: Mapping[str, Path], path: Path) -> None:
     Raises
     ------
     DiffractionError
-        If a folder is no exported surface, or the archive would be too large.
+        If a folder has not been exported, or the archive would be too large.
     """
     here = resources.files(__package__)
     with atomic_path(path) as temporary:

@@ -279,8 +279,8 @@ def _folders() -> list[Path]:
 def _arguments(words: Sequence[str]) -> argparse.Namespace:
     """Parse the command line, of which Blender's part ends with `--`."""
     parser = argparse.ArgumentParser(prog="blender_material.py", description=__doc__.split("\n")[0])
-    parser.add_argument("--folder", type=Path, help="exported folder; default: that of this file")
-    parser.add_argument("--name", default="", help="of the material; default: that of the shader")
+    parser.add_argument("--folder", type=Path, help="exported folder; default: of this script")
+    parser.add_argument("--name", default="", help="of the material; default: the shader's name")
     parser.add_argument("--object", help="mesh object that gets the material")
     parser.add_argument(
         "--tangent", choices=TANGENTS, default="uv", help="direction of the patch's x axis"
@@ -293,9 +293,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
         parser.add_argument(f"--{key}", type=Path, help=f"picture of a hologram: {content}")
     parser.add_argument("--working-space", help="working space of the file; default: as it is")
     parser.add_argument("--blend", type=Path, help=".blend file to add to; default: the open one")
-    parser.add_argument(
-        "--output", type=Path, help=".blend file to write; default: that of --blend"
-    )
+    parser.add_argument("--output", type=Path, help=".blend file to write; default: --blend")
     return parser.parse_args(words)
 
 
@@ -342,7 +340,7 @@ def _set_working_space(name: str) -> None:
     try:
         bpy.ops.wm.set_working_color_space(working_space=name)
     except TypeError as error:  # the message lists the names
-        names = str(error).rpartition(" not found in ")[2] or "those of Blender's panel"
+        names = str(error).rpartition(" not found in ")[2] or "the names in Blender's panel"
         raise MaterialError(f"working space '{name}' is unknown; choose one of {names}") from error
     for group in bpy.data.node_groups:
         if _SHADER in group:

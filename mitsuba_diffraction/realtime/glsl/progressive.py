@@ -202,7 +202,7 @@ class ProgressiveLight:
 
     lights : lights to draw instead of the scene's emitters and surroundings.
     shadow_size : texels a side of a shadow map.
-    bounces : whether light between surfaces is added to that of the scene's emitters.
+    bounces : whether light between surfaces is added to light from the emitters.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Meshes of glTF and USD files: all of a file as one, placed as its scene has them.
 
-Texture coordinates are Mitsuba's, whose v runs downwards in a picture, as those of OBJ files are.
+Texture coordinates are Mitsuba's, whose v runs downwards in a picture, as Mitsuba reads OBJ files.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ...plugin.meshes import Floats, Ints, MeshArrays
 def interchange_mesh(file: Path) -> MeshArrays:
     """Read all triangles of a glTF or USD file.
 
-    Normals and texture coordinates are None unless all meshes of the file have them.
+    Normals and texture coordinates exist where all meshes of the file have them.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _stage(file: Path) -> Any:
     try:
         return usd.Stage.Open(str(file))
     except Exception as error:  # Tf.ErrorException, over several lines
-        raise DiffractionError(f"mesh '{file}': cannot be read: it is no USD file") from error
+        raise DiffractionError(f"mesh '{file}': cannot be read as USD") from error
 
 
 def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
