@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, one_line, quoted
+from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import count_between, number_between
 from ..optics.colour import linear_srgb, response
@@ -80,8 +80,7 @@ def read_layers(path: Path) -> Layers:
         content = tomllib.loads(read_text(path))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise DiffractionError(f"{shown} is not TOML: {one_line(str(error))}") from error
-    if unknown := [key for key in content if key not in _KEYS]:
-        raise DiffractionError(f"{shown}: unknown key {unknown[0]!r}; known: {', '.join(_KEYS)}")
+    check_keys(shown, content, _KEYS)
     pairs = content.get("layers")
     if not (
         isinstance(pairs, list)
