@@ -14,6 +14,7 @@ lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows
 surroundings   environments, flat lights and obstacles, which lobes look up
+bounces        light between surfaces on a grid
 progressive    accumulation of frames, each with one light or with looked-up surroundings
 camera         sensors as cameras; moving the camera and the light by hand
 packing        tables as textures

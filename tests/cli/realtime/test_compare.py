@@ -75,7 +75,8 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
         noise = document["whole_noise"]["delta_e_mean"] + whole["noise"]["delta_e_mean"]
         assert whole["direct"]["delta_e_mean"] < 1.5 * noise + 0.5
         assert whole["full"]["delta_e_mean"] > 0.0
-        assert whole["dark_region"] == 0.0  # one convex surface
+        # one convex surface; two samples of the path tracer leave a few pixels to chance
+        assert whole["dark_region"] < 0.05
         assert whole["frame_ms"] > 0.0
         assert (folder / f"{method}.png").stat().st_size > 10_000
         both = entry["both"]
