@@ -113,8 +113,9 @@ def _range(values: NDArray[np.floating]) -> list[float]:
 def energy_warnings(summary: dict[str, Any]) -> list[str]:
     """Return a warning for each material that loses much light, or loses it without a gain."""
     much = [
-        f"with {name}, the model gains energy: up to {100 * energy['taken, largest']:.0f} % of the "
-        "light is removed (up to 80° from the normal; energy_conserving=false keeps it)"
+        f"with {name}, the relief would send out more light than it receives: the excess, up to "
+        f"{100 * energy['taken, largest']:.0f} %, is removed (up to 80° from the normal; "
+        "energy_conserving=false keeps it), and colours are least certain there"
         for name, energy in summary.items()
         if energy["taken, largest"] > WARN_REMOVED
     ]

@@ -15,7 +15,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.mean_second_order import limited
@@ -55,8 +54,6 @@ THICKNESS_STEP = 1.0
 SLOPE_STEP = 2.0**-9
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
-#: Removed share of the albedo above which real materials cause a warning.
-WARNED_EXCESS = 0.05
 
 
 class EnergyModel:
@@ -82,7 +79,7 @@ class EnergyModel:
         self._table, self._model = table, str(boundary)
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self._material = conserving, boundary.material
-        self._warned, self._coat = False, coat
+        self._coat = coat
         self._filmed = isinstance(self._material, UnderFilm) and boundary.model.has_second_order
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
@@ -120,7 +117,6 @@ class EnergyModel:
             return
         conserved = [self._energy.at(node) for node in nodes]
         if self.conserving:
-            self._warn(conserved)
             self._scale.update(scales_of([energy.scale for energy in conserved]), nodes, scales)
         if beneath:
             ratios = [self._ratio(energy) for energy in conserved]
@@ -132,21 +128,6 @@ class EnergyModel:
         if self._coat is None:
             return 1.0
         return float(_rounded_index(plain(self._coat.eta), COAT_STEP))
-
-    def _warn(self, conserved: list[Conservation]) -> None:
-        """Say once that much is taken of a real material."""
-        if self._warned or isinstance(self._material, Perfect) or conserved[0].scale is None:
-            return
-        albedo = conserved[0].albedo
-        assert albedo is not None  # of a reflector
-        largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
-        if largest > 1.0 + WARNED_EXCESS:
-            self._warned = True
-            warn(
-                f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
-                "the normal: the excess is removed (energy_conserving=false keeps it); its "
-                "orders are least certain there"
-            )
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Energy scale s on `FINE`; None where all are 1."""

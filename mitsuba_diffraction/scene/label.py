@@ -17,7 +17,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
-from .logo import Areas, logo, wavelengths_of
+from .logo import HUES, Areas, logo, wavelengths_of
 from .orientation.mesh_files import load_mesh
 from .stage import STUDIO
 
@@ -34,6 +34,8 @@ _CAMERA, _FAR, _MIDDLE = 8.0, 400.0, 3.0
 _DISTANCE, _RING = 600.0, (6.0, 80.0)
 # Half of the card's larger side, cm, and its part of the picture of 4 by 3
 _CARD, _FILLED, _PICTURE = 3.0, 0.86, 4.0 / 3.0
+# Heights at which a label's surface is looked at
+_HEIGHTS = 33
 # Factors on the patch's period that the plugin's table serves well
 _STRETCH = (0.4, 1.5)
 
@@ -45,19 +47,19 @@ class Place(NamedTuple):
     ----------
     matrix : (2, 3), centimetres to the right and upwards from the label's middle, of (u, v, 1).
     size : (width, height), cm.
-    elevation : of the surface's normal, degrees.
+    elevations : of the surface's normal, degrees, evenly from the label's lower to its upper edge.
     """
 
     matrix: Floats
     size: tuple[float, float]
-    elevation: float
+    elevations: Floats
 
 
 def card(aspect: float) -> Place:
     """Return the place of a picture, of this width over height, that fills an upright card."""
     width, height = 2 * _CARD * min(1.0, aspect), 2 * _CARD * min(1.0, 1.0 / aspect)
     matrix = np.array([[width, 0.0, -width / 2], [0.0, height, -height / 2]])
-    return Place(matrix, (width, height), 0.0)
+    return Place(matrix, (width, height), np.zeros(1))
 
 
 def front(
@@ -87,11 +89,19 @@ def front(
     sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     corners, uv = (mesh.positions @ rotation.T)[mesh.faces], own.uv[own.faces]
-    normals = (mesh.normals @ rotation.T)[mesh.faces].sum(axis=1)
+    normals = (mesh.normals @ rotation.T)[mesh.faces]
     sides = np.ptp(corners.reshape(-1, 3), axis=0)
-    number, weights = _in_front(corners, height * sides[2], normals)
-    normal = normals[number] / np.linalg.norm(normals[number])
+    wide, z = width * sides[0], height * sides[2]
+
+    def normal_at(z: float) -> tuple[int, Floats, Floats]:
+        number, weights = _in_front(corners, z, normals.sum(axis=1))
+        normal = weights @ normals[number]
+        return number, weights, normal / np.linalg.norm(normal)
+
+    number, weights, normal = normal_at(z)
     right = np.array([-normal[1], normal[0], 0.0]) / math.hypot(normal[0], normal[1])
+    rise = math.hypot(normal[0], normal[1]) * wide / aspect
+    steep = [normal_at(z + part * rise)[2][2] for part in np.linspace(-0.5, 0.5, _HEIGHTS)]
     edges = corners[number, 1:] - corners[number, 0]
     flat = np.stack([edges @ right, edges @ np.cross(normal, right)])  # (2, 2), columns are edges
     steps = (uv[number, 1:] - uv[number, 0]).T
@@ -102,9 +112,8 @@ def front(
         )
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
-    wide = width * sides[0]
-    elevation = math.degrees(math.asin(float(np.clip(normal[2], -1.0, 1.0))))
-    return Place(np.column_stack([linear, shift]), (wide, wide / aspect), elevation)
+    elevations = np.degrees(np.arcsin(np.clip(steep, -1.0, 1.0)))
+    return Place(np.column_stack([linear, shift]), (wide, wide / aspect), elevations)
 
 
 def _in_front(corners: Floats, z: float, normals: Floats) -> tuple[int, Floats]:
@@ -133,24 +142,26 @@ def _in_front(corners: Floats, z: float, normals: Floats) -> tuple[int, Floats]:
     return int(np.where(normals[:, 1] < 0.0, away, np.inf).argmin()), np.full(3, 1.0 / 3.0)
 
 
-def geometry(elevation: float) -> tuple[float, float]:
-    """Return the ring's elevation, degrees, and the tangential part of ω_i + ω_o upwards.
+def geometry(elevations: Floats) -> tuple[float, Floats]:
+    """Return the ring's elevation, degrees, and the tangential parts (n,) of ω_i + ω_o upwards.
 
-    elevation : of the label's normal, degrees.
+    elevations : (n,) of the label's normal, degrees, from its lower to its upper edge; where they
+        leave what the patch can be stretched to, colours are wrong.
 
-    Raises a DiffractionError if no ring shows colours there.
+    Raises a DiffractionError if no ring shows colours in the middle.
     """
-    seen = math.sin(math.radians(_CAMERA - elevation))
-    wanted = math.degrees(math.asin(float(np.clip(TANGENTIAL - seen, -1.0, 1.0))))
-    ring = float(np.clip(wanted + elevation, *_RING))
-    tangential = seen + math.sin(math.radians(ring - elevation))
-    stretch = [nm * 1e-3 / tangential / PERIOD if tangential > 0 else 0.0 for nm in (445, 640)]
-    if not _STRETCH[0] <= stretch[0] <= stretch[1] <= _STRETCH[1]:
+    middle = float(elevations[len(elevations) // 2])
+    wanted = TANGENTIAL - math.sin(math.radians(_CAMERA - middle))
+    ring = middle + math.degrees(math.asin(float(np.clip(wanted, -1.0, 1.0))))
+    ring = float(np.clip(ring, *_RING))
+    tangential = sum(np.sin(np.radians(angle - elevations)) for angle in (_CAMERA, ring))
+    low, high = HUES[1] * 1e-3 / PERIOD / _STRETCH[1], HUES[0] * 1e-3 / PERIOD / _STRETCH[0]
+    if not low <= tangential[len(elevations) // 2] <= high:
         raise DiffractionError(
-            f"the label's surface is inclined by {abs(elevation):.0f}°, where no lamp shows its "
+            f"the label's surface is inclined by {abs(middle):.0f}°, where no lamp shows its "
             "colours to the camera; choose another height or turn"
         )
-    return ring, tangential
+    return ring, np.clip(tangential, low, high)
 
 
 def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values: str) -> Path:
@@ -169,7 +180,7 @@ def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DiffractionError(f"cannot make the folder '{folder}': {error.strerror}") from error
-    ring, tangential = geometry(place.elevation)
+    ring, tangential = geometry(place.elevations)
     linear = place.matrix[:, :2]
     # degrees from the first tangent, in the label's plane, to the label's upward direction
     orientation = 90.0 - math.degrees(math.atan2(linear[1, 0], linear[0, 0]))

@@ -154,23 +154,26 @@ def _angle(xyz: Floats) -> Floats:
     return np.degrees(np.arctan2(y, x))
 
 
-def logo(parts: Areas, *, tangential: float, orientation: float, period: float) -> Hologram:
+def logo(parts: Areas, *, tangential: Floats, orientation: float, period: float) -> Hologram:
     """Return the textures of the gratings that show the colours, with a blank margin.
 
     Dark colours have a lower weight.
 
     parts : of `areas`.
-    tangential : length of the tangential part of ω_i + ω_o.
+    tangential : (n,) lengths of the tangential part of ω_i + ω_o, evenly from the lower to the
+        upper edge.
     orientation : degrees from the surface's first tangent to that part's direction.
     period : of the patch, µm.
     """
     ny, nx = parts.labels.shape
     periods, weights = np.full((ny, nx), np.nan), np.zeros((ny, nx))
     mosaic = np.add.outer(2 * np.arange(ny), np.arange(nx))
+    up = 1.0 - (np.arange(ny) + 0.5) / ny
+    rows = np.interp(up, np.linspace(0.0, 1.0, len(tangential)), tangential)[:, None]
     for number, colour in enumerate(parts.colours, 1):
-        shown = np.array(wavelengths_of(colour)) * 1e-3 / tangential
+        shown = np.array(wavelengths_of(colour)) * 1e-3
         here = parts.labels == number
-        periods[here] = shown[mosaic % len(shown)][here]
+        periods[here] = (shown[mosaic % len(shown)] / rows)[here]
         weights[here] = colour.max() / 255.0
     foil = hologram(
         np.pad(np.isfinite(periods), 1), periods=np.pad(periods, 1, constant_values=np.nan),

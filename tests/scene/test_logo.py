@@ -64,9 +64,10 @@ def test_white_and_purple_are_mixtures() -> None:
 def test_periods_send_the_wavelengths_to_the_camera(tmp_path: Path) -> None:
     drawn(64, 8).save(tmp_path / "logo.png")
     parts = areas(tmp_path / "logo.png", dots=64)
-    foil = logo(parts, tangential=0.5, orientation=90.0, period=1.3)
+    foil = logo(parts, tangential=np.array([0.4, 0.6]), orientation=90.0, period=1.3)
     inside = np.s_[1:-1, 1:-1]
-    shown = foil.lateral_scale[inside] * 1.3 * 0.5 * 1e3  # λ = Λ L, nm
+    rows = 0.6 - 0.2 * (np.arange(48) + 0.5) / 48
+    shown = foil.lateral_scale[inside] * 1.3e3 * rows[:, None]  # λ = Λ L, nm
     for number, colour in enumerate(parts.colours, 1):
         here = parts.labels == number
         # halves of single precision
