@@ -44,7 +44,10 @@ def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
     # the denoiser clips negative numbers, which saturated colours have in sRGB and none has in XYZ
     to_srgb = linear_srgb(np.eye(3))
     xyz = noisy @ np.linalg.inv(to_srgb).astype(np.float32)
+    # in a spectral variant the wavelengths of a sample colour the albedo, and its noise would stay
+    albedo = denoiser.denoise(np.clip(albedo, 0.0, 1.0)) @ np.linalg.inv(to_srgb)
     clean = denoiser.denoise(
-        np.ascontiguousarray(xyz), np.clip(albedo, 0.0, 1.0), normal, hdr=True, clean_aux=True
-    )
+        np.ascontiguousarray(xyz), np.ascontiguousarray(np.clip(albedo, 0.0, 1.0), np.float32),
+        normal, hdr=True, clean_aux=True,
+    )  # fmt: skip
     return mi.Bitmap((clean @ to_srgb).astype(np.float32), pixel_format=rgb)
