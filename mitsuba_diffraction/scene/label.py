@@ -154,7 +154,7 @@ def geometry(elevations: Floats) -> tuple[float, Floats]:
     wanted = TANGENTIAL - math.sin(math.radians(_CAMERA - middle))
     ring = middle + math.degrees(math.asin(float(np.clip(wanted, -1.0, 1.0))))
     ring = float(np.clip(ring, *_RING))
-    tangential = sum(np.sin(np.radians(angle - elevations)) for angle in (_CAMERA, ring))
+    tangential = np.sin(np.radians(_CAMERA - elevations)) + np.sin(np.radians(ring - elevations))
     low, high = HUES[1] * 1e-3 / PERIOD / _STRETCH[1], HUES[0] * 1e-3 / PERIOD / _STRETCH[0]
     if not low <= tangential[len(elevations) // 2] <= high:
         raise DiffractionError(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import mitsuba as mi
 import pytest
 
@@ -15,10 +18,12 @@ pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 
 @pytest.mark.parametrize("name", ["cd", "gold-foil", "dichroic-film", "snake"])
-def test_a_look_is_mixed_and_coated_or_refused_in_one_line(name, tmp_path):
+def test_a_look_is_mixed_and_coated_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
     mi.set_variant("llvm_ad_rgb")
     solved = kind_of(find_preset(name).patch) is FileKind.ORDERS
-    own = {} if solved else {"heightfield": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}
+    own: dict[str, Any] = (
+        {} if solved else {"heightfield": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}
+    )
     mixed = {"type": "diffraction_mix", "look": md.preset(name, **own), "rest": {"type": "diffuse"}}
     assert "Diffraction" in str(mi.load_dict({**mixed, "weight_look": 0.5}))
     coated = md.preset(name, coat_ior=1.4, **own)
