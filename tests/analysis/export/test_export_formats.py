@@ -19,6 +19,8 @@ from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.orders import thin_grating
 from tests.support.variants import obstacle
 
+pytestmark = pytest.mark.thorough
+
 #: Window, µm, whose lobes are some 15° wide at half of their height.
 WIDTH = 2.0
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
