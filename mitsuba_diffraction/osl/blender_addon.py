@@ -12,7 +12,10 @@ from typing import Any
 
 from . import blender_material
 
-bpy = blender_material.bpy  # None outside of Blender
+try:
+    import bpy
+except ModuleNotFoundError:  # outside of Blender nothing is registered
+    bpy = None
 
 HERE = Path(__file__).parent
 #: Name of the asset library in Blender's preferences.

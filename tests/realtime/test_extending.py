@@ -85,7 +85,7 @@ def test_page(tab: Any, model: Model, tmp_path: Path) -> None:
         "sun": {"type": "directional", "direction": [0.1, 0.0, 1.0]},
         "plane": {"type": "rectangle", "bsdf": surface},
     }
-    page = make_page(mi.load_dict(scene), methods=["fast"])
+    page = make_page(mi.load_dict(scene), methods=["fast"], bounces=False)
     path = tmp_path / "page.html"
     path.write_text(page.text, encoding="utf-8")
     opened = tab((96, 64))

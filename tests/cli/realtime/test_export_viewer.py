@@ -24,6 +24,12 @@ SKIN = """<bsdf type="diffraction">
 GRATING = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.06\nperiods = 3\n'
 
 
+@pytest.fixture(autouse=True)
+def _few_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trace little light between surfaces, of which a plate alone has none."""
+    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 8)
+
+
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     (tmp_path / "grating.toml").write_text(GRATING)
