@@ -49,7 +49,7 @@ ROUND = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands":
 ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine.
-_BUSY, _HANG = 40, 300
+_BUSY, _HANG = 40, 900
 _SHOWN = 300  # characters of a failure
 
 

@@ -88,13 +88,15 @@ class Surface:
         fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
         nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
-        solved = parallel(lambda light: self._solved(light()), lights)
+        solve = self._balanced if self._both_sides else self._limited
+        solved = parallel(lambda light: solve(light()), lights)
         c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
         if self._both_sides and np.all(c == 1.0):
             return Conservation()
-        few = self.orders.strong <= settings.few_orders and not self._both_sides
+        few = self.orders.strong <= settings.few_orders
+        parts = (settings.side_parts if self._both_sides else settings.parts)[few]
         between = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
-        lights = self._lights(between, *grid.middles(settings.few_parts if few else 1))
+        lights = self._lights(between, *grid.middles(parts))
 
         def lower(n: int) -> None:
             pair = slice(n, n + 2)
@@ -104,11 +106,10 @@ class Surface:
             parallel(lower, range(first, len(between), 2))
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
-            missing = side >= scale.shape[1] or (self._both_sides and np.all(scale == 1.0))
+            unscaled = (self._both_sides or scale is c) and np.all(scale == 1.0)
+            missing = unscaled or side >= scale.shape[1]
             return None if missing else DirectionalTable(nodes, scale[:, side])
 
-        if not self._both_sides:
-            return Conservation(albedo, table(s, 0))
         return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
     def albedos(
@@ -160,32 +161,26 @@ class Surface:
         table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
         return table, float(albedos.max())
 
-    def _solved(self, light: ScatteredLight) -> tuple[Array, Array]:
-        """Find c and s at the grid's directions."""
-        if self._both_sides:
-            return self._balanced(light), self._ones
-        return self._ones, self._limited(light)
-
-    def _limited(self, light: ScatteredLight) -> Array:
-        """Find s of a reflector at the grid's directions."""
+    def _limited(self, light: ScatteredLight) -> tuple[Array, Array]:
+        """Find c, which is 1, and s of a reflector at the grid's directions."""
         settings = self._settings
         # part of a lobe is below the horizon there, and would ask for any s
         largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, 1.0))
         kernel = partial(light.balanced, self._ones)
         aim = np.minimum(kernel(self._ones), np.float32(settings.target))
-        return scaled(kernel, aim, largest[:, None], settings.sweeps)
+        return self._ones, scaled(kernel, aim, largest[:, None], settings.sweeps)
 
-    def _balanced(self, light: ScatteredLight) -> Array:
-        """Find c at the grid's directions, such that R + T is 1."""
+    def _balanced(self, light: ScatteredLight) -> tuple[Array, Array]:
+        """Find c at the grid's directions, such that R + T is 1, and s, which is 1."""
         settings, most = self._settings, self._settings.largest**2
         others, zeroth = light.others(self._ones), light.order_0(self._ones)
         if np.abs(others + zeroth - 1.0).max() < settings.close:
-            return self._ones
+            return self._ones, self._ones
         aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
         c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
         c = np.where(zeroth > MIN_ORDER_0, c, np.float32(1.0))
         # a lobe within one row, as at the critical angle, is not adjusted
-        return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
+        return np.asarray(median_filter(c, (1, 3, 1), mode="nearest")), self._ones
 
     def _lowered(self, light: ScatteredLight, c: Array, s: Array) -> tuple[Array, Array]:
         """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""

@@ -19,8 +19,9 @@ class EnergySettings:
         quickly towards the critical angle.
     wavelengths : of a scale; variants of one wavelength have one. The model's albedo, which tells
         whether a scale is needed, has a quarter of them and half the directions.
-    few_parts, few_orders : between nodes, light is looked at in the middles of cells; on reflectors
-        of at most so many strong orders, whose albedos have kinks, of so many parts either way.
+    parts, side_parts, few_orders : between nodes, light is looked at in middles of so many parts of
+        a cell, either way, first of surfaces with more than `few_orders` strong orders, then of
+        those with fewer, whose kinks are sharper. With 3 a blazed mirror has 1.04 in between.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
     fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of the second order's
         mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
@@ -46,7 +47,8 @@ class EnergySettings:
     fringe_step: float = 0.1
     scale_fringe_step: float = 0.6
     fringes: int = 64
-    few_parts: int = 3
+    parts: tuple[int, int] = (3, 5)
+    side_parts: tuple[int, int] = (1, 2)
     few_orders: int = 32
     rings: int = 36
     steps: int = 80

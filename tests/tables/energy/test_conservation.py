@@ -118,8 +118,8 @@ def test_a_grating_gains_nothing_between_nodes_either(tables, material):
     theta, phi = np.radians(rng.uniform(0, 80, 30)), np.radians(rng.uniform(0, 360, 20))
     raw, kept = conserved(surface, [520.0, 547.0, 560.0], theta, phi)
     assert raw.max() > 1.02
-    # spikes are as narrow as a lobe, half a degree
-    assert kept.max() <= (1.005 if material == "aluminium" else 1.08)
+    # spikes are as narrow as a lobe, half a degree, and looked at in the middle wavelength alone
+    assert kept.max() <= (1.005 if material == "aluminium" else 1.02)
     assert np.mean(kept / np.minimum(raw, 1.0)) > 0.95
 
 
