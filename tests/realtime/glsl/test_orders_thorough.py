@@ -19,7 +19,7 @@ pytestmark = pytest.mark.thorough
 def test_scenes_look_as_path_traced(name: str, tmp_path: Path, some_variant: str) -> None:
     scene = load_scene(SCENES / f"{name}.xml", {"resx": "16", "resy": "12"})
     comparison = Comparison(
-        scene, name, mi.variant(), tmp_path / "compared", spp=6144, full_spp=0, frames=256,
+        scene, name, mi.variant(), tmp_path / "compared", spp=6144, full_spp=0, frames=128,
         supersampling=6,
     )  # fmt: skip
     whole = comparison.run(["fast"])["methods"]["fast"]["whole"]

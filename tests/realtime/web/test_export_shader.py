@@ -132,7 +132,7 @@ def exported(sphere: Any, three: Path) -> Path:
 @pytest.fixture(scope="module")
 def opened(browser: Any, exported: Path) -> Iterator[Any]:
     """The page of the material, served from the folder without a server."""
-    page = browser.new_page(viewport={"width": 480, "height": 270})
+    page = browser.new_page(viewport={"width": 240, "height": 135})
     page.set_default_timeout(PATIENCE)
     said: list[str] = []
     page.on("pageerror", lambda error: said.append(str(error)))
@@ -159,8 +159,8 @@ def test_the_example_shows_colours(opened: Any) -> None:
         pixels = np.asarray(shot.convert("RGB"), float)
     # neither grey nor one colour: red here, blue there
     redness = pixels[..., 0] - pixels[..., 2]
-    assert (redness > 60).sum() > 20
-    assert (redness < -60).sum() > 20
+    assert (redness > 60).sum() > 5
+    assert (redness < -60).sum() > 5
     opened.goto(SITE)
     opened.wait_for_function("document.documentElement.dataset.state")
 
