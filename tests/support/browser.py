@@ -16,15 +16,23 @@ FLAGS = (
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 )  # fmt: skip
 SIZE = (96, 64)
-#: Milliseconds that a page may take for anything: shaders are compiled in software.
-PATIENCE = 180_000
-#: As soon as there is a viewer, it draws no more than a test asks for. In a frame of a page scripts
-#: like this one may come after the page's own.
-ONE_SAMPLE = """if (window.viewer) window.viewer.most = 1;
-else Object.defineProperty(window, "viewer", { configurable: true, set(viewer) {
-    viewer.most = 1;
-    Object.defineProperty(window, "viewer", { value: viewer });
-} });
+#: Milliseconds that a page may take for anything: shaders are compiled in software, on a machine
+#: that may be busy.
+PATIENCE = 600_000
+#: As soon as there is a viewer, it draws no more than a test asks for, and waits as long as tests
+#: do. In a frame of a page scripts like this one may come after the page's own.
+ONE_SAMPLE = f"""{{
+    const prepare = (viewer) => {{
+        const own = viewer.settled;
+        viewer.most = 1;
+        viewer.settled = (count) => own.call(viewer, count, {PATIENCE});
+    }};
+    if (window.viewer) prepare(window.viewer);
+    else Object.defineProperty(window, "viewer", {{ configurable: true, set(viewer) {{
+        prepare(viewer);
+        Object.defineProperty(window, "viewer", {{ value: viewer }});
+    }} }});
+}}
 """
 
 
