@@ -28,6 +28,7 @@ from ..optics.boundary import (
     power,
 )
 from ..optics.coat import Crossing, coated_power, crossing, transmitted
+from .arithmetic import clip, index_of, maximum
 from .directions import Pair, TablePoint
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import CoatedPair, UnderFilm
@@ -54,15 +55,15 @@ class HeightStatistic:
     ) -> list[Heights]:
         """Return κ and the statistic for each channel."""
         # An order of no frequency to speak of has the first node's value, as q → 0
-        squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
+        squared = maximum(dr.squared_norm(pair.uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
         scaled_w = pair.w * height_scale
         heights = []
         for k in wavenumbers:
             place = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
             lower = index_between(dr.floor(place), 0.0, self._last)
-            low, high = read_record(self._nodes, mi.UInt32(lower), 2)
-            variance = dr.lerp(low, high, dr.clip(place - lower, 0.0, 1.0))
+            low, high = read_record(self._nodes, index_of(lower), 2)
+            variance = dr.lerp(low, high, clip(place - lower, 0.0, 1.0))
             heights.append(Heights(scaled_w * k, variance))
         return heights
 

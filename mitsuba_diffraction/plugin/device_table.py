@@ -20,6 +20,7 @@ from ..errors import DiffractionError
 from ..tables.layout import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
+from .arithmetic import index_of, maximum
 from .loops import sum_of
 from .memory import index_between, once_a_table, packet_size, read_packets, upload, zero_packets
 from .series import inner, series_of
@@ -107,7 +108,7 @@ class DeviceTable:
             if grid.coherent:
                 result = dr.square(parts[0]) + dr.square(parts[1])
             else:
-                result = dr.maximum(parts[0], 0.0)  # a cut series may dip below zero by its error
+                result = maximum(parts[0], 0.0)  # a cut series may dip below zero by its error
         outside = dr.nan
         if self.limited:
             outside = dr.select(within(qx, qy, (self.q_limit, self.q_limit)), 0.0, dr.nan)
@@ -128,7 +129,7 @@ class DeviceTable:
         parts = self.series.at(kappa).order_0
         if self.record.components == 2:
             return dr.square(parts[0]) + dr.square(parts[1])
-        return dr.maximum(parts[0], 0.0)
+        return maximum(parts[0], 0.0)
 
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
         """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
@@ -320,7 +321,7 @@ def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index
     """Array index of the first tap at a position in bins, and the weights of all taps."""
     first = dr.floor(position if taps % 2 == 0 else position + 0.5) + first_tap(taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
-    index = mi.UInt32(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
+    index = index_of(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
     return index, Gaussians(position - first, first, taps, exponent)
 
 

@@ -233,6 +233,7 @@ import mitsuba as mi
 
 from ..optics.geometry import vcavity
 from ..tables.directional import DirectionalTable
+from .arithmetic import maximum
 from .boundary import KIRCHHOFF, Boundary
 from .description import Energy, Nested, SecondOrder, Surface
 from .diffraction_parameters import read_parameters
@@ -359,7 +360,7 @@ class Diffraction(DiffractingSurface):
         uv = self.power.draw(
             mi.Frame3f.cos_theta(site.si.wi),
             dr.detach(self._drawing_scale(site)),
-            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
+            maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             site.si,
         )

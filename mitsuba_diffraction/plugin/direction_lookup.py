@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
+from .arithmetic import clip, float_of, index_of
 from .directions import PatchFrame
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
@@ -34,7 +35,7 @@ class DirectionLookup:
         self._last, self._varies = 0, False
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
-        self._pages = self._polar = self._azimuthal = 1
+        self._pages = self._polar = self._azimuthal = self._record = 1
 
     def update(
         self,
@@ -53,7 +54,7 @@ class DirectionLookup:
         height_scale, varies = scales.height_scale, scales.varies
         maps = _maps(tables, scales.centre)
         rates = [(number, _maps(rate, scales.centre)) for number, rate in slopes]
-        self._polar, self._azimuthal, self._pages = maps.shape[1:4]
+        self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
@@ -88,18 +89,19 @@ class DirectionLookup:
             share = (height_scale - self._low) * self._slope
         cell, s, t = self._cell(*self._place(tangential, cosine))
 
-        def page(n: Index) -> Float:
+        def pages(n: Index) -> list[Float]:
             corners = self._corners(cell * self._pages + n, share)
-            return dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
+            fours = (corners[start : start + 4] for start in range(0, self._record, 4))
+            return [dr.lerp(dr.lerp(a, b, t), dr.lerp(c, d, t), s) for a, b, c, d in fours]
 
-        if mi.is_rgb or self._pages == 1:
+        if self._record == 4:
             last = self._pages - 1
-            return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
+            return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
         values = []
         for k in wavenumbers:
             place = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
-            n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
-            values.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
+            n = index_of(index_between(place, 0.0, self._pages - 1.0))
+            values.append(dr.lerp(*pages(n), clip(place - float_of(n), 0.0, 1.0)))
         return values
 
     def _place(self, tangential: Vector2f, cosine: Float) -> tuple[Float, Float]:
@@ -111,25 +113,25 @@ class DirectionLookup:
 
     def _cell(self, row: Float, column: Float) -> tuple[Index, Float, Float]:
         """A cell, and where in it."""
-        i = mi.UInt32(index_between(row, 0.0, self._polar - 1.0))
-        j = mi.UInt32(index_between(column, 0.0, self._azimuthal - 1.0))
-        s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
+        i = index_of(index_between(row, 0.0, self._polar - 1.0))
+        j = index_of(index_between(column, 0.0, self._azimuthal - 1.0))
+        s, t = clip(row - float_of(i), 0.0, 1.0), clip(column - float_of(j), 0.0, 1.0)
         return i * self._azimuthal + j, s, t
 
     def _corners(self, page: Index, share: Float | None) -> list[Float]:
-        """Values at the corners of a cell on one page, given by its number in memory.
+        """Values at the corners of a cell on the pages of a record, given by its number in memory.
 
         share : position between height scales, in units of their distance; None where the uploaded
             values are interpolated already.
         """
         if share is None:
-            return read_record(self._values, page, 4)
+            return read_record(self._values, page, self._record)
         lower = index_between(dr.floor(share), 0.0, float(self._last))
         size = self._pages * self._polar * self._azimuthal
-        page = page + mi.UInt32(lower) * size
-        ends = (read_record(self._nodes, at, 4) for at in (page, page + size))
+        page = page + index_of(lower) * size
+        ends = (read_record(self._nodes, at, self._record) for at in (page, page + size))
         # no farther, where values might become negative; derivatives at the ends are as inside
-        share = dr.clip(share - lower, -0.01, 1.01)
+        share = clip(share - lower, -0.01, 1.01)
         return [dr.lerp(*both, share) for both in zip(*ends, strict=True)]
 
 
@@ -140,7 +142,7 @@ def at_horizon(cosine: Float) -> Float:
 
     cosine : of the angle to the normal, above 0.
     """
-    near = dr.clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
+    near = clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
     return near * dr.sqrt(near)
 
 
@@ -178,7 +180,9 @@ def _maps(tables: list[DirectionalTable], stretch: float) -> Array:
 
 
 def _cells(table: DirectionalTable, stretch: float) -> Array:
-    """Values at the corners of each cell, (rows, columns, channels or wavelengths, 4).
+    """Values at the corners of each cell, (rows, columns, channels, 4).
+
+    Spectra have intervals of wavelengths instead of channels, and 8 values: of both ends.
 
     stretch : factor from the table's wavelengths to the light's.
 
@@ -190,7 +194,10 @@ def _cells(table: DirectionalTable, stretch: float) -> Array:
         values = np.tensordot(weights, values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)
     corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
-    return np.stack(corners, axis=-1).transpose(1, 2, 0, 3)
+    cells = np.stack(corners, axis=-1).transpose(1, 2, 0, 3)
+    if mi.is_rgb or len(values) == 1:
+        return cells
+    return np.concatenate([cells[:, :, :-1], cells[:, :, 1:]], axis=-1)
 
 
 def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .arithmetic import clip
 from .directions import Site
 from .lifecycle import ALL_COMPONENTS, PluginBSDF, ask
 from .parameter_changes import ObjectValues
@@ -187,7 +188,7 @@ class NestingBSDF(PluginBSDF):
             return mi.Float(0.0)
         mean = dr.mean(mi.unpolarized_spectrum(self.reflected_share(site, active)))
         # A nested BSDF is taken to return half of the light that it receives
-        return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
+        return clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
 
 
 def _valid(light: Spectrum) -> Spectrum:

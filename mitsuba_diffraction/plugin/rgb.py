@@ -19,6 +19,7 @@ from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import PACKET, TERMS, ColourTable
 from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
+from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
@@ -39,7 +40,7 @@ class PolarCoordinates:
     def ring(self, squared_radius: Float) -> Float:
         """Position among the rings; below 0 inside the smallest."""
         smallest = self.smallest**2
-        logarithm = dr.log(dr.maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
+        logarithm = dr.log(maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
         return logarithm * (0.5 / self.step)
 
     def turn(self, uv: Vector2f) -> Float:
@@ -72,7 +73,7 @@ class ColourLookup:
 
     def zeroth(self, uv: Vector2f, z: Float) -> Colour:
         """Return the RGB of order 0."""
-        radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
+        radius = dr.sqrt(maximum(dr.squared_norm(uv), 1e-14))
         return mi.Color3f(*self._zeroth_order(radius, z))
 
     def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
@@ -115,9 +116,9 @@ class ColourLookup:
 
 def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
     """The lower of the two whole numbers around a position, at most count − 2, and the rest."""
-    clipped = dr.maximum(position, 0.0)
+    clipped = maximum(position, 0.0)
     lower = dr.minimum(mi.UInt32(clipped), count - 2)
-    return lower, dr.minimum(clipped - mi.Float(lower), 1.0)
+    return lower, minimum(clipped - mi.Float(lower), 1.0)
 
 
 class RGBPower:
@@ -195,7 +196,7 @@ class RGBPower:
         share, band = self._strategy(cos_i, height_scale)
         lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
         lobe = mi.UInt32(lobe)
-        sample2 = dr.minimum(sample2, BELOW_ONE)
+        sample2 = minimum(sample2, BELOW_ONE)
         width = mi.Float(0.0)
         for n, sharpness in enumerate(self._sharpness):
             width = dr.select(lobe == n, math.sqrt(0.5 / sharpness), width)
@@ -217,10 +218,10 @@ class RGBPower:
     def _strategy(self, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         bands = BANDS / (BANDED * self._z_max)
-        band = mi.UInt32(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
+        band = index_of(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
         position = 2.0 * height_scale * cos_i * ((self._zs - 1) / self._z_max)
         z = index_between(position, 0.0, self._zs - 1.0)
-        brightness = read(mi.Float, self._order_0, mi.UInt32(z + 0.5))
+        brightness = read(mi.Float, self._order_0, index_of(z + 0.5))
         share = order_0_share(brightness, cos_i)
         return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..tables.sampling import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
+from .arithmetic import clip, float_of, index_of, maximum, minimum
 from .memory import float_of_bits, index_between, once_a_table, read, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
 
@@ -82,9 +83,9 @@ class OrderSampler:
         """Choose how to draw for wavenumber k and incident light at this cosine."""
         kappa = k * height_scale
         position = kappa * (cos_i + 0.5) * self._bands_per_kappa
-        band = mi.UInt32(index_between(position, 0.0, self._last_band))
+        band = index_of(index_between(position, 0.0, self._last_band))
         nearest = dr.fma(2.0 * kappa * cos_i, self._steps_per_kappa, 0.5)
-        power = read(mi.Float, self._order_0, mi.UInt32(index_between(nearest, 0.0, self._last)))
+        power = read(mi.Float, self._order_0, index_of(index_between(nearest, 0.0, self._last)))
         share = order_0_share(power, cos_i)
         unit = read(mi.Float, self._units, band)
         return Strategy(dr.select(unit > 0.0, share, 1.0), band, unit)
@@ -98,7 +99,7 @@ class OrderSampler:
             for part, cell, origin in zip(q, self._cell, self._origin, strict=True)
         )
         inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
-        column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
+        column, row = index_of(dr.select(inside, x, 0.0)), index_of(dr.select(inside, y, 0.0))
         index = (strategy.band * self._rows + row) * self._words + column // 4
         level = (read(mi.UInt32, self._levels, index, inside) >> (8 * (column & 3))) & 255
         cell = strategy.unit * float_of_bits(level << SHIFT)
@@ -106,7 +107,7 @@ class OrderSampler:
             apart = mi.Float(0.0)
             for position, number, n in ((x, column, 0), (y, row, 1)):
                 if self._lobes[n]:
-                    apart += dr.square((position - mi.Float(number) - 0.5) * self._cell[n])
+                    apart += dr.square((position - float_of(number) - 0.5) * self._cell[n])
             cell *= dr.exp2(apart * (-variance / math.log(2.0)))
         return dr.lerp(cell, glossy, strategy.share)
 
@@ -115,7 +116,7 @@ class OrderSampler:
     ) -> Vector2f:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
         share, band, _ = self.strategy(k, cos_i, height_scale)
-        sample2 = dr.minimum(sample2, BELOW_ONE)
+        sample2 = minimum(sample2, BELOW_ONE)
         glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma_0 * dr.sqrt(2.0)))
         start = band * (self._rows + 1)
         row, y = invert(self._row_sums, start, self._rows, self._rows, sample2.y)
@@ -129,7 +130,7 @@ class OrderSampler:
         if self._lobes[axis]:
             distance = dr.erfinv(dr.fma(2.0, t, -1.0) * self._within[axis]) * (1.0 / self._sigma)
             t = dr.fma(distance, 1.0 / self._cell[axis], 0.5)
-        return dr.fma(mi.Float(number) + t, self._cell[axis], self._origin[axis])
+        return dr.fma(float_of(number) + t, self._cell[axis], self._origin[axis])
 
 
 def order_0_share(power: Float, cos_i: Float) -> Float:
@@ -140,8 +141,8 @@ def order_0_share(power: Float, cos_i: Float) -> Float:
     root of that growth is between the two, and it is the share of least variance.
     """
     others = (1.0 - power) * (1.0 + cos_i)
-    share = power * dr.rcp(dr.fma(0.5 * dr.rcp(dr.maximum(cos_i, 1e-4)), others, power))
-    return dr.clip(share, LEAST_SHARE, 1.0 - LEAST_SHARE)
+    share = power * dr.rcp(dr.fma(0.5 * dr.rcp(maximum(cos_i, 1e-4)), others, power))
+    return clip(share, LEAST_SHARE, 1.0 - LEAST_SHARE)
 
 
 def direction_of(tangential: Vector2f) -> Vector3f:
@@ -174,8 +175,8 @@ def invert(
         index = dr.select((further < count) & (lower <= sample), further, index)
     lower = read(mi.Float, sums, start + index)
     upper = read(mi.Float, sums, start + index + 1)
-    width = dr.maximum(upper - lower, _SMALLEST)
-    return index, dr.clip((sample - lower) / width, 0.0, 1.0)
+    width = maximum(upper - lower, _SMALLEST)
+    return index, clip((sample - lower) / width, 0.0, 1.0)
 
 
 @once_a_table

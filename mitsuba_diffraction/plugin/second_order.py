@@ -22,6 +22,7 @@ from ..optics.second_order_change import applies
 from ..optics.slope_ratios import SlopeRatios
 from ..settings import checked
 from ..tables.table import DiffractionTable
+from .arithmetic import clip, index_of, maximum
 from .boundary import Boundary
 from .directions import Pair
 from .fresnel import Dielectric
@@ -105,9 +106,9 @@ class SecondOrder:
         squares = dr.fma(first.x, first.x, dr.square(first.y)) * dr.fma(
             second.x, second.x, dr.square(second.y)
         )
-        turn = -dot * dr.rsqrt(dr.maximum(squares, 1e-20))
+        turn = -dot * dr.rsqrt(maximum(squares, 1e-20))
         cosines = (pair.cos_i, pair.cos_o, turn)
-        angles = [dr.acos(dr.clip(cosine, -_NORMAL, _NORMAL)) for cosine in cosines]
+        angles = [dr.acos(clip(cosine, -_NORMAL, _NORMAL)) for cosine in cosines]
         per = (NODES - 1) / math.pi
         return [angles[0] * (2.0 * per), angles[1] * (2.0 * per), angles[2] * per]
 
@@ -137,8 +138,8 @@ class _Grid:
         lower, upper = [], []
         for place, count in zip(places, self._shape, strict=True):
             first = index_between(dr.floor(place), 0.0, count - 2.0)
-            lower.append(mi.UInt32(first))
-            upper.append(dr.clip(place - first, 0.0, 1.0))
+            lower.append(index_of(first))
+            upper.append(clip(place - first, 0.0, 1.0))
         _, rows, columns = self._shape
         start = (lower[0] * (rows - 1) + lower[1]) * (columns - 1) + lower[2]
         ends = [self._between(start + n * (rows - 1) * (columns - 1), upper) for n in (0, 1)]

@@ -16,6 +16,7 @@ import numpy as np
 from ..tables.expansion import Expansion
 from ..tables.layout import Record, cells_of, functions_at
 from ..tables.table import DiffractionTable
+from .arithmetic import clip, index_of, minimum
 from .memory import PACKET, index_between, read_record, upload
 from .types import Float, Index
 
@@ -85,14 +86,14 @@ class Tabulated:
         last = self._expansion.intervals * self._cells - 1.0
         position = kappa * (self._cells / self._expansion.length)
         lower = index_between(dr.floor(position), 0.0, last)
-        t = dr.clip(position - lower, 0.0, 1.0)
-        cell = mi.UInt32(lower)
+        t = clip(position - lower, 0.0, 1.0)
+        cell = index_of(lower)
         numbers = read_record(self._parabolas, cell, self._record.numbers)
         count = self._expansion.terms + self._components
         a, b, c = (numbers[n * count : (n + 1) * count] for n in range(3))
         values = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
         weights, order_0 = values[: -self._components], values[-self._components :]
-        offset = dr.minimum(kappa * (1.0 / self._expansion.length), 1.0)
+        offset = minimum(kappa * (1.0 / self._expansion.length), 1.0)
         factor = offset if self._expansion.kind == "amplitude" else dr.square(offset)
         interval = mi.UInt32(0)
         if self._expansion.intervals > 1:
@@ -111,7 +112,7 @@ def series_interval(expansion: Expansion, kappa: Float) -> tuple[Float, Index]:
     """Position of κ in its interval (0 … 1), and the interval."""
     position = kappa * (1.0 / expansion.length)
     lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
-    return position - lower, mi.UInt32(lower)
+    return position - lower, index_of(lower)
 
 
 def series_weights(
@@ -124,7 +125,7 @@ def series_weights(
         for n in range(2, terms + 1):
             weights.append(weights[-1] * x * (1.0 / n))
         return weights
-    t = dr.clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
+    t = clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
     factor = offset if expansion.kind == "amplitude" else dr.square(offset)
     scale = dr.select(interval == 0, factor, 1.0)
     weights = [scale, scale * t]  # Tₙ(t) by their recurrence, the factor carried along

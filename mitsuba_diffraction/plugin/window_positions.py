@@ -22,6 +22,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
+from .arithmetic import index_of
 from .directions import PatchFrame
 from .memory import index_between
 from .types import Float, Interaction, Rotation, Vector2f
@@ -129,6 +130,6 @@ def _unskewed(corner: Vector2f) -> Vector2f:
 def _shift(corner: Vector2f) -> Vector2f:
     """A corner's shift in patches, 0 … 1."""
     numbers = [
-        mi.UInt32(index_between(part + _MOST_CORNERS, 0.0, 2.0 * _MOST_CORNERS)) for part in corner
+        index_of(index_between(part + _MOST_CORNERS, 0.0, 2.0 * _MOST_CORNERS)) for part in corner
     ]
     return mi.Vector2f(*(mi.Float(bits >> 8) * 2.0**-24 for bits in mi.sample_tea_32(*numbers)))

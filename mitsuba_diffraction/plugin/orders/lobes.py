@@ -19,6 +19,7 @@ from ...optics.geometry import sigma_of
 from ...optics.orders import lobe_falloff, lobe_peak, order_lobe, wavenumber_step
 from ...tables.orders import OrderTable
 from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
+from ..arithmetic import clip, index_of, maximum, minimum
 from ..directions import Pair
 from ..loops import sum_of
 from ..memory import index_between, read_record, upload
@@ -138,7 +139,7 @@ class _Window:
         """Draw an order of a row, and a direction in its lobe."""
         drawn = self.lookup.draw(row, sample1)
         wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
-        spread = mi.warp.square_to_std_normal(dr.minimum(sample2, BELOW_ONE)) * wide
+        spread = mi.warp.square_to_std_normal(minimum(sample2, BELOW_ONE)) * wide
         centre = mi.Vector2f(drawn.order * wavelength * (1e-3 / self.period), 0.0)
         return Draw(centre + mi.Vector2f(spread), drawn.below, drawn.valid)
 
@@ -173,7 +174,7 @@ class SpectralLobes(_Window):
                 terms.append((order, lobe, share.efficiency))
             peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self.sigma) * pair.cos_o
             lit.append(Lit(row, light * peak, peak, terms))
-            density += chance * peak * dr.rcp(dr.maximum(self.lookup.total(row, near), _MIN_SUM))
+            density += chance * peak * dr.rcp(maximum(self.lookup.total(row, near), _MIN_SUM))
         mean = density * (1.0 / len(wavelengths))
         return Reflected(self.spectrum(pair, ctx, lit), dr.detach(mean))
 
@@ -255,7 +256,7 @@ class DaylightLobes(_Window):
         """Return the efficiency of an order, and its probability."""
         row = self.lookup.row(light.incident, light.cos_i, wavelength)
         share, total = self.lookup.order(row, order, True, below), self.lookup.total(row)
-        return share.efficiency, share.chance * dr.rcp(dr.maximum(total, _MIN_SUM))
+        return share.efficiency, share.chance * dr.rcp(maximum(total, _MIN_SUM))
 
     def _zeroth(self, light: Incidence, below: Below, radius: Float) -> list[Float]:
         """Sum order 0 over wavelengths, for red, green, blue and the density."""
@@ -276,31 +277,31 @@ class DaylightLobes(_Window):
         """Sum all other orders, for red, green, blue and the density."""
         u, v = uv.x, uv.y
         unit = 2.0 * math.pi / self.period
-        square = dr.maximum(radius, 1e-8)
+        square = maximum(radius, 1e-8)
         # k_m = m · step, of the sign of u
         step = wavenumber_step(u, v, self.period)
         aside = lobe_falloff(u, v, self.sigma, self.period)
-        first = dr.maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
-        last = dr.minimum(
+        first = maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
+        last = minimum(
             dr.floor(self._waves[1] * dr.rcp(step)),
-            dr.sqrt(_REACH * dr.rcp(dr.maximum(aside, 1e-8))),
+            dr.sqrt(_REACH * dr.rcp(maximum(aside, 1e-8))),
         )
         most = int(2.0 * self._waves[1] / unit) + 1
         lit = (last >= first) & (radius * (self._waves[1] / unit) ** 2 > 0.25)
-        count = dr.select(lit, mi.UInt32(index_between(last - first + 1.0, 0.0, float(most))), 0)
+        count = dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, float(most))), 0)
         variance = dr.rcp(square) * (0.5 / self.sigma**2)
         place = (variance - self._variances[0]) * (
             self._counts[0] / (self._variances[1] - self._variances[0])
         )
         lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
-        upper_share = dr.clip(place - lower, 0.0, 1.0)
+        upper_share = clip(place - lower, 0.0, 1.0)
         scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
 
         def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
             light, (step, aside, upper_share, scale) = inputs
             m = first + mi.Float(n)
             k = m * step
-            weights = self._weights(k, mi.UInt32(lower), upper_share)
+            weights = self._weights(k, index_of(lower), upper_share)
             wavelength = 2e3 * math.pi * dr.rcp(k)
             value, share = self._shares(light, below, wavelength, dr.mulsign(m, u))
             lobe = scale * dr.exp(-aside * dr.square(m))
@@ -313,8 +314,8 @@ class DaylightLobes(_Window):
         """Interpolate the smoothed weights of a wavenumber."""
         place = (k - self._waves[0]) * (self._counts[1] / (self._waves[1] - self._waves[0]))
         lower = index_between(dr.floor(place), 0.0, self._counts[1] - 1.0)
-        t = dr.clip(place - lower, 0.0, 1.0)
-        values = read_record(self._smoothed, row * self._counts[1] + mi.UInt32(lower), 4 * CHANNELS)
+        t = clip(place - lower, 0.0, 1.0)
+        values = read_record(self._smoothed, row * self._counts[1] + index_of(lower), 4 * CHANNELS)
         return [
             dr.lerp(
                 dr.lerp(values[c], values[CHANNELS + c], t),

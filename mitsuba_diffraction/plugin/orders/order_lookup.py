@@ -19,6 +19,7 @@ from ...optics.orders import (
 )
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners
+from ..arithmetic import float_of, index_of, maximum
 from ..memory import index_between, once_a_table, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 
@@ -111,7 +112,7 @@ class OrderLookup:
             light from below a sheet.
         wavelength : in vacuum, nm.
         """
-        vacuum, wavelength = wavelength, dr.maximum(wavelength, self._ends[0])
+        vacuum, wavelength = wavelength, maximum(wavelength, self._ends[0])
         x, y = (incident.x * (-1.0 / self.index), incident.y * (1.0 / self.index))
         inverse = self._period * dr.rcp(wavelength)
         place = order_cell(x, y, inverse, self._last, _MIN_DIVISOR)
@@ -120,26 +121,26 @@ class OrderLookup:
             _smooth(place.t), _smooth(place.r),
             self._w(wavelength, place.k_continuous),
         ]  # fmt: skip
-        kind = mi.UInt32(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
-        channels = mi.UInt32(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
+        kind = index_of(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
+        channels = index_of(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
         lit = (vacuum >= self._reach[0]) & (vacuum <= self._reach[1])
         cell, weights = mi.UInt32(0), [dr.select(lit, mi.Float(1.0), 0.0)]
         for coordinate, count in zip(places, self._cells, strict=True):
             position = coordinate * float(count)
             lower = index_between(dr.floor(position), 0.0, count - 1.0)
             share = position - lower
-            cell = cell * count + mi.UInt32(lower)
+            cell = cell * count + index_of(lower)
             weights = [
                 part for weight in weights for part in (weight - weight * share, weight * share)
             ]
-        ports, port = channels * self._sides, mi.UInt32(channel)
+        ports, port = channels * self._sides, index_of(channel)
         if self._sides == 2:
             port += dr.select(cos_i < 0.0, channels, 0)
         start = read(mi.UInt32, self._starts, kind) + (cell * ports + port) * (ports + 1)
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
-        light = mi.UInt32(channel), channels, weights, incident, vacuum, face
+        light = index_of(channel), channels, weights, incident, vacuum, face
         return Row(kind, cell, start, *light)
 
     @staticmethod
@@ -147,9 +148,9 @@ class OrderLookup:
         row: Row, order: Float, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
         """Return an order's port and its validity; evanescent orders have port 0 or a lower one."""
-        q = mi.Float(row.channel) - order
-        propagates = active & (q >= 0.0) & (q < mi.Float(row.channels))
-        q = mi.UInt32(dr.select(propagates, q, 0.0))
+        q = float_of(row.channel) - order
+        propagates = active & (q >= 0.0) & (q < float_of(row.channels))
+        q = index_of(dr.select(propagates, q, 0.0))
         if below is not None:
             q += dr.select(below, row.channels, 0)
         return q, propagates
@@ -190,7 +191,7 @@ class OrderLookup:
         def at(port: Index) -> tuple[Float, Mask]:
             below = port >= row.channels
             q = port if self._sides == 1 else port - dr.select(below, row.channels, 0)
-            return mi.Float(row.channel) - mi.Float(q), below
+            return float_of(row.channel) - float_of(q), below
 
         def body(port: Index, reached: Float) -> tuple[Index, Float]:
             order, below = at(port)

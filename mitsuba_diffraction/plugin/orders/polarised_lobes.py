@@ -23,6 +23,7 @@ from ...optics.fresnel import amplitudes
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import matrices
 from ...tables.orders.polarised import ODD
+from ..arithmetic import maximum, minimum
 from ..boundary import mueller, turn, turned
 from ..directions import Pair
 from ..memory import read, read_record, upload
@@ -72,7 +73,7 @@ class PolarisedLookup(OrderLookup):
         share = mi.Float(1.0)
         if self.coated:
             within = self._between(row, q, 0, active)
-            share = dr.minimum(elements[0] * dr.rcp(dr.maximum(within, _MIN_DIVISOR)), 1.0)
+            share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
         factors = [y if odd else 1.0 for odd in ODD.ravel().tolist()]
         return Wave(_nearest([x * f for x, f in zip(elements, factors, strict=True)]), share)
 
@@ -96,14 +97,14 @@ class PolarisedLobes(SpectralLobes):
                 wave = self.lookup.wave(light.row, order, y, lobe > 0.0)
                 lobe = lobe * light.peak
                 face = dr.select(order == 0.0, light.row.face, 0.0)
-                power = dr.maximum(efficiency - face, 0.0) * lobe * wave.share
+                power = maximum(efficiency - face, 0.0) * lobe * wave.share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
-                root = dr.sqrt(dr.maximum(power, _MIN_POWER))  # has a derivative
+                root = dr.sqrt(maximum(power, _MIN_POWER))  # has a derivative
                 jones.append(tuple(entry * root for entry in wave.jones))
             total += path.diffracted(jones)
         if self.lookup.coated:
-            rest = [dr.maximum(a - b, 0.0) for a, b in zip(left, faces, strict=True)]
+            rest = [maximum(a - b, 0.0) for a, b in zip(left, faces, strict=True)]
             total += path.mirrored(faces) + mi.depolarizer(mi.UnpolarizedSpectrum(rest))
         return total
 
@@ -130,7 +131,7 @@ class _Path:
     def mirrored(self, powers: list[Float]) -> Spectrum:
         """Return the Mueller matrices of the coat's face, of mean reflected powers."""
         r_s, r_p = amplitudes(self._cosine, 1.0 - dr.square(self._cosine), self._index)
-        inverse = dr.rsqrt(dr.maximum(0.5 * (dr.square(r_s) + dr.square(r_p)), _MIN_DIVISOR))
+        inverse = dr.rsqrt(maximum(0.5 * (dr.square(r_s) + dr.square(r_p)), _MIN_DIVISOR))
         roots = [dr.sqrt(power) * inverse for power in powers]
         zero = mi.Float(0.0)
         s = _level(self._ends[0])
@@ -153,7 +154,7 @@ class _Path:
         sign = -1.0 if enters else 1.0
         inside = sign * mi.Vector3f(*refracted(sign * outside, mi.Float(self._index)))
         powers = transmittances(dr.abs(outside.z), mi.Float(self._index))
-        inverse = dr.rcp(dr.maximum(0.5 * (powers[0] + powers[1]), _MIN_DIVISOR))
+        inverse = dr.rcp(maximum(0.5 * (powers[0] + powers[1]), _MIN_DIVISOR))
         through_s, through_p = (dr.sqrt(power * inverse) for power in powers)
         s, zero = _level(outside), mi.Float(0.0)
         first, last = (outside, inside) if enters else (inside, outside)
@@ -167,13 +168,13 @@ class _Path:
 def _across(axis: Vector3f, direction: Vector3f) -> Vector3f:
     """Return a unit vector, made perpendicular to a direction."""
     across = dr.fma(direction, -dr.dot(axis, direction), axis)
-    return across * dr.rsqrt(dr.maximum(dr.squared_norm(across), _MIN_DIVISOR))
+    return across * dr.rsqrt(maximum(dr.squared_norm(across), _MIN_DIVISOR))
 
 
 def _level(direction: Vector3f) -> Vector3f:
     """Return s = ẑ×d/|ẑ×d|, y along the normal."""
     square = dr.square(direction.x) + dr.square(direction.y)
-    inverse = dr.rsqrt(dr.maximum(square, SAME_DIRECTION))
+    inverse = dr.rsqrt(maximum(square, SAME_DIRECTION))
     level = mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)
     return dr.select(square > SAME_DIRECTION, level, mi.Vector3f(0.0, 1.0, 0.0))
 
@@ -210,11 +211,11 @@ def _nearest(m: list[Float]) -> Jones:
     largest, most = columns[0], powers[0].real
     for column, power in zip(columns[1:], powers[1:], strict=True):
         larger = power.real > most
-        most = dr.maximum(most, power.real)
+        most = maximum(most, power.real)
         largest = [dr.select(larger, a, b) for a, b in zip(column, largest, strict=True)]
     vector = [
         sum((columns[n][row] * largest[n] for n in range(1, 4)), columns[0][row] * largest[0])
         for row in range(4)
     ]
-    inverse = dr.rsqrt(dr.maximum(0.5 * sum(map(squared, vector)), _MIN_DIVISOR**2))
+    inverse = dr.rsqrt(maximum(0.5 * sum(map(squared, vector)), _MIN_DIVISOR**2))
     return tuple(entry * inverse for entry in vector)
