@@ -24,11 +24,21 @@ WARM_UP = 2
 
 def kernel_seconds(call: Callable[[], Any]) -> float:
     """Return the execution time of the kernels of one call, s, without tracing in Python."""
+    return sum(kernel["execution_time"] for kernel in _kernels(call)) * 1e-3
+
+
+def kernel_operations(call: Callable[[], Any]) -> int:
+    """Return the number of Dr.Jit's operations in the kernels of one call, loops counted once."""
+    return sum(kernel.get("operation_count", 0) for kernel in _kernels(call))
+
+
+def _kernels(call: Callable[[], Any]) -> list[dict[str, Any]]:
+    """Run a call; return Dr.Jit's records of its kernels."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         dr.eval(call())
         dr.sync_thread()
-        return sum(entry["execution_time"] for entry in dr.kernel_history()) * 1e-3
+        return list(dr.kernel_history())
 
 
 def rounds_of(

@@ -47,17 +47,21 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
     On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
     mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
     have no such arrays: there it stays NumPy's, in single precision for want of `mi.Float16`.
-    Filled up to an even count with a zero, for `read`.
     """
     if not dr.is_jit_v(mi.Float):
         return values.astype(np.float32 if kind is mi.Float16 else values.dtype).ravel()
-    array = kind(np.pad(values.ravel(), (0, values.size % 2))) * dr.opaque(kind, 1)
+    array = kind(values.ravel()) * dr.opaque(kind, 1)
     dr.eval(array)
     return array
 
 
+def upload_numbers(kind: Kind, values: NDArray[np.generic]) -> Buffer:
+    """Upload an array for `read`, filled up to an even count with a zero."""
+    return upload(kind, np.pad(values.ravel(), (0, values.size % 2)))
+
+
 def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:
-    """Gather a number per lane from an uploaded array; 0 in inactive lanes."""
+    """Gather a number per lane from an array of `upload_numbers`; 0 in inactive lanes."""
     if not dr.is_jit_v(mi.Float):
         return kind(source[index] if active else 0)
     if dr.backend_v(mi.Float) is not dr.JitBackend.LLVM:

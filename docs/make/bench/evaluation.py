@@ -15,7 +15,13 @@ import mitsuba as mi
 import numpy as np
 
 from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.analysis.timing import Queries, kernel_seconds, ratio, rounds_of
+from mitsuba_diffraction.analysis.timing import (
+    Queries,
+    kernel_operations,
+    kernel_seconds,
+    ratio,
+    rounds_of,
+)
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.tables.colour.table import ColourTable
@@ -39,7 +45,7 @@ from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake
 
 FLOOR = "bare gathers of the defaults"
-_TIMES = "ns/call"
+_TIMES, _OPERATIONS = "ns/call", "operations"
 _EVAL = "× eval"
 _BASELINES = {
     "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
@@ -92,7 +98,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         ],
         THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }
-    return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals)
+    return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals, operations_of(calls))
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
@@ -109,7 +115,7 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
             calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
     lanes = dict.fromkeys(calls, plan.lanes)
     times = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
-    sections = []
+    operations, sections = operations_of(calls), []
     for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
         nanoseconds = {name: times[f"{what} {name}"] for name in names}
         evals = {name: ratio(nanoseconds[name], times[f"eval {name}"]) for name in names}
@@ -119,11 +125,17 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
             if most is not None
         }
         title = f"{what}: {_conditions(plan, tables)}"
-        section = _section(title, nanoseconds, dict.fromkeys(nanoseconds, plan.lanes), goals)
+        counts = {name: operations[f"{what} {name}"] for name in names}
+        section = _section(title, nanoseconds, dict.fromkeys(names, plan.lanes), goals, counts)
         for row in section.rows:
             row.values[_EVAL] = evals[row.name]
         sections.append(replace(section, columns=(*section.columns, _EVAL)))
     return sections
+
+
+def operations_of(calls: Mapping[str, Callable[[], Any]]) -> dict[str, int]:
+    """Return the number of operations in each call's kernels."""
+    return {name: kernel_operations(call) for name, call in calls.items()}
 
 
 def _queries(plan: Plan, slow: bool) -> Queries:
@@ -156,6 +168,7 @@ def _section(
     times: dict[str, list[float]],
     lanes: dict[str, int],
     goals: Mapping[str, Sequence[Goal]],
+    operations: Mapping[str, int],
 ) -> Section:
     baselines = {heading: name for heading, name in _BASELINES.items() if name in times}
     rows = []
@@ -163,9 +176,10 @@ def _section(
         values: dict[str, float | None] = {_TIMES: statistics.median(taken)}
         for heading, baseline in baselines.items():
             values[heading] = ratio(taken, times[baseline])
+        values[_OPERATIONS] = operations[name]
         raw = {"ns": taken, "lanes": lanes[name]}
         rows.append(Row(name, values, goals.get(name, ()), raw))
-    return Section(title, (_TIMES, *baselines), rows)
+    return Section(title, (_TIMES, *baselines, _OPERATIONS), rows)
 
 
 def measure_colours(

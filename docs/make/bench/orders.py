@@ -10,7 +10,13 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.analysis.timing import Queries, kernel_seconds, ratio, rounds_of
+from mitsuba_diffraction.analysis.timing import (
+    Queries,
+    kernel_operations,
+    kernel_seconds,
+    ratio,
+    rounds_of,
+)
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.progress import Progress
 
@@ -67,13 +73,14 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
         values: dict[str, float | None] = {
             "ns/call": 1e9 * statistics.median(taken) / plan.lanes,
             "× roughconductor": times,
+            "operations": kernel_operations(calls[what, name]),
         }
         rows.append(Row(f"{what} {name}", values, goals, {"seconds": taken}))
     title = (
         f"solved orders: {mi.variant()}, {plan.lanes} random pairs of directions; kernels alone, "
         f"medians of {plan.rounds} rounds"
     )
-    return Section(title, ("ns/call", "× roughconductor"), rows)
+    return Section(title, ("ns/call", "× roughconductor", "operations"), rows)
 
 
 def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.analysis.timing import SEED, ratio, rounds_of
+from mitsuba_diffraction.analysis.timing import SEED, kernel_operations, ratio, rounds_of
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.plugin.power import PowerModel
 from mitsuba_diffraction.plugin.sampling import EVEN
@@ -33,7 +33,7 @@ WAVELENGTHS = (450.0, 550.0, 650.0)
 #: Samples a pixel of the rendering in which bright pixels are looked for.
 FIREFLY_SPP = 64
 # Of the snake's scene.
-_COLUMNS = ("ms", "ns/sample", "× roughconductor")
+_COLUMNS = ("ms", "ns/sample", "× roughconductor", "operations")
 _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
 
 
@@ -325,7 +325,8 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
     for name, taken in seconds.items():
         median = statistics.median(taken)
         to_rough = ratio(taken, seconds[_ROUGH])
-        values = (1e3 * median, 1e9 * median / samples, to_rough)
+        operations = kernel_operations(partial(mi.render, scene_of[name], spp=plan.spp))
+        values = (1e3 * median, 1e9 * median / samples, to_rough, operations)
         goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
         rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken}))
     title = (

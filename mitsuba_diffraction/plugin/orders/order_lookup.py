@@ -20,7 +20,7 @@ from ...optics.orders import (
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners
 from ..arithmetic import float_of, index_of, maximum
-from ..memory import index_between, once_a_table, read, read_record, upload
+from ..memory import index_between, once_a_table, read, read_record, upload, upload_numbers
 from ..types import Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
@@ -90,7 +90,7 @@ class OrderLookup:
     def __init__(self, table: OrderTable) -> None:
         records = corners(table)
         self._cells = records.cells
-        self._starts = upload(mi.UInt32, records.starts)
+        self._starts = upload_numbers(mi.UInt32, records.starts)
         self._values = upload(mi.Float16, records.values)
         self._period = 1e3 * table.optical_period
         self._last = float(table.last_band)
