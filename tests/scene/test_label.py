@@ -97,7 +97,9 @@ def test_on_a_card_it_is_the_picture(tmp_path: Path, parts: Any, gentle: dict[st
     check(seen, colours(parts)[rows][:, columns, 0])
 
 
-@pytest.mark.parametrize(("name", "turn"), [("board.obj", 0), ("board.obj", 1), ("board.ply", 3)])
+@pytest.mark.parametrize(
+    ("name", "turn"), [("board.obj", 0), ("board.obj", 1), ("board.ply", 3), ("board.glb", 0)]
+)
 def test_on_a_mesh_it_is_as_a_diffuse_texture_on_an_obj(
     tmp_path: Path, parts: Any, gentle: dict[str, str], name: str, turn: int
 ) -> None:

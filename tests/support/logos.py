@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
@@ -52,14 +53,21 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
             lines.append("f " + " ".join(ends))
         file.write_text("\n".join(lines) + "\n")
         return
-    rows, faces = [], []
-    for number, quad in enumerate(quads):
-        places = front if number == 0 else uv * 0.1 + 7
-        rows += [f"{' '.join(map(str, corners[v]))} {places[k][0]:.6f} {places[k][1]:.6f}"
-                 for k, v in enumerate(quad)]  # fmt: skip
-        a = 4 * number
-        faces += [f"3 {a} {a + 1} {a + 2}", f"3 {a} {a + 2} {a + 3}"]
+    places = [front if n == 0 else uv * 0.1 + 7 for n in range(len(quads))]
+    rows = [
+        (*corners[v], *places[n][k]) for n, quad in enumerate(quads) for k, v in enumerate(quad)
+    ]
+    firsts = range(0, len(rows), 4)
+    faces = [(a, a + k, a + k + 1) for a in firsts for k in (1, 2)]
+    if file.suffix == ".glb":
+        trimesh = pytest.importorskip("trimesh")
+        table = np.array(rows)
+        visual = trimesh.visual.TextureVisuals(uv=table[:, 3:])
+        trimesh.Trimesh(table[:, :3], faces, visual=visual, process=False).export(file)
+        return
     header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
     header += [f"property float {name}" for name in ("x", "y", "z", "s", "t")]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
-    file.write_text("\n".join([*header, *rows, *faces]) + "\n")
+    lines = [" ".join(f"{value:.6f}" for value in row) for row in rows]
+    lines += [f"3 {a} {b} {c}" for a, b, c in faces]
+    file.write_text("\n".join([*header, *lines]) + "\n")
