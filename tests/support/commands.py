@@ -78,7 +78,8 @@ def run(words: list[str]) -> None:
     _, command, *rest = words
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
     rest = [*without_size(rest), *_smaller(command, rest)]
-    rest = [word for word in rest if word != "--denoise"]  # needs an extra, has tests of its own
+    # need extras, and have tests of their own
+    rest = [word.replace(".mp4", ".webp") for word in rest if word != "--denoise"]
     for option in {"--workers", "--jobs"} & set(rest):  # tests/cluster starts processes
         at = rest.index(option)
         del rest[at : at + 2]
@@ -87,6 +88,8 @@ def run(words: list[str]) -> None:
     if "--preset" in rest:
         at = rest.index("--preset") + 1
         rest[at] = small_look(command, rest[at])
+    if "--addon" in rest and "--with" not in rest:  # all named looks take minutes
+        rest += ["--with", "cd-osl"]
     if command == "render" and "--frames" in rest:
         rest += ["--frames", "2"]
     assert main([command, *rest]) == 0, words
@@ -152,6 +155,7 @@ def small_tree(folder: Path) -> Path:
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
     Image.fromarray(grey).save(folder / "cow.png")
     mi.Bitmap(np.full((4, 8, 3), 0.4, np.float32)).write(str(folder / "sky.hdr"))
+    (folder / "skin-osl").symlink_to("cd-osl")  # which a command before exports
     drawn(32, 1).save(folder / "logo.png")
     write_board(folder / "bottle.obj")
     (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
