@@ -90,7 +90,7 @@ def run(words: list[str]) -> None:
         rest[at] = small_look(command, rest[at])
     if "--addon" in rest and "--with" not in rest:  # all named looks take minutes
         rest += ["--with", "cd-osl"]
-    if command == "render" and "--frames" in rest:
+    if command == "render" and {"--frames", "--orbit"} & set(rest):
         rest += ["--frames", "2"]
     assert main([command, *rest]) == 0, words
     if "-o" in rest:
