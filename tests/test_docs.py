@@ -23,7 +23,7 @@ from tests.support.pages import FENCE, PAGES, blocks, first_columns, spans, type
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 BLENDER_OPTIONS = {"--", "--python"} | set(
-    re.findall(r'"(--[a-z]+)"', (PACKAGE / "osl/blender_material.py").read_text(encoding="utf-8"))
+    re.findall(r'"(--[a-z-]+)"', (PACKAGE / "osl/blender_material.py").read_text(encoding="utf-8"))
 )
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
