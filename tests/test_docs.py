@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import io
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -14,6 +16,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.files import MESHES
+from mitsuba_diffraction.osl import blender_material
 from mitsuba_diffraction.scene.parameters import parameters_of
 from mitsuba_diffraction.scene.stage import STUDIO
 from scenes.make.__main__ import build_parser as meshes_parser
@@ -22,9 +25,9 @@ from tests.support.pages import FENCE, PAGES, blocks, first_columns, spans, type
 
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
-BLENDER_OPTIONS = {"--", "--python"} | set(
-    re.findall(r'"(--[a-z-]+)"', (PACKAGE / "osl/blender_material.py").read_text(encoding="utf-8"))
-)
+with contextlib.redirect_stdout(io.StringIO()) as script_help, contextlib.suppress(SystemExit):
+    blender_material.run(["--help"])
+BLENDER_OPTIONS = {"--", "--python"} | set(re.findall(r"--[a-z-]+", script_help.getvalue()))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 _COMMAND = re.compile(r"(\.venv/bin/)?(mitsuba-diffraction|python -m|make) ")
