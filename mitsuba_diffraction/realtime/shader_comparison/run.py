@@ -221,10 +221,12 @@ class Comparison:
         exposure = exposure_of(direct.mean)
         errors = difference(direct.mean, picture.mean, None, exposure)
         self._write(picture.mean, f"{method}_whole", self.frames)
-        bounced = None
+        beside_full: dict[str, Any] = {"full": None, "dark_region": None}
         if full is not None:
             bounced = self._draw_progressive(method, frames, bounces=True).picture.mean
             self._write(bounced, f"{method}_bounces", frames)
+            beside_full["full"] = difference(full, bounced, None, exposure_of(full))
+            beside_full["dark_region"] = dark_region(full, bounced)
         write_sheet(
             self.folder / f"{method}.png", direct.mean, picture.mean, full, method=method,
             errors=errors, compared=None, exposure=exposure,
@@ -233,8 +235,7 @@ class Comparison:
         fine = (side * renderer.camera.size[0], side * renderer.camera.size[1])
         return {
             "direct": errors,
-            "full": None if full is None else difference(full, bounced, None, exposure_of(full)),
-            "dark_region": None if full is None else dark_region(full, bounced),
+            **beside_full,
             "noise": picture.noise(exposure),
             "frames": frames,
             "samples": self.frames * side**2,
