@@ -60,9 +60,9 @@ OSL = Consumer(
         Feature.LIMITED: "export a table of all orders, or the height field",
         Feature.MIX: "export its surfaces one by one, and mix their shaders in Blender",
         Feature.VARYING_ORIENTATION: "export a number, and give the texture to the script in "
-        "Blender: --orientation FILE",
-        Feature.VARYING_LENGTH: "export a number, and give the texture to the script in Blender: "
-        "--stretch FILE",
+        "Blender as its orientation",
+        Feature.VARYING_LENGTH: "export a number, and give the texture to the script in Blender "
+        "as its stretch",
         Feature.TRANSMISSION: "export a table of the reflecting side, or render it with Mitsuba",
     },
     left_out={

@@ -33,6 +33,7 @@ def ran(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_blender_that_cannot_show_it_is_one_line(tmp_path, version, with_osl, said):
     text = ".".join(map(str, version))
     (tmp_path / "bpy.py").write_text(_BPY.format(version=version, text=text))
+    (tmp_path / "mathutils.py").touch()
     (tmp_path / "_cycles.py").write_text(f"with_osl = {with_osl}\n")
     done = ran(tmp_path)
     assert done.returncode == 1

@@ -51,7 +51,7 @@ def test_every_scene_is_shown():
     shown = {shlex.split(p.commands[-1])[1] for p in gallery.PICTURES if p.page == "gallery"}
     # for the others to include, and one that needs no picture: docs/meshes.md works with it
     parts = {"from_blender", "daylight", "lamp", "room", "skin", "skin_two", "studio", "window"}
-    parts |= {"environment", "outdoors"}
+    parts |= {"environment", "outdoors", "label", "ring"}
     scenes = {path.stem for path in (ROOT / "scenes").glob("*.xml")} - parts
     assert shown == {f"scenes/{name}.xml" for name in scenes}
 

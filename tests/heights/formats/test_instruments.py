@@ -152,7 +152,7 @@ def test_a_channel_on_a_non_uniform_grid_is_refused(tmp_path, monkeypatch):
 
 def test_without_the_package_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography.IO", None)
-    assert "[afm]" in refusal(write(tmp_path))
+    assert "(extra afm)" in refusal(write(tmp_path))
 
 
 def test_unknown_files_list_what_is_known(tmp_path):
