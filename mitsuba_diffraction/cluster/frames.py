@@ -108,10 +108,10 @@ class Film:
     client : `distributed.Client`.
     scene : XML file.
     frames : to render, in this order.
-    variant : that is set here; workers set it, too.
+    variant : variant of this process, which workers set too.
     sensor, preview, threads : as in `cluster.render`.
     keep : folder of sums that wait for their picture.
-    warn : called with lines that are worth one.
+    warn : called with the text of each warning.
     """
 
     def __init__(

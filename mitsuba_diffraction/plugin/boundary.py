@@ -95,7 +95,7 @@ class Boundary:
         """Return N' of a pair, or its Mueller matrix, for each channel.
 
         wavenumbers : of the channels, rad/µm.
-        mode : whether light comes along ωo (radiance) or along ωi (importance).
+        mode : direction of the light, along ωo (radiance) or along ωi (importance).
         """
         if isinstance(self.material, Perfect):
             return mi.depolarizer(mi.UnpolarizedSpectrum(dr.square(pair.one_plus_dot)))

@@ -274,7 +274,7 @@ class OrderTable:
 def check_outline(
     period: float, wavelengths: Sequence[float], superstrate: float, thin: bool = False
 ) -> None:
-    """Refuse a period, wavelengths or index of which there can be no table.
+    """Refuse a period, wavelengths or an index outside their ranges.
 
     Raises a DiffractionError with the allowed values.
     """
