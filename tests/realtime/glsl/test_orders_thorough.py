@@ -17,9 +17,9 @@ pytestmark = pytest.mark.thorough
 @pytest.mark.parametrize("name", ["cd", "grating"])
 @pytest.mark.usefixtures("gl")
 def test_scenes_look_as_path_traced(name: str, tmp_path: Path, some_variant: str) -> None:
-    scene = load_scene(SCENES / f"{name}.xml", {"resx": "16", "resy": "12"})
+    scene = load_scene(SCENES / f"{name}.xml", {"resx": "24", "resy": "18"})
     comparison = Comparison(
-        scene, name, mi.variant(), tmp_path / "compared", spp=6144, full_spp=0, frames=128,
+        scene, name, mi.variant(), tmp_path / "compared", spp=6144, full_spp=0, frames=256,
         supersampling=6,
     )  # fmt: skip
     whole = comparison.run(["fast"])["methods"]["fast"]["whole"]
