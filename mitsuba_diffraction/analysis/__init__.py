@@ -5,6 +5,8 @@ Contents
 export         files of a BRDF for other programs
 maps           BRDF maps over the hemisphere of view directions
 spectra        reflectance spectra as a spectrometer measures them
+spectrometer   angles of lamp and detectors, and the detectors' cones
+media          clear media above a surface, and their index over wavelength
 spectra_files  CSV, colours and plot of spectra
 observers      eyes of animals: sensitivities, quantum catches, contrasts
 false_colour   pictures of an eye's quantum catches

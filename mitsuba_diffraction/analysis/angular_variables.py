@@ -9,6 +9,7 @@ Checked: the abstract, which has five variables for every pair of angles. Not ch
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ def angular_variables(
     wavelengths: ArrayLike,
     azimuth: float = 0.0,
     acceptance: float = 2.0,
+    before: Callable[[float], None] | None = None,
     progress: Progress = silent,
 ) -> dict[str, float]:
     """Return `fitted` of a surface's B2 and H1 for all `LAMPS` and `DETECTORS`.
@@ -55,7 +57,7 @@ def angular_variables(
         progress(n, len(LAMPS), "lamps")
         rows += colours_of(
             spectrum(bsdf, float(lamp), DETECTORS.tolist(), light_azimuth=azimuth,
-                     acceptance=acceptance, wavelengths=inside)
+                     acceptance=acceptance, wavelengths=inside, before=before)
         )  # fmt: skip
     brightness, hue = (np.array([row[name] for row in rows]) for name in ("B2", "H1"))
     return fitted(np.repeat(LAMPS, len(DETECTORS)), collected, brightness, hue)

@@ -11,22 +11,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..errors import DiffractionError, DiffractionWarning, quoted
+from ..errors import DiffractionWarning
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions
 from ..heights.recipes import Recipe
-from ..optics.materials import index_at_sodium
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.orders import OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
-
-#: Largest index of a medium above a surface.
-MOST_MEDIUM = 2.0
 
 
 class Scan(NamedTuple):
@@ -51,33 +47,6 @@ def read_scan(path: Path, options: LoadOptions, settings: Mapping[str, Any]) -> 
         return Scan([load_heights(path, options)], TableSettings(**settings))
     recipe = Recipe.load(path)
     return Scan(recipe.fields(options), TableSettings(**{**recipe.table, **settings}))
-
-
-def in_medium(scan: Scan, ext_ior: str | float | None) -> Scan:
-    """Return a scan for light within a medium, whose waves are shorter: lengths times its index.
-
-    ext_ior : index of the medium above the surface, or its name; None for air.
-
-    Raises a DiffractionError if the medium is unknown or absorbs.
-    """
-    index = medium_index(ext_ior)
-    if index == 1.0:
-        return scan
-    line = f"lengths times {index:.5g}, the index of the medium above"
-    patches = [p.changed(index * p.heights, line).stretched(index) for p in scan.patches]
-    return scan._replace(patches=patches)
-
-
-def medium_index(ext_ior: str | float | None) -> float:
-    """Return the index of the medium above a surface as a number; 1 for air."""
-    if ext_ior in (None, "none", "air", "vacuum"):
-        return 1.0
-    index = index_at_sodium(ext_ior, "ext_ior")
-    if isinstance(index, str) or not 1.0 <= index <= MOST_MEDIUM:
-        raise DiffractionError(
-            f"ext_ior={quoted(ext_ior)}: give water, or an index from 1 to {MOST_MEDIUM:g}"
-        )
-    return index
 
 
 def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,6 +32,7 @@ from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
 from .known_wavelengths import check_material
+from .spectrometer import Geometry, across_plane, cone, light_direction, lobe_width
 
 Reals = NDArray[np.float64]
 
@@ -46,68 +47,8 @@ SPECTRA = Consumer(
 )
 #: Default wavelengths: first, last and step, nm.
 FIRST, LAST, STEP = 300.0, 830.0, 5.0
-#: Steepest direction of a lamp or of the edge of a detector's cone, degrees.
-STEEPEST = 89.0
 #: Wavelengths that a spectrum may have.
 MAX_WAVELENGTHS = 10_000
-
-# Nodes of the cone: radii and azimuths per standard deviation of the narrowest lobe, and at least.
-_PER_LOBE, _FEWEST_RADII, _FEWEST_AZIMUTHS = 1.25, 8, 16
-# Most nodes of a cone, a gigabyte of memory: 120° at 300 nm have 2.5 million under 65 µm.
-_MOST_NODES = 1 << 22
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Angles of a measurement, degrees.
-
-    Raises a DiffractionError if an angle is out of range, there is no detector, or a cone reaches
-    below the surface.
-
-    Parameters
-    ----------
-    light : angle of the lamp from the normal, 0 to 89.
-    detectors : angles of the detectors in the plane of incidence; the mirror's is +`light`.
-    azimuth : of the lamp, from the patch's x axis towards its y axis, −360 to 360.
-    acceptance : full angle of the cone that a detector collects.
-    """
-
-    light: float = 30.0
-    detectors: tuple[float, ...] = (30.0,)
-    azimuth: float = 0.0
-    acceptance: float = 2.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.light <= STEEPEST:
-            raise DiffractionError(
-                f"light={self.light:g}: the lamp must be 0 to {STEEPEST:g} degrees from the normal"
-            )
-        if not -360.0 <= self.azimuth <= 360.0:
-            raise DiffractionError(
-                f"light_azimuth={self.azimuth:g} must be from -360 to 360 degrees"
-            )
-        if not 0.01 <= self.acceptance <= 120.0:
-            raise DiffractionError(
-                f"acceptance={self.acceptance:g}: the full angle of the detector's cone must be "
-                "from 0.01 to 120 degrees, e.g. 2"
-            )
-        if not self.detectors:
-            raise DiffractionError("there is no detector; give at least one angle, e.g. 30")
-        furthest = STEEPEST - 0.5 * self.acceptance
-        for angle in self.detectors:
-            if not abs(angle) <= furthest:
-                raise DiffractionError(
-                    f"detector={angle:g}: a cone of {self.acceptance:g} degrees around it reaches "
-                    f"below the surface; detectors must be from {-furthest:g} to {furthest:g} "
-                    "degrees from the normal"
-                )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the detectors' columns that R keeps: light30_detectorm10 at −10°."""
-        return tuple(
-            f"light{self.light:g}_detector{angle:g}".replace("-", "m") for angle in self.detectors
-        )
 
 
 @dataclass(frozen=True)
@@ -160,6 +101,7 @@ def spectrum(
     acceptance: float = 2.0,
     relative: str = "white",
     wavelengths: ArrayLike | None = None,
+    before: Callable[[float], None] | None = None,
     progress: Progress = silent,
 ) -> Spectra:
     """Return the reflectance spectra of a surface in a spectrometer.
@@ -179,6 +121,8 @@ def spectrum(
         perfect mirror, seen where it reflects the lamp to; "none", the share of the incident light
         that enters the detector.
     wavelengths : nm; default: 360 to 830 in steps of 5.
+    before : called with each wavelength, nm, before it is measured, to change the BSDF's
+        parameters that depend on it, as `media.follow` does.
     progress : called as progress(done, total, text).
     """
     geometry = Geometry(light, tuple(float(d) for d in detectors), light_azimuth, acceptance)
@@ -205,7 +149,7 @@ def spectrum(
                 "longer ones, or build a wider table with "
                 "DiffractionTable.build"
             )
-    signals = _signals(bsdf, sigma, geometry, lam, progress)
+    signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)
         # ∫ cosθ/π dω over a cone about a direction at θ: cosθ sin²(half)
@@ -281,93 +225,51 @@ def _interaction(view: Any) -> Any:
 
 
 def _signals(
-    bsdf: Any, sigma: float | None, geometry: Geometry, lam: Reals, progress: Progress
+    bsdf: Any,
+    sigma: float | None,
+    geometry: Geometry,
+    lam: Reals,
+    before: Callable[[float], None] | None,
+    progress: Progress,
 ) -> Reals:
     """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
-    lobe = _lobe(sigma, lam)
+    lobe = lobe_width(sigma, lam)
     parts = 3 if mi.is_polarized else 1
     result = np.zeros((parts, lam.size, len(geometry.detectors)))
     for n, angle in enumerate(geometry.detectors):
         progress(n, len(geometry.detectors), "detectors")
-        directions, weights = _cone(geometry, angle, lobe)
-        result[:, :, n] = _integrals(bsdf, geometry, lam, directions, weights)
+        directions, weights = cone(geometry, angle, lobe)
+        result[:, :, n] = _integrals(bsdf, geometry, lam, before, directions, weights)
     progress(len(geometry.detectors), len(geometry.detectors), "detectors")
     return result
 
 
-def _lobe(sigma: float | None, lam: Reals) -> float:
-    """Return the standard deviation of the narrowest lobe, rad: of exp(−σ²k²Δ²), 1/(√2 σk)."""
-    return 0.05 if sigma is None else 1.0 / (2**0.5 * sigma * float(wavenumber(lam[0])))
-
-
-def _light(geometry: Geometry) -> Reals:
-    """Return the unit vector (3,) towards the lamp."""
-    return _in_plane(geometry, -geometry.light)
-
-
-def _in_plane(geometry: Geometry, angle: float) -> Reals:
-    """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
-    theta, phi = math.radians(-angle), math.radians(geometry.azimuth)
-    return np.array(
-        [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
-    )
-
-
-def _cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
-    """Return directions (m, 3) in a detector's cone and their solid angles (m,).
-
-    Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge is
-    sharp, and lobes inside are smooth.
-    """
-    half = math.radians(0.5 * geometry.acceptance)
-    radii = max(math.ceil(_PER_LOBE * half / lobe), _FEWEST_RADII)
-    around = max(math.ceil(_PER_LOBE * 2.0 * math.pi * half / lobe), _FEWEST_AZIMUTHS)
-    if radii * around > _MOST_NODES:
-        narrower = geometry.acceptance * math.sqrt(_MOST_NODES / (radii * around))
-        raise DiffractionError(
-            f"acceptance={geometry.acceptance:g}: the lobes of so wide a coherence window are too "
-            f"fine to add up over this cone; take at most {0.99 * narrower:.2g} degrees"
-        )
-    nodes, weights = np.polynomial.legendre.leggauss(radii)
-    alpha = 0.5 * half * (nodes + 1.0)
-    psi = 2.0 * np.pi * (np.arange(around) + 0.5) / around
-    alpha, psi = (a.ravel() for a in np.meshgrid(alpha, psi, indexing="ij"))
-    axis = _in_plane(geometry, angle)
-    across = _across(geometry)
-    along = np.cross(across, axis)
-    directions = (
-        np.cos(alpha)[:, None] * axis
-        + (np.sin(alpha) * np.cos(psi))[:, None] * along
-        + (np.sin(alpha) * np.sin(psi))[:, None] * across
-    )
-    solid = np.repeat(0.5 * half * weights, around) * np.sin(alpha) * 2.0 * np.pi / around
-    return directions, solid
-
-
-def _across(geometry: Geometry) -> Reals:
-    """Return the unit vector (3,) normal to the plane of incidence: s."""
-    phi = math.radians(geometry.azimuth)
-    return np.array([-math.sin(phi), math.cos(phi), 0.0])
-
-
 def _integrals(
-    bsdf: Any, geometry: Geometry, lam: Reals, directions: Reals, weights: Reals
+    bsdf: Any,
+    geometry: Geometry,
+    lam: Reals,
+    before: Callable[[float], None] | None,
+    directions: Reals,
+    weights: Reals,
 ) -> Reals:
     """Return ∫ f cosθo dωo, (1 or 3, n).
 
     The detector is Mitsuba's camera and the lamp its emitter: `eval` has the lamp's cosine, and its
     Mueller matrix is for light that goes from the lamp to the detector.
     """
-    light = _light(geometry)
+    light = light_direction(geometry)
     si = _interaction(mi.Vector3f(*(upload(mi.Float, column) for column in directions.T)))
     towards = mi.Vector3f(*(float(c) for c in light))
     dr.make_opaque(towards)
     turned = weights * directions[:, 2] / light[2]
-    stokes = _stokes(light, _across(geometry))
-    context, packet = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
+    stokes = _stokes(light, across_plane(geometry))
+    context, channels = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
+    packet = channels if before is None else 1
     sums = np.zeros((3 if mi.is_polarized else 1, lam.size))
     for first in range(0, lam.size, packet):
-        index = np.minimum(np.arange(first, first + packet), lam.size - 1)
+        if before is not None:
+            before(float(lam[first]))
+        index = np.minimum(first + np.minimum(np.arange(channels), packet - 1), lam.size - 1)
         values = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in lam[index]])
         dr.make_opaque(values)  # one kernel for all wavelengths
         si.wavelengths = values
@@ -398,8 +300,8 @@ def _of_mirror(sigma: float | None, geometry: Geometry, lam: Reals) -> Reals:
     """
     if sigma is None:
         return np.ones((lam.size, 1))
-    directions, solid = _cone(geometry, geometry.light, _lobe(sigma, lam))
-    light = _light(geometry)
+    directions, solid = cone(geometry, geometry.light, lobe_width(sigma, lam))
+    light = light_direction(geometry)
     squares = np.square(directions[:, :2] + light[:2]).sum(axis=1)
     weights = 4.0 * np.pi**2 * sigma**4 * solid * directions[:, 2]
     signals = [

@@ -35,8 +35,9 @@ from .crops import crops_of
 from .iridescence import WINDOW, chance_iridescence, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
+from .media import in_medium
 from .repeats import sample_of, scan_files, write_repeats
-from .scans import bsdf_of, in_medium, read_scan, table_of
+from .scans import bsdf_of, read_scan, table_of
 from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 

@@ -330,7 +330,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
-    from ..analysis.scans import medium_index
+    from ..analysis.media import medium_index
     from ..plugin.dictionary import ORDERS, bsdf_dict
     from ..plugin.diffraction import Diffraction
     from ..plugin.orders.orders_sheet import diffraction_orders

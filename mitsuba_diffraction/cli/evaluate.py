@@ -191,7 +191,8 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
         method = make(args.method, patch, period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
-    from ..analysis.scans import Scan, bsdf_of, in_medium, table_of
+    from ..analysis.media import in_medium
+    from ..analysis.scans import Scan, bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..scene.load import set_variant
 

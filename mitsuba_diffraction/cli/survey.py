@@ -97,7 +97,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     check_writable(args.output / "survey.csv", make_folder=True)
 
     from ..analysis.known_wavelengths import known_range
-    from ..analysis.scans import medium_index
+    from ..analysis.media import medium_index
     from ..analysis.survey import run_survey
     from ..analysis.treatments import Treatment, load_treatments
 

@@ -45,8 +45,7 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
         if len(conductor) == 1:
             raise DiffractionError(f"{conductor[0]} alone is not a conductor; give both eta and k")
         metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
-        metal.medium = _medium(props, coat)
-        return metal
+        return _in_medium(metal, props, coat)
     return _dielectric(props, read_index(props, "int_ior", KERATIN), coat)
 
 
@@ -68,11 +67,15 @@ def _named(props: Properties, coat: Dielectric | None) -> Reflectance:
         )
         metal = Conductor(eta, k, f"n = {material.real:g} + {material.imag:g}i")
     else:
-        wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
-        metal = Conductor.of_material(material, wavelength)
-        above = material_named(str(props.get("coat_ior", props.get("ext_ior", ""))) or PERFECT)
-        if above in TISSUES:
-            metal.disperse(str(above), wavelength)
+        metal = Conductor.of_material(material, number(props, "wavelength", DEFAULT_WAVELENGTH))
+    return _in_medium(metal, props, coat)
+
+
+def _in_medium(metal: Conductor, props: Properties, coat: Dielectric | None) -> Conductor:
+    """Put a material with an index of its own into the medium above it, with its dispersion."""
+    above = material_named(str(props.get("coat_ior", props.get("ext_ior", ""))) or PERFECT)
+    if above in TISSUES:
+        metal.disperse(str(above), number(props, "wavelength", DEFAULT_WAVELENGTH))
     metal.medium = _medium(props, coat)
     return metal
 

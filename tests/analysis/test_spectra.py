@@ -12,18 +12,14 @@ from hypothesis import strategies as st
 from scipy.special import jv
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.analysis.spectra import (
-    STEEPEST,
-    Geometry,
-    check_wavelengths,
-    mean_spectra,
-)
+from mitsuba_diffraction.analysis.spectra import check_wavelengths, mean_spectra
 from mitsuba_diffraction.analysis.spectra_files import (
     colour_of,
     save_csv,
     save_errors,
     spectra_figure,
 )
+from mitsuba_diffraction.analysis.spectrometer import STEEPEST, Geometry
 from tests.support.acceptance import spectra_and_reference
 from tests.support.variants import obstacle
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.spectra import Geometry, Spectra
+from mitsuba_diffraction.analysis.spectra import Spectra
 from mitsuba_diffraction.analysis.spectral_variables import colours_of
+from mitsuba_diffraction.analysis.spectrometer import Geometry
 
 LAM = np.arange(300.0, 701.0, 1.0)
 

@@ -8,7 +8,8 @@ import mitsuba as mi
 import numpy as np
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.analysis.scans import Scan, in_medium, medium_index
+from mitsuba_diffraction.analysis.media import in_medium, medium_index
+from mitsuba_diffraction.analysis.scans import Scan
 from mitsuba_diffraction.optics.materials import SODIUM, TISSUES
 from mitsuba_diffraction.settings import TableSettings
 from tests.support.directions import Array, rough_patch
