@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.materials import PERFECT, material_named
+from ..optics.materials import PERFECT, lets_light_through, material_named
 from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.pigment import pigment_range
+from ..plugin.support import CONDUCTOR, refusal
 
 Reals = NDArray[np.float64]
 
@@ -18,7 +20,8 @@ Reals = NDArray[np.float64]
 def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
     """Return the wavelengths, nm, between which a material and a pigment beneath it are known.
 
-    Raises a DiffractionError if there is no such material, or the pigment cannot be read.
+    Raises a DiffractionError if there is no such material, it lets no light through to the pigment,
+    or the pigment cannot be read.
     """
     name = PERFECT if material is None else material_named(material)
     limits = None
@@ -28,11 +31,15 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
             raise DiffractionError(unknown_conductor(name))
     first, last = limits or (0.0, math.inf)
     least, most = pigment_range(pigment)
+    if pigment not in (None, "none") and material is not None and not lets_light_through(material):
+        choice = f"material={material}, which lets no light through"
+        raise DiffractionError(refusal("the pigment", replace(CONDUCTOR, choice=choice)))
     return max(first, least), min(last, most)
 
 
 def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
     """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
+    known_range(material, pigment)
     for name, limits in (
         ("material", known_range(material)),
         ("pigment", known_range(None, pigment)),

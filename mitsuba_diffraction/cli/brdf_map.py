@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
@@ -339,6 +340,11 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
     parameters |= surface_parameters(args)
     if (index := medium_index(args.ext_ior)) != 1.0:
+        if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):
+            raise DiffractionError(
+                f"'{args.source}' is a table, of lengths in air; leave --ext-ior out, or give "
+                "heights"
+            )
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)
     for option in options.used_heights_options(args):

@@ -147,14 +147,19 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("option", "named"),
-    [("--material", "kerratin"), ("--ext-ior", "melanin"), ("--pigment", "blueish")],
+    "options",
+    [
+        ("--material", "kerratin"),
+        ("--ext-ior", "melanin"),
+        ("--pigment", "blueish"),
+        ("--pigment", "0.2", "--material", "gold"),
+    ],
 )
 def test_materials_that_are_none_are_refused_before_a_scan_is_measured(
-    run, scans, tmp_path, option, named
+    run, scans, tmp_path, options
 ):
-    line = run("survey", *scans, "-o", tmp_path / "out", option, named).failed_in_one_line()
-    assert named in line
+    line = run("survey", *scans, "-o", tmp_path / "out", *options).failed_in_one_line()
+    assert options[-1] in line
 
 
 def test_treatments_are_those_of_all_patterns_that_match(tmp_path):

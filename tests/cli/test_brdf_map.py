@@ -166,6 +166,13 @@ def test_the_source_is_not_overwritten(run, heights):
     assert "would overwrite its own source" in line
 
 
+def test_a_table_of_lengths_in_air_is_refused_in_water(run, heights):
+    assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
+    line = run("brdf-map", "table.exr", "--ext-ior", "water").failed_in_one_line()
+    assert "table.exr" in line
+    assert "--ext-ior" in line
+
+
 def test_a_missing_source_is_named(run):
     assert "nothing.png" in run("brdf-map", "nothing.png").failed_in_one_line()
 

@@ -71,6 +71,7 @@ def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
         (["--material", "Al", "--wavelength-range", "800", "900"], "885.6 nm"),
         (["--material", "kerratin"], "keratin"),
         (["--pigment", "none.csv"], "none.csv"),
+        (["--material", "gold", "--pigment", "0.2"], "gold"),
         (["--crops", "400"], "crops=400"),
     ],
 )
