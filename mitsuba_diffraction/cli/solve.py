@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import functools
+import itertools
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -21,15 +22,16 @@ from .workers import add_workers, client_of, on_workers
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from ..solve.films import Layers
     from ..solve.orders import Estimate
     from ..solve.recipes import SolvedRecipe
     from ..tables.orders import OrderTable
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "layers", "thin", "wavelength_range", "tolerance",
-    "solver", "resolution", "polarised", "accept", "theta", "phi", "step", "jobs", "workers",
-    "scheduler",
+    "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin",
+    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "accept", "theta", "phi",
+    "step", "jobs", "workers", "scheduler",
 )  # fmt: skip
 
 
@@ -71,6 +73,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; once for "
         "each, from the material upwards; solved by coupled waves",
     )  # fmt: skip
+    group.add_argument(
+        "--beneath", metavar="M:T", type=_layer, action="append",
+        help="layer beneath the grooves, or a file of layers and slices (.toml); once for each, "
+        "from the substrate upwards",
+    )  # fmt: skip
+    group.add_argument("--substrate", metavar="M", help="material below them; default: --material")
     group.add_argument(
         "--thin", action="store_true", default=None,
         help="a thin sheet that light goes through, with these grooves on its upper side; needs an "
@@ -201,7 +209,9 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         thin=recipe.thin or bool(args.thin),
         settings=replace(recipe.settings, **changed),
         output=args.output or recipe.output,
-        layers=recipe.layers if args.layers is None else tuple(args.layers),
+        substrate=recipe.substrate if args.substrate is None else args.substrate,
+        layers=_chained(args.layers, recipe.layers),
+        beneath=_chained(args.beneath, recipe.beneath),
     )
 
 
@@ -239,6 +249,8 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             recipe.material,
             superstrate=recipe.superstrate,
             layers=recipe.layers,
+            beneath=recipe.beneath,
+            substrate=recipe.substrate,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -313,14 +325,24 @@ def _pair(text: str) -> tuple[float, float]:
     return low, high
 
 
-def _layer(text: str) -> tuple[str, float]:
+def _layer(text: str) -> Layers:
+    if text.endswith(".toml"):
+        from ..solve.films import read_layers
+
+        return read_layers(text)
     material, _, thickness = text.rpartition(":")
     try:
-        return material, float(thickness)
+        return ((material, float(thickness)),)
     except ValueError as error:
         raise argparse.ArgumentTypeError(
-            f"expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, got '{text[:40]}'"
+            "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
+            f"'{text[:40]}'"
         ) from error
+
+
+def _chained(given: list[Layers] | None, default: Layers) -> Layers:
+    """Return the layers of all uses of an option."""
+    return default if given is None else tuple(itertools.chain(*given))
 
 
 def _time(seconds: float) -> str:

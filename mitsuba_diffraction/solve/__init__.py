@@ -10,7 +10,8 @@ efficiencies  files of efficiencies, CSV and NetCDF, and their conventions
 listing     `list_orders`: a table's efficiencies as such a file
 profiles    one period of the grooves as a polygon; generators and a reader
 materials   refractive index over wavelength, by name or number
-films       films on a profile
+structure   films on a profile, slices beneath it, and the substrate
+films       their reader and checks
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
 chandezon   solver: coordinates that follow slopes

@@ -19,7 +19,7 @@ from ..tables.orders.lookup import turned_axes
 from ..tables.orders.polarised import mueller_of
 from ..tables.orders.table import check_outline
 from .efficiencies import Efficiencies, check_light
-from .films import Layers, films_of, material_text
+from .films import Layers, Substance, material_text, structure_of
 from .jobs import Jobs, problem_of, solver_of
 from .materials import Material, material_of
 from .measured import table_of
@@ -42,6 +42,8 @@ def solve_beam(
     step: float = 5.0,
     superstrate: float = 1.0,
     layers: Layers = (),
+    beneath: Layers = (),
+    substrate: Substance | None = None,
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] = silent,
@@ -56,8 +58,8 @@ def solve_beam(
     theta, phi : directions to the light, degrees, within the superstrate: from the normal, and from
         x towards y; a grid of both.
     step : between wavelengths, nm; the ends of the settings' wavelengths are solved exactly.
-    profile, material, superstrate, layers, settings, jobs, announce : as for `solve_orders`; the
-        tolerance bounds the solver's error.
+    profile, material, superstrate, layers, beneath, substrate, settings, jobs, announce : as for
+        `solve_orders`; the tolerance bounds the solver's error.
     """
     how, work = settings or Settings(), jobs or Jobs()
     low, high = how.wavelengths
@@ -77,8 +79,10 @@ def solve_beam(
             "solutions; choose fewer directions, or a larger step"
         )
     substance = material_of(material, how.wavelengths)
-    films = films_of(layers, substance, False, how.wavelengths)
-    grating = Grating(profile, substance, superstrate, how.wavelengths, films=films)
+    structure = structure_of(
+        profile, substance, how.wavelengths, layers=layers, beneath=beneath, substrate=substrate
+    )
+    grating = Grating(profile, substance, superstrate, how.wavelengths, structure=structure)
     light = _Lights(grating, lam, polar, azimuth)
     problem = problem_of(grating, how.method, how.resolution or 0)
     middle = light.places[:: max(len(light.places) // _COMPARED, 1)]

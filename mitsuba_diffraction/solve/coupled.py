@@ -4,8 +4,8 @@ The profile is cut into layers with vertical walls, in each of which the field i
 from the Fourier coefficients of ε (Moharam, Grann, Pommet and Gaylord 1995, JOSA A 12, 1068), with
 Li's rules for products of discontinuous functions (Li 1996, JOSA A 13, 1870). One reflection matrix
 serves all channels. Films on the profile, as thick along z everywhere, are further media of layers:
-walls have none, as if they had been evaporated from above. Slopes of metal converge
-slowly in TM: use the integral method for them.
+walls have none, as if they had been evaporated from above. Slices beneath the profile are layers of
+their own. Slopes of metal converge slowly in TM: use the integral method for them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,25 @@ from scipy.linalg import block_diag, toeplitz
 from ..errors import DiffractionError
 from .profiles import Profile
 from .stations import LEAST_NORMAL, Real, Station
+from .structure import Slice, Structure
 
 Complex = NDArray[Any]
 
 # Decimals of µm that tell edges of layers apart
 _DIGITS = 9
+# Number of the medium above: the last one
+_ABOVE = -1
+
+
+class _Filled(NamedTuple):
+    """Intervals (n, 2) of a layer, over the period, with the numbers of a medium and its surround.
+
+    Media are the profile's material, those of the structure, and the medium above.
+    """
+
+    ends: Real
+    medium: int
+    around: int
 
 
 class CoupledWaves:
@@ -39,10 +53,12 @@ class CoupledWaves:
     profile : one period of the grooves; no undercut.
     harmonics : spatial frequencies on either side of the middle one. Slopes are cut into as many
         layers.
-    films : thicknesses of films on the profile, from the material upwards, along z, µm.
+    structure : films on the profile, slices beneath it, and a substrate.
     """
 
-    def __init__(self, profile: Profile, harmonics: int, films: Sequence[float] = ()) -> None:
+    def __init__(
+        self, profile: Profile, harmonics: int, structure: Structure | None = None
+    ) -> None:
         if (np.diff(profile.x) < 0).any():
             raise DiffractionError(
                 f"{profile.name} is undercut, which coupled waves in layers cannot solve; use "
@@ -52,18 +68,20 @@ class CoupledWaves:
         levels = np.unique(profile.z)
         if not _has_walls(profile):
             levels = np.linspace(levels[0], levels[-1], harmonics + 1)
+        around = structure or Structure()
         # surfaces of the material and of each film
-        offsets = np.append(0.0, np.cumsum(films))
+        offsets = np.append(0.0, np.cumsum([film.thickness for film in around.films]))
         edges = np.unique(np.round(np.add.outer(offsets, levels), _DIGITS))[::-1]
-        self._top, self._bottom = float(edges[0]), float(edges[-1])
-        #: Layers from the top: thickness in µm, and intervals (n, 2) below each surface.
+        slices = _slices(around.slices, len(offsets), profile.period)
+        self._top = float(edges[0])
+        self._bottom = float(edges[-1]) - sum(thickness for thickness, _ in slices)
+        self._substrate = 0 if around.substrate is None else len(around.materials)
+        #: Layers from the top: thickness in µm, and what fills them.
         self.layers = [
-            (
-                float(above - below),
-                [_intervals(profile, float(0.5 * (above + below) - up)) for up in offsets],
-            )
+            (float(above - below), _surfaces(profile, float(0.5 * (above + below)), offsets))
             for above, below in pairwise(edges)
         ]
+        self.layers += slices
 
     @property
     def name(self) -> str:
@@ -77,12 +95,12 @@ class CoupledWaves:
                 "coupled waves need a material with an index; use method=integral for a perfect "
                 "conductor"
             )
-        indices = np.stack([station.indices, *station.films], axis=-1)
+        indices = np.stack([station.indices, *station.media], axis=-1)
         pairs = zip(station.wavelengths, indices, station.along, strict=True)
         return np.stack([self._solve(station, *pair) for pair in pairs])
 
     def _solve(self, station: Station, wavelength: float, indices: Complex, y: float) -> Complex:
-        """Return the amplitudes at one wavelength; indices of the material, and of films.
+        """Return the amplitudes at one wavelength; indices of the material, and of the structure.
 
         The scattering matrix of tangential E is carried up from the material (`_across`); through a
         layer of thickness h, R becomes X R X, U becomes X U, and D becomes D X, with X = exp(iqh).
@@ -91,10 +109,10 @@ class CoupledWaves:
         numbers = np.arange(first, first + 2 * self.harmonics + 1)
         x = np.sqrt(1.0 - y**2) * station.sines_of(numbers)
         media = np.append(indices**2, 1.0)
-        below = _uniform(x, y, media[0])
+        below = _uniform(x, y, media[self._substrate])
         total = _material(len(x), station.inside - first)
         for thickness, filled in reversed(self.layers):
-            above = _layer(x, y, media, [ends / self.period for ends in filled])
+            above = _layer(x, y, media, filled)
             total = _across(above, below, total)
             through = np.exp(2j * np.pi * thickness / wavelength * above.q)[:, None]
             total = _Scattering(
@@ -105,7 +123,7 @@ class CoupledWaves:
         total = _across(_uniform(x, y, 1.0), below, total)
         sides = (
             _Side(x[np.arange(station.channels) - first], y, 1.0, -self._top / wavelength),
-            # a metal, whose index is complex, has no channels
+            # of a sheet; a metal, whose index is complex, has no channels
             _Side(x[station.inside - first], y, abs(indices[0]), self._bottom / wavelength),
         )
         rows = np.arange(station.channels) - first
@@ -145,15 +163,11 @@ def _uniform(x: Real, y: float, epsilon: complex) -> _Modes:
     return _Modes(q, np.eye(len(q)), right / q)
 
 
-def _layer(x: Real, y: float, media: Complex, filled: Sequence[Real]) -> _Modes:
-    """Return the modes of a layer.
-
-    media : ε of the material, of films upwards, and of the medium above all of them.
-    filled : intervals (n, 2) below the surface of each but the last, over the period.
-    """
-    whole = [float(np.sum(ends[:, 1] - ends[:, 0])) for ends in filled]
-    if all(share in (0.0, 1.0) for share in whole):
-        return _uniform(x, y, complex(media[int(sum(share == 0.0 for share in whole))]))
+def _layer(x: Real, y: float, media: Complex, filled: Sequence[_Filled]) -> _Modes:
+    """Return the modes of a layer; media : ε by number."""
+    shares = [float(np.sum(part.ends[:, 1] - part.ends[:, 0])) for part in filled]
+    if all(share in (0.0, 1.0) for share in shares):
+        return _uniform(x, y, complex(_summed(media, filled, shares, 1.0)))
     direct = _toeplitz(len(x), media, filled)
     inverse = _toeplitz(len(x), 1.0 / media, filled)
     left, right = _products(x, y, direct, np.linalg.inv(inverse))
@@ -274,20 +288,51 @@ class _Side:
         return np.asarray(self._square > (LEAST_NORMAL * self.index) ** 2)
 
 
-def _toeplitz(n: int, media: Complex, filled: Sequence[Real]) -> Complex:
+def _toeplitz(n: int, media: Complex, filled: Sequence[_Filled]) -> Complex:
     """Return the Toeplitz matrix of the Fourier coefficients of values of `media`, see `_layer`.
 
     Harmonic m has the factor exp(−2πi m x): the numbers of channels rise towards −x.
     """
     m = np.arange(-(n - 1), n)
-    coefficients = np.zeros(len(m), complex)
-    coefficients[n - 1] = media[-1]
-    for step, ends in zip(media[:-1] - media[1:], filled, strict=True):
-        # ∫ exp(2πi m x) dx over the intervals
-        middle, width = ends.mean(axis=1)[:, None], (ends[:, 1] - ends[:, 0])[:, None]
-        terms = width * np.sinc(m * width) * np.exp(2j * np.pi * m * middle)
-        coefficients += step * terms.sum(axis=0)
+    coefficients = _summed(media, filled, [_transform(part.ends, m) for part in filled], m == 0)
     return np.asarray(toeplitz(coefficients[n - 1 :], coefficients[n - 1 :: -1]))
+
+
+def _transform(ends: Real, m: NDArray[np.int64]) -> Complex:
+    """Return ∫ exp(2πi m x) dx over intervals (n, 2)."""
+    middle, width = ends.mean(axis=1)[:, None], np.diff(ends)
+    terms = width * np.sinc(m * width) * np.exp(2j * np.pi * m * middle)
+    return np.asarray(terms.sum(axis=0))
+
+
+def _summed(media: Complex, filled: Sequence[_Filled], parts: Sequence[Any], whole: Any) -> Any:
+    """Return the transform of values of `media`, from the transforms of the parts, and of 1."""
+    steps = (media[part.medium] - media[part.around] for part in filled)
+    return media[_ABOVE] * whole + sum(step * part for step, part in zip(steps, parts, strict=True))
+
+
+def _surfaces(profile: Profile, height: float, offsets: Real) -> list[_Filled]:
+    """Return what lies below the surfaces of the material and of each film at a height, µm."""
+    above = [*range(1, len(offsets)), _ABOVE]
+    return [
+        _Filled(_intervals(profile, height - up) / profile.period, number, above[number])
+        for number, up in enumerate(offsets)
+    ]
+
+
+def _slices(
+    slices: Sequence[Slice], first: int, period: float
+) -> list[tuple[float, list[_Filled]]]:
+    """Return slices from the top: thickness, and parts; first : number of their first medium."""
+    layers = []
+    for thickness, parts in slices:
+        filled = [
+            _Filled(np.array([[part.begin, part.end]]) / period, number, _ABOVE)
+            for number, part in enumerate(parts, first)
+        ]
+        layers.append((thickness, filled))
+        first += len(parts)
+    return layers[::-1]
 
 
 def _has_walls(profile: Profile) -> bool:

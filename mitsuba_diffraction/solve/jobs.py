@@ -69,9 +69,9 @@ class Problem:
 def method_for(grating: Grating) -> str:
     """Return the solver for a grating.
 
-    Coupled waves for films, Chandezon's method for slopes, else the integral method.
+    Coupled waves for films and slices, Chandezon's method for slopes, else the integral method.
     """
-    if grating.films:
+    if grating.structure:
         return "coupled"
     sloped = not (grating.is_perfect or grating.thin or refused(grating.profile))
     return "chandezon" if sloped else "integral"
@@ -85,10 +85,11 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     if method == AUTO:
         method = method_for(grating)
     check_choice("method", method, (AUTO, *METHODS))
-    if grating.films and method != "coupled":
+    structure = grating.structure
+    if structure and method != "coupled":
         raise DiffractionError(
-            f"method {method} has no films on the profile; use method=coupled, or leave the "
-            "layers out"
+            f"method {method} has one medium below the profile and one above; use method=coupled, "
+            "or leave out layers, beneath and substrate"
         )
     content = hashlib.sha256(
         repr(
@@ -99,9 +100,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     content.update(repr(profile.period).encode())
     for array in (profile.x, profile.z, material.wavelengths, material.values):
         content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
-    for film in grating.films:
-        content.update(repr(film.thickness).encode())
-        for array in (film.material.wavelengths, film.material.values):
+    content.update(repr(structure.lengths).encode())
+    for medium in structure.materials:
+        for array in (medium.wavelengths, medium.values):
             content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
     return Problem(grating, method, resolution, content.hexdigest())
 
@@ -110,9 +111,8 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
     grating = problem.grating
-    if grating.films:  # which coupled waves alone have
-        thicknesses = [film.thickness for film in grating.films]
-        return CoupledWaves(grating.profile, problem.resolution, thicknesses)
+    if grating.structure:  # which coupled waves alone have
+        return CoupledWaves(grating.profile, problem.resolution, grating.structure)
     return METHODS[problem.method](grating.profile, problem.resolution)
 
 

@@ -14,14 +14,16 @@ from scipy.spatial import QhullError
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, OrderTable, cells
-from ..tables.orders.table import LARGEST_SUM, S_AND_P, Counts, check_outline
+from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
 from .efficiencies import ROUNDING, Efficiencies, read_efficiencies
 from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
 COUNTS = Counts(12, 8, 4)
-#: Nodes along ρ of the table of one direction: a curve over wavelength, for each order.
-_MOST_RHO, _LEAST_RHO = 32, 4
+#: Nodes along ρ at least of the table of one direction: a curve over wavelength, for each order.
+_LEAST_RHO = 4
+#: Error of efficiencies of the light in the file that is worth a change at nodes as large as 1.
+_MISSED = 1e-3
 #: Distance from grazing, in p, within which rounding decides whether an order propagates.
 _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
@@ -113,10 +115,12 @@ def table_of(
             f"{shown} has light across the grooves only (phi = 0): other light gets the same "
             "efficiencies, which is exact for perfect conductors alone"
         )
-    counts = Counts(*COUNTS[:2], 1 if in_plane or len(grid.wavelengths) == 1 else COUNTS.w)
+    counts = [Counts(*COUNTS[:2], 1 if in_plane or len(grid.wavelengths) == 1 else COUNTS.w)] * (
+        last + 1
+    )
     if len(np.unique(samples.s)) == 1:
-        counts = _of_one_direction(len(grid.wavelengths), last)
-    bands = tuple(_band(k, counts, samples) for k in range(last + 1))
+        counts = [_of_one_direction(samples.cell, k) for k in range(last + 1)]
+    bands = tuple(_band(k, of_band, samples) for k, of_band in enumerate(counts))
     table = OrderTable(period, wavelengths, bands, superstrate, header, thin, S_AND_P)
     header |= _errors(table, samples)
     if not incomplete and header["reciprocity_error"] > _ONE_WAY:
@@ -128,10 +132,12 @@ def table_of(
     return table
 
 
-def _of_one_direction(wavelengths: int, last: int) -> Counts:
-    """Return nodes for a curve of so many wavelengths, some twice as many in all bands."""
-    in_band = 4 * wavelengths // (last + 1)
-    return Counts(2, min(max(in_band, _LEAST_RHO), _MOST_RHO), 1)
+def _of_one_direction(cell: cells.Cell, band: int) -> Counts:
+    """Return nodes for curves over K, some four for each wavelength in the band."""
+    big_k = cell.k_continuous
+    in_band = 4.0 * len(big_k) / max(float(np.ptp(big_k)), 1.0 / MOST_NODES)
+    lit = (cell.band == band).any()
+    return Counts(2, int(min(max(in_band, _LEAST_RHO), MOST_NODES)) if lit else _LEAST_RHO, 1)
 
 
 def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
@@ -273,6 +279,8 @@ def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.fl
             s = cells.from_cell(k, kind, j, grid[0], grid[1], 2e3 / big_k, 1.0).x  # at c = 1
             for q in range(size):
                 values[:, :, :, j, q] = _of_nearest_direction(samples, j - q, s, big_k)
+    if not several and (cell.band == k).any():
+        values = _through_samples(k, counts, samples, values)
     return (values if values.shape[-1] == 2 else _sheet(values)).astype(np.float32)
 
 
@@ -307,6 +315,26 @@ def _of_nearest_direction(samples: _Samples, order: int, s: Real, big_k: Real) -
         for kind, column in enumerate(powers[light].T):
             values[here, kind] = np.interp(big_k[here], samples.cell.k_continuous[light], column)
     return values
+
+
+def _through_samples(k: int, counts: Counts, samples: _Samples, values: Real) -> Real:
+    """Change values (τ, ρ, w, j, q, n) of light from one direction so that they meet the file's.
+
+    Least squares of the changes at nodes, of which many lie at wavelengths beyond the file's, and
+    of the errors over `_MISSED`.
+    """
+    here = np.flatnonzero(samples.cell.band == k)
+    rho = cells.interpolation(counts.rho, samples.cell.rho[here])
+    gain = rho.T @ np.linalg.inv(rho @ rho.T + _MISSED**2 * np.eye(len(here)))
+    size = values.shape[3]
+    orders = np.subtract.outer(np.arange(size), np.arange(size))
+    known = np.stack([samples.of_order(int(m))[here] for m in orders.ravel()], axis=1)
+    known = known.reshape(len(here), size, size, -1)
+    missed = known - np.einsum("sr,rjqn->sjqn", rho, values[0, :, 0])
+    changed = np.maximum(values + np.einsum("rs,sjqn->rjqn", gain, missed)[None, :, None], 0.0)
+    kinds = changed.reshape(*changed.shape[:5], -1, 2)  # reflected, and transmitted; s and p
+    total = kinds.sum(axis=(4, 5), keepdims=True)
+    return np.asarray((kinds / np.maximum(total, 1.0)).reshape(changed.shape))
 
 
 def _interpolated(points: Real, values: Real, places: Real) -> Real:

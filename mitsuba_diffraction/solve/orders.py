@@ -16,7 +16,7 @@ from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import MOST_NODES, Counts, check_outline
 from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
-from .films import Layers, films_of, material_text
+from .films import Layers, Substance, material_text, structure_of
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .materials import Material, material_of
 from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
@@ -91,6 +91,8 @@ def solve_orders(
     superstrate: float = 1.0,
     thin: bool = False,
     layers: Layers = (),
+    beneath: Layers = (),
+    substrate: Substance | None = None,
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] | None = None,
@@ -110,6 +112,8 @@ def solve_orders(
         light on both sides (`sheet`). Otherwise it has the reflected orders.
     layers : films on the profile, from the material upwards, such as [("1.46", 0.1)]: material and
         thickness along z, µm. They interfere; walls have none.
+    beneath : layers beneath the profile, from the substrate upwards, and slices (`films.Layers`).
+    substrate : below them; by default the material.
     settings : wavelengths, tolerance, method.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
@@ -135,7 +139,15 @@ def solve_orders(
         superstrate,
         how.wavelengths,
         thin,
-        films_of(layers, substance, thin, how.wavelengths),
+        structure_of(
+            profile,
+            substance,
+            how.wavelengths,
+            layers=layers,
+            beneath=beneath,
+            substrate=substrate,
+            thin=thin,
+        ),
     )
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)

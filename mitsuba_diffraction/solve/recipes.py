@@ -5,6 +5,8 @@
     material = "Al"                 # a name, an index such as "1.5" or "0.65+5.6i", or "none"
     superstrate = 1.58              # index of the clear medium above; default 1
     layers = [["1.46", 0.1]]        # films on it, from the material upwards, µm; default none
+    beneath = "stack.toml"          # layers and slices beneath it, `films.read_layers`; or a list
+    substrate = "SiO2"              # below them; default: the material
     thin = true                     # light goes through: a sheet of a clear material; default false
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
@@ -15,7 +17,7 @@
     period = 1.6                    # µm
     depth = 0.12                    # µm
 
-Paths are relative to the recipe.
+Paths are relative to the recipe. Without a profile, the surface above `beneath` is flat.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import inspect
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +35,13 @@ from ..files import path_within, read_text
 from ..heights.lengths import number_between
 from ..heights.recipes import SOLVED
 from ..tables.orders.table import WAVELENGTHS
-from .films import Layers
+from .films import Layers, checked_layers, read_layers
 from .orders import Settings
 from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
-    "method", "profile", "material", "superstrate", "layers", "thin", "wavelengths", "tolerance",
-    "solver", "resolution", "polarised", "output", "arguments",
+    "method", "profile", "material", "superstrate", "layers", "beneath", "substrate", "thin",
+    "wavelengths", "tolerance", "solver", "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -49,7 +51,8 @@ class SolvedRecipe:
 
     Attributes
     ----------
-    profile, material, superstrate, thin, settings, layers : arguments of `solve_orders`.
+    profile, material, superstrate, thin, settings, layers, beneath, substrate : arguments of
+        `solve_orders`.
     output : path of the table.
     """
 
@@ -60,6 +63,8 @@ class SolvedRecipe:
     settings: Settings
     output: Path
     layers: Layers = ()
+    beneath: Layers = ()
+    substrate: str | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
@@ -89,14 +94,18 @@ class SolvedRecipe:
                 )
             if not isinstance(arguments, dict):
                 raise DiffractionError(f"arguments: expected a section, got {quoted(arguments)}")
+            layers, beneath = (_layers(content, key, file.parent) for key in ("layers", "beneath"))
+            substrate = content.get("substrate")
             return cls(
-                profile_of(content.get("profile"), arguments, file.parent),
+                _profile(content, arguments, file.parent, bool(beneath)),
                 str(content.get("material", "Al")),
                 number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
                 _settings(content),
                 path_within(file, output),
-                _layers(content.get("layers", [])),
+                layers,
+                beneath,
+                None if substrate is None else str(substrate),
             )
         except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error
@@ -128,13 +137,22 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     return make(**arguments)
 
 
-def _layers(value: Any) -> Layers:
-    """Return pairs of a material and a thickness."""
-    if not (isinstance(value, list) and all(isinstance(p, list) and len(p) == 2 for p in value)):
-        raise DiffractionError(
-            f'layers: expected pairs such as [["1.46", 0.1]], material and µm, got {quoted(value)}'
-        )
-    return tuple((str(name), thickness) for name, thickness in value)
+def _profile(
+    content: Mapping[str, Any], arguments: Mapping[str, Any], folder: Path, flat: bool
+) -> Profile:
+    """Return a recipe's profile; a flat one without a name, if that is allowed."""
+    if flat and "profile" not in content:
+        line = profile_of("lamellar", {**arguments, "depth": 0.0})
+        return replace(line, name=f"slices over {line.period:g} µm")
+    return profile_of(content.get("profile"), arguments, folder)
+
+
+def _layers(content: Mapping[str, Any], key: str, folder: Path) -> Layers:
+    """Return the layers that a recipe has under a key: in a list, or in a file."""
+    value = content.get(key, [])
+    if isinstance(value, str):
+        return read_layers(folder / value)
+    return checked_layers(value, key)
 
 
 def _flag(content: Mapping[str, Any], name: str) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..tables.orders import cells
+from .films import material_text
 from .jobs import Jobs, Problem
 from .nodes import Place
 from .stations import Real, reversed_light
@@ -19,6 +20,8 @@ _STEP, _MOST = 1.35, 6
 #: Light from nothing that a solution may have where resolutions are compared, or a tenth of the
 #: tolerance if that is more: the table scales it away, which changes colours by as much.
 _EXCESS = 5e-4
+#: Reflected share of light, on average, below which there are no efficiencies to tabulate.
+_DARK = 1e-7
 #: Points for each wavelength in the material, at first; meshes graded at corners are half as fine
 #: between them.
 _POINTS_PER_WAVELENGTH = 2.5
@@ -79,11 +82,21 @@ class _Refined(NamedTuple):
 def _refined(
     problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
 ) -> _Refined:
-    """Solve at the next resolution, and compare."""
+    """Solve at the next resolution, and compare.
+
+    Raises a DiffractionError if the grating reflects nothing.
+    """
     fine = finer_problem(problem)
     finer = jobs.solve(fine, places, "choosing the resolution")
     missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
-    return _Refined(fine, finer, missed / sum(float(finer[p].sum()) for p in places))
+    light = sum(float(finer[p].sum()) for p in places)
+    if light < _DARK * sum(values[p].shape[1] for p in places):
+        raise DiffractionError(
+            f"{problem.grating.profile.name} of {material_text(problem.grating)} reflects no "
+            "light; choose materials that differ from the medium above, and layers that light "
+            "passes"
+        )
+    return _Refined(fine, finer, missed / light)
 
 
 def finer_problem(problem: Problem) -> Problem:

@@ -6,8 +6,8 @@ share the expensive part of a solver. A station has several wavelengths w at the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, TypeVar
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..tables.orders import cells
 from .materials import Material
 from .profiles import Profile
+from .structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -29,13 +30,6 @@ LEAST_COSINE = 0.03
 LEAST_NORMAL = 5e-4
 
 
-class Film(NamedTuple):
-    """Film on a profile, as thick along z everywhere; thickness in µm."""
-
-    material: Material
-    thickness: float
-
-
 @dataclass(frozen=True, eq=False)
 class Grating:
     """Periodic surface for which a table is solved.
@@ -47,7 +41,7 @@ class Grating:
     superstrate : real index of the clear medium above.
     wavelengths : shortest and longest of the table, in vacuum, nm.
     thin : whether the material is a sheet with a flat lower side (`sheet`).
-    films : on the profile, from the material upwards.
+    structure : films on the profile, and what lies beneath it.
     """
 
     profile: Profile
@@ -55,7 +49,7 @@ class Grating:
     superstrate: float
     wavelengths: tuple[float, float]
     thin: bool = False
-    films: tuple[Film, ...] = ()
+    structure: Structure = field(default_factory=Structure)
 
     @property
     def optical_period(self) -> float:
@@ -95,13 +89,13 @@ class Grating:
             None if index is None else index / self.superstrate,
             np.sqrt(1.0 - cosine**2),
             self.thin,
-            tuple(self._relative(film.material, lam) for film in self.films),
+            tuple(self._relative(material, lam) for material in self.structure.materials),
         )
 
     def _relative(self, material: Material, wavelength: Real) -> Complex:
-        """Return the index of a film, relative to the medium above; wavelength : in vacuum, nm."""
+        """Return an index relative to the medium above; wavelength : in vacuum, nm."""
         index = material.index(wavelength)
-        assert index is not None  # `orders.films_of` refuses perfect conductors
+        assert index is not None  # `films.structure_of` refuses perfect conductors
         return np.asarray(index / self.superstrate)
 
 
@@ -119,7 +113,7 @@ class Station:
         conductor, of which only the first wavelength is solved.
     along : (n,) direction cosine y along the grooves.
     thin : whether light comes from within the material as well.
-    films : indices (n,) of each film, relative to the medium above.
+    media : indices (n,) of the materials of the structure, relative to the medium above.
     """
 
     extent: float
@@ -129,7 +123,7 @@ class Station:
     indices: NDArray[np.complex128] | None
     along: Real
     thin: bool = False
-    films: tuple[Complex, ...] = ()
+    media: tuple[Complex, ...] = ()
 
     @property
     def sines(self) -> Real:

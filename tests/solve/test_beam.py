@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.beam import solve_beam
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings
-from mitsuba_diffraction.solve.profiles import sinusoidal
+from mitsuba_diffraction.solve.profiles import lamellar, sinusoidal
 
 #: One wavelength.
 GREEN = Settings(wavelengths=(550.0, 550.0))
@@ -39,3 +41,27 @@ def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
 def test_light_that_cannot_be_solved_is_refused(options, message):
     with pytest.raises(DiffractionError, match=message):
         solve_beam(sinusoidal(0.6, 0.05), "Al", **options)
+
+
+def test_efficiencies_of_one_direction_are_those_solved():
+    """Also of a few wavelengths, which are narrower than the distance of usual nodes."""
+    profile, settings = lamellar(0.376, 0.36, 0.6), Settings((522.0, 542.0))
+    mirror = [("1.46", 0.104), ("1.95", 0.073)] * 8
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table, between = (
+            solve_beam(
+                profile, 1.46, theta=45.0, step=4.0, beneath=mirror,
+                settings=replace(settings, wavelengths=ends, resolution=8),
+            )
+            for ends in ((522.0, 542.0), (524.0, 540.0))
+        )  # fmt: skip
+    assert table.header["error_worst"] < 1e-3  # `measured._MISSED`
+    # half way between wavelengths, by the other table's own nodes
+    x = -np.sin(np.radians(45.0))
+    for wavelength in np.linspace(524.0, 540.0, 5):
+        expected, got = (
+            np.stack([each.polarised_efficiency(x, 0.0, wavelength, m) for m in (0, 1)])
+            for each in (between, table)
+        )
+        # single precision, and the smooth curve through steps of 4 nm
+        np.testing.assert_allclose(got, expected, atol=1e-3)

@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.solve.coupled import CoupledWaves
-from mitsuba_diffraction.solve.films import films_of
+from mitsuba_diffraction.solve.films import structure_of
 from mitsuba_diffraction.solve.jobs import problem_of
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import blazed, lamellar
@@ -21,16 +21,14 @@ LAYERS = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
 SUPERSTRATE = 1.2
 
 
-def grating(profile, layers=LAYERS, material="Al"):
+def grating(profile, layers=LAYERS, material="Al", **beneath):
     substance = material_of(material, RANGE)
-    films = films_of(layers, substance, False, RANGE)
-    return Grating(profile, substance, SUPERSTRATE, RANGE, films=films)
+    structure = structure_of(profile, substance, RANGE, layers=layers, **beneath)
+    return Grating(profile, substance, SUPERSTRATE, RANGE, structure=structure)
 
 
 def solved(surface, station, harmonics):
-    return CoupledWaves(
-        surface.profile, harmonics, [film.thickness for film in surface.films]
-    ).amplitudes(station)
+    return CoupledWaves(surface.profile, harmonics, surface.structure).amplitudes(station)
 
 
 def test_flat_stacks_reflect_as_transfer_matrices_say():
@@ -41,10 +39,10 @@ def test_flat_stacks_reflect_as_transfer_matrices_say():
     for n, lam in enumerate(station.wavelengths * SUPERSTRATE * 1e3):
         y, c = station.along[n], np.sqrt(1 - station.along[n] ** 2)
         indices = [
-            SUPERSTRATE, *(f.material.index(lam)[()] for f in reversed(surface.films)),
+            SUPERSTRATE, *(f.material.index(lam)[()] for f in reversed(surface.structure.films)),
             surface.material.index(lam)[()],
         ]  # fmt: skip
-        depths = [np.inf, *(1e3 * f.thickness for f in reversed(surface.films)), np.inf]
+        depths = [np.inf, *(1e3 * f.thickness for f in reversed(surface.structure.films)), np.inf]
         for channel, sine in enumerate(station.sines):
             theta = np.arcsin(np.hypot(c * sine, y))
             powers = [tmm.coh_tmm(name, indices, depths, theta, lam)["R"] for name in "sp"]
@@ -58,11 +56,11 @@ def test_a_film_of_the_material_is_a_higher_profile():
     profile = lamellar(0.5, 0.1)
     bare, same = grating(profile, []), grating(profile, [("Al", 0.07)])
     station = bare.station(1, 0, 0.35, 0.5, [0.2])
-    coated = replace(station, films=same.station(1, 0, 0.35, 0.5, [0.2]).films)
+    coated = replace(station, media=same.station(1, 0, 0.35, 0.5, [0.2]).media)
     difference = np.abs(solved(bare, station, 12)) - np.abs(solved(same, coated, 12))
     assert np.abs(difference).max() < 1e-9
     air = grating(profile, [(str(SUPERSTRATE), 0.07)])
-    aired = replace(station, films=air.station(1, 0, 0.35, 0.5, [0.2]).films)
+    aired = replace(station, media=air.station(1, 0, 0.35, 0.5, [0.2]).media)
     difference = solved(bare, station, 12) - solved(air, aired, 12)
     assert np.abs(difference).max() < 1e-9
 
@@ -84,7 +82,7 @@ def test_light_under_films_is_reciprocal(profile):
         (lambda: grating(lamellar(0.5, 0.1), [("1.46", 0.0)]), "layer 1: thickness"),
         (lambda: grating(lamellar(0.5, 0.1), [("1.4", 0.1), ("Unobtainium", 1)]), "is unknown"),
         (lambda: grating(lamellar(0.5, 0.1), [("none", 0.1)]), "layer 1: .*perfect conductor"),
-        (lambda: grating(lamellar(0.5, 0.1), LAYERS, "none"), "not on thin sheets or perfect"),
+        (lambda: grating(lamellar(0.5, 0.1), LAYERS, "none"), "not thin sheets or perfect"),
         (lambda: problem_of(grating(blazed(0.5, 0.1)), "chandezon", 20), "method=coupled"),
     ],
 )

@@ -21,6 +21,7 @@ RECIPE = {
     "method": '"solved"', "profile": '"blazed"', "material": '"Al"', "superstrate": "1.5",
     "wavelengths": "[400, 700]", "tolerance": "0.02", "solver": '"coupled"', "resolution": "20",
     "output": '"groove.nc"', "layers": '[["SiO2", 0.1], ["2.3", 0.05]]',
+    "beneath": '[["Al2O3", 0.1], [0.1, ["2.3", 0.1, 0.4]]]', "substrate": '"Al"',
 }  # fmt: skip
 ARGUMENTS = {"period": "1.2", "depth": "0.2", "direction": '"ascending"'}
 #: TOML of values that hardly fit.
@@ -42,8 +43,19 @@ def test_a_recipe_is_read(tmp_path):
     recipe = SolvedRecipe.load(file)
     assert (recipe.profile.period, recipe.superstrate) == (1.2, 1.5)
     assert recipe.layers == (("SiO2", 0.1), ("2.3", 0.05))
+    assert recipe.beneath == (("Al2O3", 0.1), (0.1, ["2.3", 0.1, 0.4]))
     assert recipe.settings.wavelengths == (400.0, 700.0)
     assert recipe.output == tmp_path / "groove.nc"
+
+
+def test_without_a_profile_slices_end_in_a_flat_surface(tmp_path):
+    file = tmp_path / "ridges.toml"
+    (tmp_path / "stack.toml").write_text('layers = [[0.1, ["chitin", 0.1, 0.3]]]')
+    content = {"method": '"solved"', "material": '"melanin"', "beneath": '"stack.toml"'}
+    file.write_text(text_of(content, {"period": "0.8"}))
+    recipe = SolvedRecipe.load(file)
+    assert (recipe.profile.period, recipe.profile.depth) == (0.8, 0.0)
+    assert recipe.beneath == ((0.1, ["chitin", 0.1, 0.3]),)
 
 
 @settings(max_examples=80, deadline=None)

@@ -1,0 +1,70 @@
+"""Media around a profile: films on it, slices beneath it, and the substrate below them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .materials import Material
+
+
+class Film(NamedTuple):
+    """Film on a profile, as thick along z everywhere; thickness in µm."""
+
+    material: Material
+    thickness: float
+
+
+class Part(NamedTuple):
+    """Rectangle of a slice, from x = begin to end in µm; end may lie in the next period."""
+
+    material: Material
+    begin: float
+    end: float
+
+
+class Slice(NamedTuple):
+    """Slab with vertical walls, thickness in µm; the medium above the grating fills its gaps."""
+
+    thickness: float
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """All media of a grating but the profile's material and the medium above.
+
+    Attributes
+    ----------
+    films : on the profile, from its material upwards.
+    slices : beneath the lowest point of the profile, from the substrate upwards.
+    substrate : below the slices; None is the profile's material.
+    """
+
+    films: tuple[Film, ...] = ()
+    slices: tuple[Slice, ...] = ()
+    substrate: Material | None = None
+
+    def __bool__(self) -> bool:
+        """Whether any medium is added."""
+        return bool(self.films or self.slices or self.substrate)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Materials of the films, of the slices' parts, and of the substrate, in this order."""
+        parts = (part.material for layer in self.slices for part in layer.parts)
+        substrate = () if self.substrate is None else (self.substrate,)
+        return (*(film.material for film in self.films), *parts, *substrate)
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """All lengths, µm, which with the materials identify the structure."""
+        return tuple(self._lengths())
+
+    def _lengths(self) -> Iterator[float]:
+        yield from (len(self.films), *(film.thickness for film in self.films))
+        for thickness, parts in self.slices:
+            yield from (thickness, len(parts))
+            for part in parts:
+                yield from (part.begin, part.end)
