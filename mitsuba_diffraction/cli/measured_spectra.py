@@ -126,7 +126,7 @@ def _of_heights(
     table = table_of(scan, bar)
     line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
     if line and not quiet and args.crops is None:
-        say(line)
+        _say_first(args, line)
     if table.settings.window_width is not None:
         _say_once(args, blur(table.window_width))
     if args.light_azimuth == "auto":
@@ -176,6 +176,23 @@ def _within(table: OrderTable, lam: Any, file: Path) -> Any:
     if len(inside) < len(lam):
         say(f"'{file}' has orders of {low:g} to {high:g} nm: other wavelengths are left out")
     return inside
+
+
+def say_notes(args: argparse.Namespace) -> None:
+    """Print on how many scans there are notes beside the first one's."""
+    noted = vars(args).get("noted", 0)
+    if noted > 1:
+        others = "1 more scan" if noted == 2 else f"{noted - 1} more scans"
+        say(f"notes on {others}: 'mitsuba-diffraction info' prints them")
+
+
+def _say_first(args: argparse.Namespace, line: str) -> None:
+    """Print the notes on the first scan that has any, and warnings; count the others."""
+    from ..heights.validity import UNRELIABLE
+
+    args.noted = vars(args).get("noted", 0) + 1
+    if args.noted == 1 or UNRELIABLE in line:
+        say(line)
 
 
 def _say_once(args: argparse.Namespace, line: str) -> None:

@@ -14,7 +14,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
-from .measured_spectra import measured_spectra
+from .measured_spectra import measured_spectra, say_notes
 from .options import whole_number
 from .report import check_outputs, save_report
 from .spectrometer import add_spectrometer, group
@@ -113,6 +113,7 @@ def run(args: argparse.Namespace) -> int:
             name: [s for file in members for s in measured_spectra(args, file, geometry, lam, bar)]
             for name, members in groups.items()
         }
+    say_notes(args)
     everything = files_of_spectra.on_common_wavelengths(measured)
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength

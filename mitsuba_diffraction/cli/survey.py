@@ -81,10 +81,14 @@ def run(args: argparse.Namespace) -> int:
             f"scans are {wide[0]:.3g} to {wide[-1]:.3g} µm wide: small ones have more colour by "
             "chance; compare them with --crops 4, crops of 10 µm"
         )
+    whole = sum("crop" not in row for row in rows if not row["reason"])
+    if args.crops is not None and whole:
+        say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
+    measured = "scans" if args.crops is None else "crops and whole scans"
     seconds = time.perf_counter() - start
     save_report(args, {"rows": rows, "seconds": seconds})
     print(
-        f"{args.output}: {len(rows) - failed} {'scans' if args.crops is None else 'crops'} in "
+        f"{args.output}: {len(rows) - failed} {measured} in "
         f"survey.csv, {failed} failed, "
         f"{len({row['sample'] for row in rows})} samples in samples.csv, {seconds:.1f} s"
     )

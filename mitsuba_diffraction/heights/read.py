@@ -217,7 +217,7 @@ class _Lengths(NamedTuple):
 
     scale: float  # µm per unit of the values
     pixel_size: tuple[float, float]  # µm
-    overrides: list[str]  # one line for each length of the file that an option overrides
+    overrides: list[str]  # one line for each length that an option states or overrides
 
 
 def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
@@ -234,6 +234,8 @@ def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
         )
     for line in lines:
         warn(f"{shown}: {line}")
+    if options.height_unit is not None and not raw.stated:
+        lines.append(f"heights in {options.height_unit}, as height_unit states")
     return _Lengths(scale, pixel_size, lines)
 
 
@@ -256,7 +258,9 @@ def _height_scale(
         scale = micrometres_of(unit)
         assert scale is not None  # LoadOptions checks it
         same = raw.unit is not None and math.isclose(scale, raw.unit)
-        return scale, [] if same else [f"height_unit overrides the file's: in {unit}{stated}"]
+        if same or not raw.stated:
+            return scale, []
+        return scale, [f"height_unit overrides the file's: in {unit}{stated}"]
     if max_height is not None:
         known = raw.values[np.isfinite(raw.values)]
         with np.errstate(over="ignore"):

@@ -60,6 +60,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     slope = field.rms_slope
     if GENTLE_SLOPE < slope <= IMPOSSIBLE_SLOPE:
         slope = seen_slope(field, shortest)
+    seen = " of the waves that light resolves" if slope < 0.95 * field.rms_slope else ""
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
             f"{field.name}: {units_warning(field)}; no surface has an RMS slope of "
@@ -67,15 +68,15 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
         )
     elif slope > STEEP_SLOPE:
         lines.append(
-            f"{field.name}: {UNRELIABLE}: RMS slope {slope:.2g} is above "
+            f"{field.name}: {UNRELIABLE}: RMS slope {slope:.2g}{seen} is above "
             f"{STEEP_SLOPE:g}, where they differ from rigorous solutions by more than 20 %, on "
             "steeper surfaces completely"
         )
     elif slope > GENTLE_SLOPE:
         lines.append(
             f"{field.name}: expect colours to differ from rigorous solutions by 5 to 20 % in light "
-            f"60° from the normal: RMS slope {slope:.2g} is above {GENTLE_SLOPE:g}; they "
-            "differ by less nearer to the normal, by more at edges and with model='kirchhoff'"
+            f"60° from the normal: RMS slope {slope:.2g}{seen} is above {GENTLE_SLOPE:g}; "
+            "they differ by less nearer to the normal, by more at edges and with model='kirchhoff'"
         )
     coarse = max(field.pixel_size)
     if coarse > shortest / 4:

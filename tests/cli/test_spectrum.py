@@ -142,6 +142,15 @@ def test_groups_and_ranges_that_are_none_are_one_line(run, scans, arguments, nam
     assert named in ran.err.splitlines()[-1]
 
 
+def test_notes_on_many_scans_are_one_scan_s_and_a_number(run, scans, here):
+    for n in range(2):
+        np.save(scans / f"scan{n}.npy", 8.0 * np.load(scans / f"scan{n}.npy"))
+    ran = run("spectrum", scans, *PIXEL, *QUICK)
+    assert ran.code == 0, ran.err
+    assert sum("info " in line for line in ran.err.splitlines()) == 1
+    assert "1 more scan" in ran.err
+
+
 def test_samples_that_are_averaged_are_said(run, scans, here):
     (scans / "scan1.npy").rename(scans / "other1.npy")
     ran = run("spectrum", scans, *PIXEL, *QUICK)

@@ -69,8 +69,11 @@ def test_exr_and_arrays_may_be_in_nanometres(tmp_path):
     channels = {"Y": HEIGHTS[::-1].astype(np.float32)}
     OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "a.exr"))
     for name in ("a.npy", "a.exr"):
-        field, _ = loaded(tmp_path / name, height_unit="nm", pixel_size=0.1)
+        with warnings.catch_warnings():  # nothing of the file is overridden
+            warnings.simplefilter("error")
+            field = HeightField.load(tmp_path / name, height_unit="nm", pixel_size=0.1)
         assert field.heights == pytest.approx(HEIGHTS * 1e-3, rel=1e-6)  # single precision
+        assert "nm" in field.history[-1]
 
 
 def test_contradictions_and_unknown_units_are_refused(text, tmp_path):
