@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import drjit as dr
@@ -41,7 +44,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         "sheet": through | {"thin": True},
     }[kind]
     solid = kind in ("metal", "dielectric")
-    layer = rng.choice(["none", "coat", "film"]) if solid else "none"
+    layer = rng.choice(["none", "coat", "film", "stack"]) if solid else "none"
     if layer == "coat":
         chosen["coat_ior"] = 1.0 + log_uniform(rng, 0.01, 1.0)
     elif layer == "film":
@@ -62,6 +65,8 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
     }
     if "plugin" not in chosen and rng.random() < 0.1:
         chosen["shadowing"] = "vcavity"
+    if layer == "stack":
+        chosen |= {"layers": _stack(rng), "model": "kirchhoff"}
     if rng.random() < 0.3:
         chosen["coherence"] = "patch"
     for name, low, high in (("lateral_scale", 0.2, 2.0), ("height_scale", 1e-3, 1.5)):
@@ -72,6 +77,18 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         elif drawn < 0.35:
             chosen[name] = factor
     return chosen
+
+
+def _stack(rng: np.random.Generator) -> str:
+    """A file of layers: pairs of any indices, repeated, of uncertain thickness."""
+    pairs = [
+        [f"{1.0 + log_uniform(rng, 0.05, 1.5):.4f}", log_uniform(rng, 0.01, 0.3)]
+        for _ in range(int(rng.integers(1, 4)))
+    ]
+    if rng.random() < 0.2:
+        pairs[0][0] += f"+{log_uniform(rng, 1e-4, 0.3):.5f}i"
+    repeat, spread = int(rng.integers(1, 6)), rng.choice([0.0, 0.05])
+    return f"layers = {json.dumps(pairs)}\nrepeat = {repeat}\nspread = {spread}\n"
 
 
 def _texture(texels: NDArray[np.float64]) -> dict[str, Any]:
@@ -91,7 +108,7 @@ def check(rng: np.random.Generator) -> None:
     try:
         field = grooves(rng) if rng.random() < 0.1 else surface(rng)
         asked = parameters(rng, field)
-        bsdf = mi.load_dict(md.bsdf_dict(field, **asked))
+        bsdf = _load(field, asked)
     except md.DiffractionError:
         return
     except RuntimeError as error:
@@ -123,6 +140,15 @@ def check(rng: np.random.Generator) -> None:
     assert np.all(least <= most), f"{where} {least.max(axis=0)} at least"
     wo = rng.standard_normal((_DIRECTIONS * _VALUES, 3))
     _check_values(bsdf, light(_VALUES), wo, where)
+
+
+def _load(field: md.HeightField, asked: dict[str, Any]) -> Any:
+    if "layers" not in asked:
+        return mi.load_dict(md.bsdf_dict(field, **asked))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "stack.toml")
+        file.write_text(asked["layers"], encoding="utf-8")
+        return mi.load_dict(md.bsdf_dict(field, **asked | {"layers": str(file)}))
 
 
 def _albedo_beneath(asked: dict[str, Any]) -> float:

@@ -26,7 +26,7 @@ from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
 from .gain import thick
 from .materials import Dielectric, Reflector
-from .scaling import lowered, parallel, scaled
+from .scaling import lowered, parallel, scaled, weighted
 from .settings import VERSION, energy_settings
 from .transport import Orders, ScatteredLight, Transport
 
@@ -95,15 +95,9 @@ class Surface:
             return Conservation()
         few = self.orders.strong <= settings.few_orders
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
-        between = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
-        lights = self._lights(between, *grid.middles(parts))
-
-        def lower(n: int) -> None:
-            pair = slice(n, n + 2)
-            c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair])
-
-        for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
-            parallel(lower, range(first, len(between), 2))
+        places = settings.between[few and not self._both_sides]
+        for place in places if len(nodes) > 1 else (0.0,):
+            self._lower_between(nodes, place, parts, c, s)
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
             unscaled = (self._both_sides or scale is c) and np.all(scale == 1.0)
@@ -182,8 +176,23 @@ class Surface:
         # a lobe within one row, as at the critical angle, is not adjusted
         return np.asarray(median_filter(c, (1, 3, 1), mode="nearest")), self._ones
 
-    def _lowered(self, light: ScatteredLight, c: Array, s: Array) -> tuple[Array, Array]:
-        """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""
+    def _lower_between(self, nodes: Real, place: float, parts: int, c: Array, s: Array) -> None:
+        """Lower c and s for light at a place between all neighbouring wavelengths."""
+        between = nodes[:-1] ** (1.0 - place) * nodes[1:] ** place if len(nodes) > 1 else nodes
+        lights = self._lights(between, *self._grid.middles(parts))
+
+        def lower(n: int) -> None:
+            pair = slice(n, n + 2)
+            shares = np.array([1.0 - place, place])[: len(c[pair])]
+            c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair], shares)
+
+        for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
+            parallel(lower, range(first, len(between), 2))
+
+    def _lowered(
+        self, light: ScatteredLight, c: Array, s: Array, shares: Real
+    ) -> tuple[Array, Array]:
+        """Lower c and then s of neighbouring wavelengths (n, …) for light between them."""
         settings = self._settings
         if self._both_sides:
             room = np.maximum(np.float32(settings.ceiling) - light.others(self._ones), 1e-6)
@@ -193,10 +202,14 @@ class Surface:
                 factor = np.minimum(zeroth / room, settings.largest**2)
                 return np.where(zeroth > MIN_ORDER_0, factor, np.float32(1.0))
 
-            c = lowered(c, order_0_excess, settings.passes)
-        middle = c.mean(axis=0)
-        if light.sent(middle, s.mean(axis=0)).max() > self._limit:
-            s = lowered(s, lambda s: light.sent(middle, s) / settings.ceiling, settings.passes)
+            c = lowered(c, shares, order_0_excess, settings.passes)
+        middle = weighted(c, shares)
+        if light.sent(middle, weighted(s, shares)).max() > self._limit:
+
+            def excess(s: Array) -> Array:
+                return light.sent(middle, s) / np.float32(settings.ceiling)
+
+            s = lowered(s, shares, excess, settings.passes)
         return c, s
 
 

@@ -35,14 +35,20 @@ def scaled(
     return s
 
 
-def lowered(pages: Array, excess: Callable[[Array], Array], passes: int) -> Array:
+def weighted(pages: Array, shares: Real) -> Array:
+    """Return the mean of pages (n, …) by shares (n,)."""
+    return np.einsum("n,n...->...", shares.astype(np.float32), pages)
+
+
+def lowered(pages: Array, shares: Real, excess: Callable[[Array], Array], passes: int) -> Array:
     """Return pages (n, sides, polar + 1, azimuthal) lowered until no light between exceeds 1.
 
+    shares : (n,), of the pages in the light between.
     excess : from the mean page to the factors by which light is too much in the middles of parts
         of all cells, (sides, polar · parts, azimuthal · parts).
     """
     for turn in range(passes):
-        factors = _largest_around(excess(pages.mean(axis=0)), pages.shape[-1])
+        factors = _largest_around(excess(weighted(pages, shares)), pages.shape[-1])
         last = turn == passes - 1
         pages = (pages / (factors if last else np.sqrt(factors))).astype(np.float32)
     return pages

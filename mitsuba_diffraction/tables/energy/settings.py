@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 25
+VERSION = 26
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,9 @@ class EnergySettings:
     parts, side_parts, few_orders : between nodes, light is looked at in middles of so many parts of
         a cell, either way, first of surfaces with more than `few_orders` strong orders, then of
         those with fewer, whose kinks are sharper. With 3 a blazed mirror has 1.04 in between.
+    between : places between neighbouring wavelengths, as shares of the interval, at which light is
+        looked at: first of dielectrics and of surfaces with more than `few_orders` strong orders,
+        then of reflectors with fewer.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
     fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of the second order's
         mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
@@ -50,6 +53,7 @@ class EnergySettings:
     parts: tuple[int, int] = (3, 5)
     side_parts: tuple[int, int] = (1, 2)
     few_orders: int = 32
+    between: tuple[tuple[float, ...], tuple[float, ...]] = ((0.5,), (0.33, 0.67))
     rings: int = 36
     steps: int = 80
     sweeps: int = 12
