@@ -127,7 +127,7 @@ class EnergyModel:
         """Index of the coat, rounded; 1 without a coat."""
         if self._coat is None:
             return 1.0
-        return float(_rounded_index(plain(self._coat.eta), COAT_STEP))
+        return float(rounded_index(plain(self._coat.eta), COAT_STEP))
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Energy scale s on `FINE`; None where all are 1."""
@@ -288,11 +288,11 @@ def _rounded_indices(
         index, film, depth = exact.parts
         phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)
         fine = min(step, 10.0 ** math.floor(math.log10(phase)))  # of decimal numbers as given
-        return fresnel.Filmed(_rounded_index(index, step), _rounded_index(film, fine), depth)
-    return _rounded_index(exact, step)
+        return fresnel.Filmed(rounded_index(index, step), rounded_index(film, fine), depth)
+    return rounded_index(exact, step)
 
 
-def _rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
+def rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
     """An index to a step, finer where it is close to 1, but not to 0, where no wave exists."""
     contrast = np.abs(np.asarray(index) - 1.0)
     rounded = np.where(contrast > 4.0 * step, _rounded(index, step), _rounded(index, 0.02 * step))

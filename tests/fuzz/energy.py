@@ -26,9 +26,12 @@ _SAMPLES = 1 << 13, 1 << 17
 _GRAZING, _EXCESS, _ERRORS = 85.0, (0.01, 0.05), 5.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
-#: Variants by their share. RGB variants may have negative values: colours outside the gamut.
+#: Variants by their share. RGB variants have colours outside the gamut, which are negative, or
+#: above 1 as the red of gold: their luminance is at most 1.
 _VARIANTS = {"llvm_ad_mono": 0.75, "llvm_ad_spectral": 0.2, "llvm_ad_rgb": 0.05}
 _TEXELS = (4, 4, 1)
+#: Of linear sRGB's channels.
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any]:
@@ -167,6 +170,8 @@ def _sent_on(bsdf: Any, si: Any, count: int) -> tuple[Any, Any]:
     # importance: radiance would be n² times as large in the dielectric
     _, weight = bsdf.sample(mi.BSDFContext(mi.TransportMode.Importance), si, one, two)
     values = np.array(mi.unpolarized_spectrum(weight), float).reshape(-1, _DIRECTIONS, count)
+    if mi.is_rgb:
+        values = np.einsum("c,c...->...", _LUMINANCE, values)[None]
     return values.mean(axis=2), values.std(axis=2) / np.sqrt(count)
 
 

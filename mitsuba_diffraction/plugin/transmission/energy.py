@@ -8,11 +8,13 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from ...errors import DiffractionError
 from ...tables.energy import materials
 from ...tables.energy.conservation import Energy
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, at_horizon, scales_of
 from ..directions import PatchFrame
+from ..energy import rounded_index
 from ..energy_factors import ScaleRange
 from ..fresnel import Dielectric
 from ..layers import plain
@@ -30,6 +32,12 @@ class DielectricEnergy:
     table, material, model : of the BSDF.
     thin : whether below is beyond the flat side of a sheet.
     wavelength : nm, for mono variants.
+
+    Raises
+    ------
+    DiffractionError
+        If the table is of one window (`patch`) and not flat: orders interfere with order 0 then,
+        which cannot make up for the light of the others.
     """
 
     def __init__(
@@ -40,6 +48,12 @@ class DielectricEnergy:
         thin: bool,
         wavelength: float,
     ) -> None:
+        if table.coherence == "patch" and table.roughness.nodes.max() > 0.0:
+            raise DiffractionError(
+                "coherence='patch' of a rough interface or sheet: its orders interfere with order "
+                "0, and R + T cannot be conserved; set energy_conserving to false, or coherence to "
+                "'ensemble'"
+            )
         self._table, self._material, self._model, self._thin = table, material, model, thin
         mono = wavelength, wavelength
         self._range = mono if mi.is_monochromatic else table.wavelength_range
@@ -47,7 +61,7 @@ class DielectricEnergy:
 
     def update(self, factors: ScaleRange) -> None:
         """Look up, or compute, c and s at other factors or another index: `EnergyModel.update`."""
-        index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
+        index = float(rounded_index(plain(self._material.eta), INDEX_STEP))
         dielectric = materials.Dielectric(index, self._model, self._thin)
         wavelengths = factors.wavelengths(self._range)
         energy = Energy(self._table, dielectric, wavelengths, factors.least)

@@ -93,7 +93,7 @@ class Surface:
         c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
         if self._both_sides and np.all(c == 1.0):
             return Conservation()
-        few = self.orders.strong <= settings.few_orders
+        few = 0 < self.orders.strong <= settings.few_orders
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
         places = settings.between[few and not self._both_sides]
         for place in places if len(nodes) > 1 else (0.0,):

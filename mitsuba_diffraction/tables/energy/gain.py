@@ -76,9 +76,7 @@ class Gain:
         """
         if self.path.let_through:
             return self.path.flat_transmittance(cos_i, cos_o) * power
-        wide = turn.shape[-1] > 1
-        share = self(cos_i, cos_o, turn) if wide else self.exact(cos_i, cos_o, -1.0)
-        share = share * power
+        share = self.exact(cos_i, cos_o, np.cos(turn)) * power
         if not self.path.thin:
             return share
         return share + self.path.face_reflectance(cos_i, cos_o, np.cos(turn))
