@@ -49,7 +49,7 @@ def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, 
     every = [each for members in groups.values() for each in members]
     common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
     if not common.size:
-        raise DiffractionError("the tables have no wavelength in common; build them anew")
+        raise DiffractionError("the tables share no wavelength; build them for one range")
 
     def cut(each: Spectra) -> Spectra:
         kept = np.isin(each.wavelength, common)

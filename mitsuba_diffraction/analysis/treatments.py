@@ -36,7 +36,7 @@ class Treatment:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def updated(self, other: Treatment) -> Treatment:
-        """Return this treatment, replaced by the values that `other` sets."""
+        """Return this treatment with the values that `other` sets."""
         return Treatment(self.options.updated(other.options), {**self.settings, **other.settings})
 
 
@@ -69,6 +69,6 @@ def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Tr
 def _treatment(where: str, values: Any) -> Treatment:
     """Check the options of one pattern."""
     if not isinstance(values, dict):
-        raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
+        raise DiffractionError(f"{where}: expected a section such as ['*.spm'] with options")
     check_keys(where, values, (*LOAD_KEYS, *RECIPE_SETTINGS))
     return Treatment(*options_and_settings(values, where))

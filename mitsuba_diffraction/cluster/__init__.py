@@ -5,12 +5,12 @@ Contents
 connect  to workers that are started here, or to a running cluster: `md.cluster.connect`
 render   a scene on workers: `md.cluster.render`
 build    the table of a wide scan on workers, window by window: `md.cluster.build`
-frames   frames of a scene: what workers have to render, and pictures of their sums
+frames   frames of a scene: what workers render, and how their sums become pictures
 groups   groups of passes on workers: rendered as tasks, added up, and stored here
 kept     sums stored on disk until their picture is written
 tasks    the work and the result of a task; the files of a scene, copied where they are missing
 jobs     independent jobs, here or on workers: scans as they finish, windows in order
-workers  workers started here or found on a cluster, and refused where they cannot serve
+workers  workers started here or found on a cluster; unsuitable ones are refused
 """
 
 from .frames import render

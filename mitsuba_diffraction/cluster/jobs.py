@@ -1,4 +1,4 @@
-"""Independent jobs, here or on workers: scans as they finish, windows in their order."""
+"""Independent jobs, here or on workers: scans as they finish, windows in order."""
 
 from __future__ import annotations
 

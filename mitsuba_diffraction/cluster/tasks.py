@@ -1,6 +1,6 @@
-"""Work of a worker: passes of one frame rendered and added up, and sums of other workers added.
+"""Work of a worker: render and add up passes of one frame; add sums of other workers.
 
-The files of a scene are known by content: used in place, or copied to where a worker lacks them.
+Scene files are identified by content: used in place, or copied to workers that lack them.
 """
 
 from __future__ import annotations

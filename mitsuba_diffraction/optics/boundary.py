@@ -143,7 +143,7 @@ def kirchhoff(geometry: Geometry, index: Index) -> Jones:
 
 
 def kirchhoff_power(geometry: Geometry, index: Index) -> Number:
-    """Return ½ Σ|J|² of `kirchhoff`, without its turns."""
+    """Return ½ Σ|J|² of `kirchhoff`: rotations cancel."""
     if isinstance(index, Filmed):
         index = index.tilted(geometry.tilt)
     one, cosine = geometry.one_plus_dot, geometry.cos_half

@@ -21,7 +21,7 @@ def maximum(x: Float, least: Float) -> Float:
 
 
 def minimum(x: Float, most: Float) -> Float:
-    """Return the smaller number, like `maximum`."""
+    """Return the smaller number (see `maximum`)."""
     return dr.select(x > most, most, x)
 
 

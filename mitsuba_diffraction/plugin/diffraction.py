@@ -50,7 +50,7 @@ lateral_scale : float or texture ∂ [1]
     channel. Spatial frequencies are divided by it. coherence_width applies at the largest factor,
     or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
     same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
-    to 1. Scales of energy follow it (docs/holograms.md).
+    to 1. Energy is conserved for it (docs/holograms.md).
 lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
     Largest factor of a texture, above which factors are clipped; required unless the texture is a
     bitmap. Or the largest value that a number may change to: give 1.5 × lateral_scale to optimise
@@ -105,8 +105,8 @@ eta, k : spectra ∂
     Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
-    or names: `water`. The medium changes the reflectance alone. For light within it, whose waves
-    are shorter, multiply lateral_scale and height_scale by its index, as `--ext-ior` does.
+    or names: `water`. The medium changes the reflectance alone. Waves in it are shorter: multiply
+    lateral_scale and height_scale by its index, as `--ext-ior` does.
     Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
@@ -124,8 +124,8 @@ film_ior : float or string [none]
     costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01,
     or 0.001 of thick films. Derivatives with respect to the film include it.
 film_thickness : float ∂ [none]
-    Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
-    coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.
+    Thickness of the film along the vertical, nm. 2 n d is at most 12 µm, the coherence length. RGB
+    variants sum the film's colours over wavelengths, apart from the orders.
 film_k : float ∂ [0]
     Absorption of the film: k of its index n + ik, over the index of the medium above. Excludes a
     nested BSDF.

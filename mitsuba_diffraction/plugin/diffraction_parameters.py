@@ -176,10 +176,10 @@ def _layering(
 ) -> Layering:
     if name == "transmission":
         if "diffuse_weight" in props:
-            raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")
+            raise DiffractionError("diffuse_weight needs layering='thesis'; leave it out")
         return Transmission(reflectance)
     if not nested:
-        raise DiffractionError("layering='thesis' blends with a nested BSDF, but there is none")
+        raise DiffractionError("layering='thesis' needs a nested BSDF; add one")
     weight = number(props, "diffuse_weight", 0.0)
     if not 0.0 <= weight <= 1.0:
         raise DiffractionError(f"diffuse_weight={weight:g} must lie between 0 and 1")

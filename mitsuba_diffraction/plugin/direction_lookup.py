@@ -138,7 +138,7 @@ class DirectionLookup:
 def at_horizon(cosine: Float) -> Float:
     """Factor on light within half a degree of the horizon, where tables of directions end.
 
-    An albedo that gains there rises as 1/cosθ, of wide lobes faster.
+    An albedo above 1 there rises as 1/cosθ, or faster (wide lobes).
 
     cosine : of the angle to the normal, above 0.
     """

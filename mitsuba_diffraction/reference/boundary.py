@@ -113,7 +113,7 @@ def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
 
 
 def unpolarised(jones: ArrayLike) -> Real:
-    """N = ½ Σ|J|², the power of unpolarised light of unit power after `jones`, (...)."""
+    """N = ½ Σ|J|², the power of unpolarised light of power 1 after `jones`, (...)."""
     entries = np.asarray(jones, np.complex128)
     return np.asarray(0.5 * np.sum(np.abs(entries) ** 2, axis=(-2, -1)), np.float64)
 

@@ -14,11 +14,11 @@ from ..plugin.conductors import tabulated_index
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """Complex index n + ik, interpolated linearly; held at the ends.
+    """Complex index n + ik, linear in between, constant beyond.
 
     Attributes
     ----------
-    name : for people.
+    name : for messages.
     wavelengths : (n,) nm, in vacuum.
     values : (n,) n + ik; None for a perfect conductor.
     """

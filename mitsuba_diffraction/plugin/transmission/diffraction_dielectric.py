@@ -20,7 +20,8 @@ energy_conserving : boolean [true]
     Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
     directions of both sides. Where the other orders of a steep surface exceed 1 on their own, all
     light is attenuated by s(ωi) s(ωo). It takes a few seconds the first time and is kept in the
-    cache, in steps of 0.01 of eta. `false` is the model as it is, for checks.
+    cache, in steps of 0.01 of eta, finer near 1. `false` is the model as it is, for checks, and
+    needed for coherence `patch` of a rough surface, where other orders interfere with order 0.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that

@@ -1,4 +1,4 @@
-"""Shadow maps: distance of the nearest surface from a light without extent, by direction.
+"""Shadow maps: distance from a point or directional light to the nearest surface.
 
 A map covers the part of the scene that the camera sees, which `Casters.visible` determines once for
 a camera. Directional lights have parallel projections, points have perspective ones. Each map is

@@ -127,7 +127,7 @@ class ErrorMeter:
         return result
 
     def taps_alone(self, kappa: float) -> Parts:
-        """Parts of a table whose series and storage are perfect: the taps' share of the error."""
+        """Error parts due to the taps alone, as if series and storage were exact."""
         (exact,) = self._exact([kappa])
         (y, x), (last_y, last_x) = self._outer[::-1], self.grid.last[::-1]
         inner = exact[y - last_y : y + last_y + 1, x - last_x : x + last_x + 1].copy()

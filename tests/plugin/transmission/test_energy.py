@@ -9,6 +9,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import polar, rough_patch
+from tests.support.furnace import furnace_in
 from tests.support.transmitting import SIDES
 
 pytestmark = [
@@ -51,3 +52,23 @@ def test_no_light_comes_from_nothing(field, kind, index, width):
     # the table's tolerance, and what 4 standard errors of 64 trials leave
     assert np.all(np.abs(mean - 1.0) < 4.0 * error + 5e-3)
     assert most < 20.0  # one of ten samples or more is drawn from each side
+
+
+def test_a_narrow_window_at_a_critical_angle_gains_nothing():
+    """An index of 1.0145, from inside beyond 80.3°: its rounding moves the critical angle."""
+    mi.set_variant("llvm_ad_mono")
+    given = {"int_ior": 1.0145, "ext_ior": 1.0, "coherence_width": 2.0}
+    flat = md.HeightField(np.zeros((8, 8)), 0.5)
+    bsdf = mi.load_dict(md.bsdf_dict(flat, plugin="diffraction_dielectric", **given))
+    angles = np.array([60.0, 82.0, 84.0, 87.0, 88.3, 89.5])
+    directions = np.array([polar(theta, 20.0) * [1, 1, -1] for theta in angles])
+    mean, error = furnace_in(bsdf, directions, 1)
+    assert np.all(mean <= np.where(angles < 85.0, 1.01, 1.05) + 4.0 * error)
+
+
+def test_one_window_of_a_rough_interface_is_refused():
+    window = {"coherence": "patch", "coherence_width": 3.0, "int_ior": 1.3}
+    patch = {"plugin": "diffraction_dielectric", **window}
+    with pytest.raises((md.DiffractionError, RuntimeError), match="energy_conserving to false"):
+        mi.load_dict(md.bsdf_dict(FIELDS["5 nm"], **patch))
+    mi.load_dict(md.bsdf_dict(FIELDS["5 nm"], **patch, energy_conserving=False))

@@ -171,8 +171,8 @@ Deviation of colours for light from 60°, and of cuts of scales also from 0° an
 
 {table(["surface", *names], rows)}
 
-On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more than a tenth; the goal
-is 0. On aluminium {len(against.better)} of {len(against.every)} are better than Kirchhoff and
+On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more than a tenth (goal: 0).
+On aluminium {len(against.better)} of {len(against.every)} are better than Kirchhoff and
 {len(against.worse)} worse, at most by {least:.1f} points
 ([table](validation/gratings.md#aluminium-blend-against-kirchhoff))."""
 
