@@ -95,7 +95,8 @@ class Surface:
             return Conservation()
         few = 0 < self.orders.strong <= settings.few_orders
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
-        places = settings.between[few and not self._both_sides]
+        # waves are closer than orders need where a film has fringes
+        places = settings.between[few and fringes <= count and not self._both_sides]
         for place in places if len(nodes) > 1 else (0.0,):
             self._lower_between(nodes, place, parts, c, s)
 
