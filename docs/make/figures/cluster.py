@@ -252,7 +252,7 @@ def costs_text(costs: Costs) -> str:
         f"{1e9 * costs.addition:.2g} ns a byte for a worker to add one.\n"
         f"- Assumed: workers of two such cores, tasks that vary by {costs.spread:.0%} (standard "
         f"deviation), {8e-9 / costs.network:g} Gbit/s at every machine. The scheduler and the "
-        "client do one thing at a time; a free worker takes the next task; nobody dies.\n"
+        "client do one thing at a time; a free worker takes the next task; none fails.\n"
         f"- The film: {job_text(FILM)}.\n"
         f"- The still: {job_text(STILL)}."
     )

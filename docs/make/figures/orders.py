@@ -79,8 +79,8 @@ SCENES = (
         _RECIPE.format("lamellar") + "period = 1.6\ndepth = 0.12\npixels_per_period = 64\n",
         "material=Al,coat_ior=1.58", ("resx=450", "resy=330", "spp=128"),
         "Order 2, the green and violet fan behind the hole, is missing in the model, whose "
-        "grooves, half as wide as their period, have no even orders. In the light of the "
-        "surroundings the solved disc is grey, where the model is blue in front and behind.",
+        "grooves, half as wide as their period, have no even orders. Where it mirrors "
+        "the room the solved disc is grey; the model is blue in front and behind.",
     ),
     Scene(
         "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
