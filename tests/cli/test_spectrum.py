@@ -144,7 +144,7 @@ def test_groups_and_ranges_that_are_none_are_one_line(run, scans, arguments, nam
 
 def test_notes_on_many_scans_are_one_scan_s_and_a_number(run, scans, here):
     for n in range(2):
-        np.save(scans / f"scan{n}.npy", 8.0 * np.load(scans / f"scan{n}.npy"))
+        np.save(scans / f"scan{n}.npy", 2.5 * np.load(scans / f"scan{n}.npy"))
     ran = run("spectrum", scans, *PIXEL, *QUICK)
     assert ran.code == 0, ran.err
     assert sum("info " in line for line in ran.err.splitlines()) == 1
