@@ -73,7 +73,7 @@ def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
     import mitsuba as mi
 
     from ..plugin.diffraction import Diffraction
-    from ..plugin.orders.orders_sheet import diffraction_orders
+    from ..plugin.orders.orders_block import diffraction_orders
 
     with tempfile.TemporaryDirectory() as folder:
         solved = isinstance(table, OrderTable)

@@ -334,7 +334,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     from ..analysis.media import medium_index
     from ..plugin.dictionary import ORDERS, bsdf_dict
     from ..plugin.diffraction import Diffraction
-    from ..plugin.orders.orders_sheet import diffraction_orders
+    from ..plugin.orders.orders_block import diffraction_orders
     from ..plugin.presets import preset
 
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}

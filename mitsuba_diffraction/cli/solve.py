@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin",
+    "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
     "wavelength_range", "tolerance", "solver", "resolution", "polarised", "accept", "theta", "phi",
     "step", "jobs", "workers", "scheduler",
 )  # fmt: skip
@@ -83,6 +83,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--thin", action="store_true", default=None,
         help="a thin sheet that light goes through, with these grooves on its upper side; needs an "
         "index as material",
+    )  # fmt: skip
+    group.add_argument(
+        "--block", action="store_true", default=None,
+        help="a clear block with these grooves on its upper face, in light from above and from "
+        "within; needs an index as material; solved by coupled waves",
     )  # fmt: skip
     group = parser.add_argument_group("the table")
     group.add_argument("--wavelength-range", metavar="A,B", type=_pair, help="nm; default: 380,780")
@@ -219,14 +224,25 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     """Solve a recipe on the requested processes; partial solutions are stored beside the output."""
     from ..solve.accuracy import WORST
     from ..solve.beam import solve_beam
+    from ..solve.block import solve_block
     from ..solve.jobs import Jobs
     from ..solve.orders import solve_orders
 
-    solve: Callable[..., OrderTable] = functools.partial(solve_orders, thin=recipe.thin)
-    if args.theta is not None:
+    medium: dict[str, Any] = {
+        name: getattr(recipe, name) for name in ("superstrate", "layers", "beneath", "substrate")
+    }
+    solve: Callable[..., OrderTable] = functools.partial(solve_orders, thin=recipe.thin, **medium)
+    if args.block:
+        _check_block(recipe, args)
+        solve = solve_block
+    elif args.theta is not None:
         _check_beam(recipe, args)
-        light = {"theta": args.theta, "phi": args.phi or 0.0, "step": args.step or 5.0}
-        solve = functools.partial(solve_beam, **light)
+        light: dict[str, Any] = {
+            "theta": args.theta,
+            "phi": args.phi or 0.0,
+            "step": args.step or 5.0,
+        }
+        solve = functools.partial(solve_beam, **light, **medium)
     elif args.phi is not None or args.step is not None:
         args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
@@ -247,10 +263,6 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         table = solve(
             recipe.profile,
             recipe.material,
-            superstrate=recipe.superstrate,
-            layers=recipe.layers,
-            beneath=recipe.beneath,
-            substrate=recipe.substrate,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -265,6 +277,20 @@ def _check_beam(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
         if used:
             args.parser.error(
                 f"argument --theta: not allowed with --{name}: reflected shares alone"
+            )
+
+
+def _check_block(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
+    """Refuse what blocks do not have, with a usage error."""
+    for name, used in (
+        ("thin", recipe.thin), ("superstrate", recipe.superstrate != 1.0),
+        ("layer", recipe.layers), ("beneath", recipe.beneath), ("substrate", recipe.substrate),
+        ("theta", args.theta is not None),
+    ):  # fmt: skip
+        if used:
+            args.parser.error(
+                f"argument --block: not allowed with --{name}; the block's index is relative to "
+                "the medium above"
             )
 
 
@@ -296,6 +322,7 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
     low, high = table.wavelengths
     medium = f" under index {table.superstrate:g}" if table.superstrate > 1 else ""
     medium = ", thin sheet" if table.thin else medium
+    medium = ", block" if table.block else medium
     yield "grating", f"{facts['profile']}, {facts['material']}{medium}, {low:g} to {high:g} nm"
     yield "solver", str(facts["solver"])
     if facts.get("solver_error") is not None:

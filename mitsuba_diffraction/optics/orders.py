@@ -84,6 +84,23 @@ def order_direction(x: Number, y: Number, order: Number, stride: Number) -> Orde
     return OrderDirection(out, 1.0 - xp.fma(out, out, y * y))
 
 
+@formula
+def port_power(z: Number, other: Number) -> Number:
+    """Return G = 4z/|z + z'|², the factor of a channel in orders of an interface's light.
+
+    To first order in the heights, an order of s light carries G G' times a constant (Rice 1951,
+    Comm. Pure Appl. Math. 4, 351), with G and G' of the channels it comes through and leaves by.
+
+    z : normal part of the wave vector over 2π/λ in the channel's medium, 0 if it does not
+        propagate.
+    other : square of z' in the other medium, below 0 beyond the critical angle.
+    """
+    xp = of(z, other)
+    total = z + xp.sqrt(xp.maximum(other, 0.0))
+    square = xp.where(other > 0.0, total * total, z * z - other)
+    return 4.0 * z * xp.reciprocal(xp.maximum(square, 1e-7))  # 0 only where nothing propagates
+
+
 def least_c(index: float) -> float:
     """Return the least c = √(1 − y²) in a medium of light from outside."""
     return math.sqrt(1.0 - 1.0 / index**2)

@@ -16,7 +16,8 @@ from . import arithmetic
 # Base classes first
 _MODULES = (
     "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric",
-    "orders.diffraction_orders", "orders.orders_sheet", "diffraction_mix", "presets",
+    "orders.diffraction_orders", "orders.orders_sheet", "orders.orders_block", "diffraction_mix",
+    "presets",
 )  # fmt: skip
 
 

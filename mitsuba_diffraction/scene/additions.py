@@ -342,7 +342,7 @@ def _value(text: str) -> float | bool | str:
 def _two_sided(state: Any, surface: Any) -> Any:
     """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
     name = surface.plugin_name()
-    if name == TRANSMITTING or (name == ORDERS and OrderTable.load(surface["table"]).thin):
+    if name == TRANSMITTING or (name == ORDERS and OrderTable.load(surface["table"]).sides == 2):
         return surface
     props = mi.Properties("twosided")
     props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))

@@ -4,6 +4,7 @@ Contents
 --------
 accuracy    error of a table, measured at random directions and wavelengths
 beam        `solve_beam`: orders of some directions of light alone, of an echelle
+block       `solve_block`: a face of a block, in light from outside and from within
 orders      `solve_orders`: from a profile and a material to a table
 measured    `read_orders`: from efficiencies that were solved or measured elsewhere
 efficiencies  files of efficiencies, CSV and NetCDF, and their conventions

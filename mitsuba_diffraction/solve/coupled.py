@@ -272,7 +272,8 @@ class _Side:
         With k² = n² − y² a wave of unit |E| whose E lies along the grooves has the tangential E
         (−xy, k²)/(n k), and one whose B does has (±z, 0)/k. The power is z.
         """
-        k, z = np.sqrt(self.index**2 - self.y**2), self.z
+        # positive, for numbers that are finite where no channel propagates
+        k, z = np.sqrt(max(self.index**2 - self.y**2, 1e-12)), self.z
         rows = (
             (-self.x * self.y / (self.index * k), down * z / k),
             (np.full(len(z), k / self.index), np.zeros(len(z))),

@@ -28,7 +28,7 @@ from .integral import IntegralSolver
 from .nodes import Place
 from .profiles import Profile
 from .sheet import sheet_efficiencies
-from .stations import Complex, Grating, Real, Solver
+from .stations import Complex, Grating, Real, Solver, on_both_sides
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
@@ -94,6 +94,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     content = hashlib.sha256(
         repr(
             ("amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin)
+            + (("block",) if grating.block else ())
         ).encode()
     )
     profile, material = grating.profile, grating.material
@@ -151,6 +152,8 @@ def solve_place(problem: Problem, place: Place) -> Solved:
         ) from error
     if grating.thin:
         values = np.sqrt(sheet_efficiencies(values, station))
+    if grating.block:
+        values = on_both_sides(values, station)
     values = values.astype(np.complex64).astype(np.complex128)
     return Solved(values, time.thread_time() - start)
 

@@ -58,7 +58,8 @@ def list_orders(
     """List the efficiencies of all propagating orders, with the conventions of `efficiencies`.
 
     Raises a DiffractionError if an angle or wavelength is out of its range, there are over two
-    million lines, or the table has no s and p of conical light (`OrderTable.polarised_efficiency`).
+    million lines, the table is of a block, or it has no s and p of conical light
+    (`OrderTable.polarised_efficiency`).
 
     Parameters
     ----------
@@ -68,6 +69,11 @@ def list_orders(
     polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
         unpolarised light.
     """
+    if table.block:
+        raise DiffractionError(
+            "orders of blocks have directions on two sides, which lines of R and T have not; take "
+            "OrderTable.efficiency"
+        )
     lights = [np.unique(np.asarray(values, np.float64)) for values in (wavelengths, theta, phi)]
     low, high = table.wavelengths
     check_light(lights[0], lights[1], lights[2], "orders")

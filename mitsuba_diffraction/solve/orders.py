@@ -185,11 +185,11 @@ def solve_orders(
     if error.polarised is not None:
         header["error_polarised"] = error.polarised
     if not error.within(how.tolerance):
-        _refuse_or_warn(error, how)
+        refuse_or_warn(error, how)
     return table
 
 
-def _refuse_or_warn(error: Measured, how: Settings) -> None:
+def refuse_or_warn(error: Measured, how: Settings) -> None:
     """Refuse a table that misses its tolerance, or warn if it is accepted."""
     mean = max(error.mean, error.polarised or 0.0)
     text = (

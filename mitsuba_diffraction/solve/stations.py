@@ -42,6 +42,8 @@ class Grating:
     wavelengths : shortest and longest of the table, in vacuum, nm.
     thin : whether the material is a sheet with a flat lower side (`sheet`).
     structure : films on the profile, and what lies beneath it.
+    block : whether the medium above is a block, the material the rarer one that surrounds it, and
+        light of both is solved (`block`).
     """
 
     profile: Profile
@@ -50,6 +52,7 @@ class Grating:
     wavelengths: tuple[float, float]
     thin: bool = False
     structure: Structure = field(default_factory=Structure)
+    block: bool = False
 
     @property
     def optical_period(self) -> float:
@@ -58,8 +61,8 @@ class Grating:
 
     @property
     def sides(self) -> int:
-        """Number of sides with light: 2 of a thin sheet, else 1."""
-        return 2 if self.thin else 1
+        """Number of sides with light: 2 of a thin sheet or a block, else 1."""
+        return 2 if self.thin or self.block else 1
 
     @property
     def is_perfect(self) -> bool:
@@ -71,7 +74,7 @@ class Grating:
         r, t = float(cells.sine_squared(rho)), float(cells.sine_squared(tau))
         smallest = LEAST_COSINE * 2e3 * self.optical_period / self.wavelengths[0] - band
         # an order at a distance δ from the end of p has the squared cosine 4δ/K
-        margin = 0.25 * LEAST_COSINE**2 * (band + r)
+        margin = 0.25 * LEAST_COSINE**2 * max(band + r, 1e-3)
         r = float(np.clip(max(r, smallest), 2.0 * margin, 1.0 - 2.0 * margin))
         begin, end = (0.0, r) if kind == cells.A else (r, 1.0)
         fraction = float(np.clip(begin + t * (end - begin), begin + margin, end - margin))
@@ -88,7 +91,7 @@ class Grating:
             lam / (1e3 * self.superstrate),
             None if index is None else index / self.superstrate,
             np.sqrt(1.0 - cosine**2),
-            self.thin,
+            self.thin or self.block,
             tuple(self._relative(material, lam) for material in self.structure.materials),
         )
 
@@ -135,10 +138,10 @@ class Station:
         """Numbers of the channels in which light of any wavelength propagates within a sheet."""
         if not self.thin or self.indices is None:
             return np.arange(0)
-        steepest = float(
-            np.sqrt((self.indices.real**2 - self.along**2) / (1 - self.along**2)).max()
-        )
-        middle, half = 0.5 * self.extent - self.fraction, 0.5 * self.extent * steepest
+        square = float(((self.indices.real**2 - self.along**2) / (1 - self.along**2)).max())
+        if square <= 0.0:  # all light is guided within a block
+            return np.arange(0)
+        middle, half = 0.5 * self.extent - self.fraction, 0.5 * self.extent * np.sqrt(square)
         return np.arange(int(np.ceil(middle - half)), int(np.floor(middle + half)) + 1)
 
     def sines_of(self, channels: NDArray[np.int64]) -> Real:
@@ -181,3 +184,13 @@ def reversed_light(values: NDArray[Number], sides: int = 1) -> NDArray[Number]:
     """
     ports = cells.reversed_ports(values.shape[1], sides)
     return values[:, ports][:, :, :, ports].transpose(0, 3, 4, 1, 2)
+
+
+def on_both_sides(amplitudes: Complex, station: Station) -> Complex:
+    """Return amplitudes between as many ports below as above, 0 where no channel propagates."""
+    n = station.channels
+    ports = np.concatenate([np.arange(n), n + station.inside])
+    shape = (len(amplitudes), 2 * n, 2, 2 * n, 2)
+    result = np.zeros(shape, complex)
+    result[:, ports[:, None], :, ports] = amplitudes.transpose(1, 3, 0, 2, 4)
+    return result

@@ -58,3 +58,18 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
     refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
     assert ".json or .brdf" in refused.err
     assert "no heights" in run("evaluate", "grating.nc").err
+
+
+def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540,560")
+    settings = ("--tolerance", 0.2, "--resolution", 4, "-o", "block.nc")
+    ran = run("solve", "lamellar", *grating, "--block", *settings)
+    assert ran.code == 0, ran.err
+    assert "index 1.5" in ran.out
+    assert json.loads(run("info", "block.nc", "--json").out)["block_index"] == 1.5
+    assert "two sides" in run("orders", "block.nc").err
+    assert "light that goes through" in run("export-bsdf", "block.nc").err
+    for other in (("--superstrate", 1.3), ("--thin",), ("--layer", "1.46:0.1"), ("--theta", 10)):
+        assert "not allowed with" in run("solve", "lamellar", *grating, "--block", *other).err
+    assert "--import" in run("solve", "a.csv", "--import", "--period", 1, "--block").err

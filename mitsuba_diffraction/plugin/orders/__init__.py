@@ -3,9 +3,11 @@
 Contents
 --------
 diffraction_orders  `DiffractionOrders`: reflection
-orders_sheet        `OrdersSheet`: both sides of a thin sheet; and the plugin
+orders_sheet        `OrdersSheet`: both sides of a thin sheet
+orders_block        `OrdersBlock`: a block's face, in light from both sides; and the plugin
 grating_parameters  parameters of the plugin, read from Mitsuba's Properties and checked
 order_lookup        a table of orders inside a kernel
+block_lookup        a block's table inside a kernel
 polarised_lobes     Mueller matrices in polarised variants
 lobes               light of all orders in a variant's channels, and directions drawn by it
 """

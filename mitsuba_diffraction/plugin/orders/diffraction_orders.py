@@ -34,8 +34,9 @@ other light is not reflected, which is warned of where it is visible. f is recip
 table is, at the centres of lobes.
 
 A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
-normals point to. It reflects and transmits light from either side, and nests no BSDF. Component 0
-is the reflection, component 1 the transmission. It depolarises light.
+normals point to. A table of a block (`solve --block`) makes it the block's face, with the table's
+index, in place of `dielectric`. Both reflect and transmit light from either side, nest no BSDF, and
+depolarise light. Component 0 is the reflection, component 1 the transmission.
 
 XML and the same in Python:
 
@@ -131,9 +132,15 @@ class DiffractionOrders(NestingBSDF):
         wi = site.si.wi
         incident, cos_i = dr.detach(site.frame.turned(wi)), mi.Frame3f.cos_theta(wi)
         drawn = self._lobes.draw(incident, cos_i, site.si, sample1, sample2)
-        direction = direction_of(site.frame.from_table(drawn.uv) - mi.Vector2f(wi.x, wi.y))
-        direction.z = dr.select(drawn.valid, direction.z, -1.0)
-        return dr.detach(direction), drawn.below
+        tangential = site.frame.from_table(drawn.uv) - mi.Vector2f(wi.x, wi.y)
+        return self._direction(tangential, drawn.valid), drawn.below
+
+    @staticmethod
+    def _direction(tangential: Vector2f, valid: Mask) -> Vector3f:
+        """Return the direction above of a tangential part, z below 0 if invalid."""
+        direction = direction_of(tangential)
+        direction.z = dr.select(valid, direction.z, -1.0)
+        return dr.detach(direction)
 
     def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
         """See `NestingBSDF.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
@@ -170,7 +177,7 @@ class DiffractionOrders(NestingBSDF):
             orientation=self.orientation.quantity,
             frame=lambda si: (*self.orientation.rotation(si, mi.Mask(True)), 1.0),
             nested=None if self.nested is None else Nested(self.nested),
-            transmits=self.table.thin,
+            transmits=self.table.sides == 2,
         )
 
     def shown(self) -> dict[str, Any]:

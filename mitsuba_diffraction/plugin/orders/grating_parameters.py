@@ -49,10 +49,11 @@ def read_parameters(props: Properties) -> Parameters:
     """
     nested = nested_of(props, ORDERS)
     table = _table(props)
-    if table.thin and nested is not None:
+    if table.sides == 2 and nested is not None:
+        kind = "thin sheet" if table.thin else "block"
         raise DiffractionError(
-            f"the table is that of a thin sheet, beneath which no BSDF ({class_of(nested)}) lies; "
-            "put a surface behind the sheet instead"
+            f"the table is that of a {kind}, beneath which no BSDF ({class_of(nested)}) lies; "
+            f"put a surface behind the {kind} instead"
         )
     return Parameters(
         table=table,

@@ -25,6 +25,7 @@ from ..loops import sum_of
 from ..memory import index_between, read_record, upload, upload_numbers
 from ..sampling import BELOW_ONE, invert
 from ..types import Colour, Context, Float, Index, Interaction, Mask, Spectrum, Vector2f
+from .block_lookup import BlockLookup
 from .order_lookup import OrderLookup, Row, order_lookup
 
 #: Mask of lanes whose ωo lies below a sheet; None without a sheet.
@@ -119,7 +120,7 @@ class _Window:
 
     def __init__(self, table: OrderTable, coherence_width: float) -> None:
         self.sigma, self.period = sigma_of(coherence_width), table.period
-        self.lookup = order_lookup(table, self.lookup_kind)
+        self.lookup = order_lookup(table, BlockLookup if table.block else self.lookup_kind)
         self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
         # where an order's neighbour adds to its lobe
         self._overlaps = 0.25 * self._sharpness < _REACH
@@ -286,7 +287,7 @@ class DaylightLobes(_Window):
             dr.floor(self._waves[1] * dr.rcp(step)),
             dr.sqrt(_REACH * dr.rcp(maximum(aside, 1e-8))),
         )
-        most = int(2.0 * self._waves[1] / unit) + 1
+        most = int(2.0 * self.lookup.index * self._waves[1] / unit) + 1
         lit = (last >= first) & (radius * (self._waves[1] / unit) ** 2 > 0.25)
         count = dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, float(most))), 0)
         variance = dr.rcp(square) * (0.5 / self.sigma**2)

@@ -1,4 +1,4 @@
-"""Thin sheets with solved orders, and the plugin `diffraction_orders` (Dr.Jit).
+"""Thin sheets with solved orders (Dr.Jit).
 
 Both sides of a sheet have the same medium, so order m leaves with the same tangential part above
 and below: lobes, look-ups and draws work as for a reflecting grating, with another column of the
@@ -17,14 +17,12 @@ from ..types import (
     Float,
     Interaction,
     Mask,
-    Properties,
     Sample,
     Spectrum,
     Vector2f,
     Vector3f,
 )
 from .diffraction_orders import DiffractionOrders
-from .grating_parameters import read_parameters
 
 
 class OrdersSheet(DiffractionOrders):
@@ -39,7 +37,7 @@ class OrdersSheet(DiffractionOrders):
     ) -> tuple[Spectrum, Float]:
         """See `NestingBSDF.evaluated`; of the requested components."""
         sides = mi.Frame3f.cos_theta(site.si.wi) * mi.Frame3f.cos_theta(wo)
-        lit = active & (sides != 0.0) & _requested(ctx, sides < 0.0)
+        lit = active & (sides != 0.0) & requested(ctx, sides < 0.0)
         below = mi.Mask(wo.z < 0.0)
         above = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
         pair = Pair(site.si, above, site.frame, lit)
@@ -64,25 +62,17 @@ class OrdersSheet(DiffractionOrders):
         wo.z = dr.mulsign(dr.maximum(wo.z, 0.0), dr.select(below, mi.Float(-1.0), 1.0))
         value, density = self.evaluated(ctx, site, wo, active, "vd")
         lit = density > 0.0
-        passed = mi.Frame3f.cos_theta(si.wi) * wo.z < 0.0
-        result = sample_of(wo, density, passed, 1.0)
+        cos_i = mi.Frame3f.cos_theta(si.wi)
+        result = sample_of(wo, density, cos_i * wo.z < 0.0, self.relative_index(cos_i, wo.z))
         return result, dr.select(lit, value / dr.select(lit, density, 1.0), 0.0)
 
+    def relative_index(self, cos_i: Float, cos_o: Float) -> Float:
+        """Return the index of the medium of ωo over that of ωi, by their cosines."""
+        return mi.Float(1.0)
 
-def _requested(ctx: Context, passed: Mask) -> Mask:
+
+def requested(ctx: Context, passed: Mask) -> Mask:
     """Mask of the lanes whose component a context asks for; passed : whether light goes through."""
     reflection = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
     transmission = ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1)
     return dr.select(passed, mi.Mask(transmission), mi.Mask(reflection))
-
-
-def diffraction_orders(props: Properties) -> DiffractionOrders:
-    """Return the BSDF of the plugin: a sheet if the table has one.
-
-    Raises a DiffractionError with the parameter, its value and the choices.
-    """
-    read = read_parameters(props)
-    return (OrdersSheet if read.table.thin else DiffractionOrders)(props, read)
-
-
-mi.register_bsdf("diffraction_orders", diffraction_orders)

@@ -6,6 +6,7 @@ OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
 Band        efficiencies of the directions with the same number of propagating orders
 cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
 lookup      interpolation in NumPy
+blocks      light on both sides of a block's face, whose channels differ in number
 polarised   Mueller matrices of orders, and their axes
 grids       even grids that the BSDF reads, under a coat where the table has one
 daylight    the sum of an order's lobe over daylight, for RGB variants

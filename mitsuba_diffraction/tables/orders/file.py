@@ -5,9 +5,10 @@ The variable `kind_a_K` holds kind A of band K, with the dimensions `tau_K`, `rh
 polarised table are `mueller_a_K` and `mueller_b_K`, with `row` and `column` for `polarisation`.
 Numbers are packed in 16 bits, as the CF conventions have it: efficiency = scale_factor × number.
 Global attributes hold the rest: `period` (µm), `wavelengths` (nm, in vacuum), `superstrate`
-(index), `thin` (1 for a sheet, whose `j` and `q` are ports of `cells`; else left out), `components`
-(of `polarisation`, "s and p" of imported efficiencies; else left out), `header` (JSON), `version`,
-and `sha256` of all of these and the numbers.
+(index), `thin` (1 for a sheet, whose `j` and `q` are ports of `cells`; else left out), `block`
+(index, with even nodes and the ports of `blocks`; else left out), `components` (of `polarisation`,
+"s and p" of imported efficiencies; else left out), `header` (JSON), `version`, and `sha256` of all
+of these and the numbers.
 """
 
 from __future__ import annotations
@@ -65,10 +66,12 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         file.header = header
         if table.thin:
             file.thin = np.int32(1)
+        if table.block:
+            file.block = np.float64(table.block)
         if table.components != GROOVES:
             file.components = table.components
         outline = (table.period, tuple(table.wavelengths), table.superstrate, header)
-        file.sha256 = _checksum(outline, table.thin, table.components, packed)
+        file.sha256 = _checksum(outline, table.thin, table.components, table.block, packed)
         file.createDimension("polarisation", 2)
         if table.polarised:
             file.createDimension("row", 4)
@@ -133,6 +136,7 @@ def _table(file: Any) -> OrderTable:
     period, superstrate = float(file.period), float(file.superstrate)
     low, high = (float(number) for number in file.wavelengths)
     header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
+    block = float(file.block) if hasattr(file, "block") else None
     if not isinstance(content := json.loads(header), dict):
         raise ValueError("its header is no JSON object")
     components = getattr(file, "components", GROOVES.encode()).decode("utf-8")
@@ -142,7 +146,8 @@ def _table(file: Any) -> OrderTable:
         if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
             raise ValueError(f"{name} claims {variable.shape} numbers")
         packed[int(k), kind + (_MUELLER if first == "mueller" else "")] = variable[:]
-    checksum = _checksum((period, (low, high), superstrate, header), thin, components, packed)
+    outline = (period, (low, high), superstrate, header)
+    checksum = _checksum(outline, thin, components, block, packed)
     if file.sha256 != checksum.encode():
         raise ValueError("its checksum is of another one")
     unpacked = {
@@ -152,7 +157,7 @@ def _table(file: Any) -> OrderTable:
         for key, numbers in packed.items()
     }
     bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
-    return OrderTable(period, (low, high), bands, superstrate, content, thin, components)
+    return OrderTable(period, (low, high), bands, superstrate, content, thin, components, block)
 
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
@@ -164,6 +169,7 @@ def _checksum(
     outline: tuple[float, tuple[float, ...], float, str],
     thin: bool,
     components: str,
+    block: float | None,
     packed: dict[tuple[int, str], NDArray[np.int16]],
 ) -> str:
     """Return the checksum of period, wavelengths, superstrate and header, and the numbers."""
@@ -172,6 +178,8 @@ def _checksum(
         content.update(b"thin")
     if components != GROOVES:
         content.update(components.encode())
+    if block:
+        content.update(repr(("block", block)).encode())
     for key in sorted(packed):
         content.update(repr((key, packed[key].shape)).encode())
         content.update(np.ascontiguousarray(packed[key], ">i2").data)

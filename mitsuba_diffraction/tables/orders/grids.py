@@ -6,6 +6,7 @@ c is at least √(1 − 1/n²).
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...optics.coat import face_transmittance
 from ...optics.orders import least_c
-from . import cells
+from . import blocks, cells
 from .cells import Array
 from .lookup import clamped
 from .polarised import smooth_elements
@@ -77,7 +78,11 @@ class Rows(NamedTuple):
 
 
 def corners(table: OrderTable) -> Corners:
-    """Resample a table for the renderer."""
+    """Resample a table for the renderer; a block's has even nodes, and reduced efficiencies."""
+    if table.block:
+        within = Counts(*(n - 1 for n in table.bands[0].counts))
+        reduced = functools.partial(blocks.reduced, table)
+        return Corners(within, *_stacked(table, lambda *of: _records(reduced(*of), within)))
     counts = _cells(table)
 
     def records(band: Band, kind: int) -> NDArray[np.float16]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError, warn
-from . import cells
+from . import blocks, cells
 from .cells import Array, Cell
 from .polarised import ODD, nearest_pure, smooth_elements
 from .table import GROOVES, S_AND_P, Band, OrderTable
@@ -33,23 +33,26 @@ def efficiency(
 ) -> Array:
     """Return the efficiency of an order for unpolarised light, from the table's polynomials.
 
-    Raises a DiffractionError if light below is asked for, and the table is not of a sheet.
+    Raises a DiffractionError if light below is asked for, and the table is of reflected light.
 
     Parameters
     ----------
     x, y : direction cosines within the superstrate of the mirror direction of the incident
-        light, −(ωi)_x and −(ωi)_y.
+        light, −(ωi)_x and −(ωi)_y; times the index for light within a block.
     wavelength : in vacuum, nm. Beyond the table's by more than `table.MARGIN` octaves the table is
         dark, with a warning; within that margin, the nearest wavelength's.
     order : m; order m leaves at x + m λ/(n d) and y.
-    from_below : whether the light comes from below a thin sheet.
-    transmitted : whether the order leaves on the other side of a thin sheet.
+    from_below : whether the light comes from below a thin sheet, or from within a block.
+    transmitted : whether the order leaves on the other side of a thin sheet or a block's face.
 
     Returns
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
     """
     light = (table, x, y, wavelength, order, from_below, transmitted)
+    if table.block:
+        lit = _lit(table, np.asarray(wavelength, np.float64))
+        return np.asarray(np.where(lit, blocks.efficiency(*light), 0.0))
     return np.asarray(_stored(*light).mean(axis=-1))
 
 
@@ -152,6 +155,8 @@ def _stored(
     transmitted: bool,
 ) -> Array:
     """Return the efficiencies of the table's two components, (…, 2)."""
+    if table.block:
+        raise DiffractionError("a table of a block has unpolarised efficiencies; take efficiency")
     return _values(
         table, x, y, wavelength, order, from_below, transmitted, lambda band, kind: band.kind(kind),
         clamped,

@@ -22,6 +22,8 @@ LARGEST_SUM = 1.001
 ROUNDING = 2e-3
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
+#: Least index of a block: orders of light that goes through depend on n − 1.
+LEAST_BLOCK = 1.01
 #: Components of a table's light: E, or B, along the grooves; or s and p, of imported efficiencies.
 GROOVES, S_AND_P = "grooves", "s and p"
 #: Octaves beyond its wavelengths within which a table has its nearest efficiencies, and then none.
@@ -112,6 +114,8 @@ class OrderTable:
     thin : whether the profile is the upper side of a thin sheet, whose lower side is flat. The
         table then has the light on both sides, at the ports of `cells`.
     components : of the incident light that efficiencies belong to: `GROOVES`, or `S_AND_P`.
+    block : index of a clear block, of which the profile is the upper face, or None. The table then
+        has the light on both sides, at the nodes and ports of `blocks`.
     """
 
     period: float
@@ -121,6 +125,7 @@ class OrderTable:
     header: Mapping[str, Any] = field(default_factory=dict)
     thin: bool = False
     components: str = GROOVES
+    block: float | None = None
 
     # Set by the package, since look-ups and files build on this class
     efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
@@ -131,13 +136,13 @@ class OrderTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 
     def __post_init__(self) -> None:
-        check_outline(self.period, self.wavelengths, self.superstrate, self.thin)
+        check_outline(self.period, self.wavelengths, self.superstrate, self.thin, self.block)
         expected = self.last_band + 1
         if [band.k for band in self.bands] != list(range(expected)):
             raise DiffractionError(
                 f"{len(self.bands)} bands of orders, expected {expected}, k = 0 to {expected - 1}: "
                 f"period {self.period:g} µm at {self.wavelengths[0]:g} nm and index "
-                f"{self.superstrate:g}"
+                f"{self.block or self.superstrate:g}"
             )
         for band in self.bands:
             _check_band(band, self.sides)
@@ -173,8 +178,8 @@ class OrderTable:
 
     @property
     def optical_period(self) -> float:
-        """Period times the index above it, n d, µm."""
-        return self.superstrate * self.period
+        """Period times the index of the medium of its channels, n d, µm: above, or of a block."""
+        return (self.block or self.superstrate) * self.period
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -184,8 +189,8 @@ class OrderTable:
 
     @property
     def sides(self) -> int:
-        """Number of sides with light: 2 of a thin sheet, else 1."""
-        return 2 if self.thin else 1
+        """Number of sides with light: 2 of a thin sheet or a block, else 1."""
+        return 2 if self.thin or self.block else 1
 
     @property
     def polarised(self) -> bool:
@@ -236,6 +241,7 @@ class OrderTable:
     @cached_property
     def _digest(self) -> str:
         outline = [self.period, self.wavelengths, self.superstrate, self.thin]
+        outline += [self.block] if self.block else []
         shapes = [kind.shape for band in self.bands for kind in band.kinds]
         content = hashlib.sha256(json.dumps([outline, shapes]).encode())
         for band in self.bands:
@@ -250,6 +256,7 @@ class OrderTable:
             "wavelength_range_nm": list(self.wavelengths),
             "superstrate_index": self.superstrate,
             "thin_sheet": self.thin,
+            "block_index": self.block,
             "polarised": self.polarised,
             "components": self.components,
             "bands": len(self.bands),
@@ -264,6 +271,7 @@ class OrderTable:
         low, high = self.wavelengths
         medium = "" if self.superstrate == 1.0 else f" under index {self.superstrate:g}"
         medium = ", thin sheet" if self.thin else medium
+        medium = f", block of index {self.block:g}" if self.block else medium
         medium += ", polarised" if self.polarised else ""
         return (
             f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
@@ -272,7 +280,11 @@ class OrderTable:
 
 
 def check_outline(
-    period: float, wavelengths: Sequence[float], superstrate: float, thin: bool = False
+    period: float,
+    wavelengths: Sequence[float],
+    superstrate: float,
+    thin: bool = False,
+    block: float | None = None,
 ) -> None:
     """Refuse a period, wavelengths or an index outside their ranges.
 
@@ -293,7 +305,12 @@ def check_outline(
             f"superstrate={superstrate:g}: a thin sheet has the same medium on both sides; leave "
             "the superstrate out, and give the sheet's index relative to that medium"
         )
-    if largest_band((low, high), superstrate * period) >= MOST_BANDS:
+    if block is not None and not (LEAST_BLOCK <= block <= 5.0 and superstrate == 1.0 and not thin):
+        raise DiffractionError(
+            f"block={block:g} must be an index of {LEAST_BLOCK:g} to 5, relative to the medium "
+            "above, without a superstrate and not thin"
+        )
+    if largest_band((low, high), (block or superstrate) * period) >= MOST_BANDS:
         raise DiffractionError(
             f"a period of {period:g} µm has over {MOST_BANDS} orders at {low:g} nm; solve orders "
             "of shorter periods, and use the BSDF 'diffraction' for this one"
