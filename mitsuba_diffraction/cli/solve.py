@@ -212,6 +212,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
         material=recipe.material if args.material is None else args.material,
         superstrate=recipe.superstrate if args.superstrate is None else args.superstrate,
         thin=recipe.thin or bool(args.thin),
+        block=recipe.block or bool(args.block),
         settings=replace(recipe.settings, **changed),
         output=args.output or recipe.output,
         substrate=recipe.substrate if args.substrate is None else args.substrate,
@@ -232,7 +233,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         name: getattr(recipe, name) for name in ("superstrate", "layers", "beneath", "substrate")
     }
     solve: Callable[..., OrderTable] = functools.partial(solve_orders, thin=recipe.thin, **medium)
-    if args.block:
+    if recipe.block:
         _check_block(recipe, args)
         solve = solve_block
     elif args.theta is not None:

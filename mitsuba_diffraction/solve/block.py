@@ -28,6 +28,8 @@ from .stations import Complex, Grating, Real, reversed_light
 
 #: Nodes of the first table; each refinement halves the distance between them.
 COUNTS = Counts(9, 7, 3)
+#: Efficiencies of a refined table at most, of which the renderer takes eight bytes each.
+_MOST_VALUES = 1 << 25
 
 
 def solve_block(
@@ -93,9 +95,11 @@ def solve_block(
         made = tuple(_band(grating, band, counts, solved) for band in bands)
         table = OrderTable(profile.period, how.wavelengths, made, header=header, block=index)
         error = _measured(table, problem, work)
-        if error.within(how.tolerance) or refinement == REFINEMENTS:
+        finer = Counts(*(2 * n - 1 for n in counts))
+        size = table.nbytes // 4 * np.prod(finer) // np.prod(counts)
+        if error.within(how.tolerance) or refinement == REFINEMENTS or size > _MOST_VALUES:
             break
-        counts = Counts(*(2 * n - 1 for n in counts))
+        counts = finer
     header |= {
         "error_mean": error.mean, "error_worst": error.most,
         "reciprocity_error": table.reciprocity,
@@ -166,7 +170,7 @@ def _to_node(grating: Grating, place: Place) -> Real:
 def _measured(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     """Compare a table with solutions at random directions within and above, by turns.
 
-    As `accuracy.measured_error` does: of light in all orders but 0, unless it is alone.
+    Light in all orders but 0; where order 0 is alone, light that goes through.
     """
     assert table.block is not None
     x, y, lam = diffuse_light(SAMPLES, table.wavelengths)
@@ -192,7 +196,7 @@ def _measured(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
                 for side in (True, False)
             ]
         )
-        others = np.tile(orders != 0 if count > 1 else True, 2)
+        others = np.tile(orders != 0, 2) if count > 1 else np.arange(2) != port
         missed[n], light[n] = np.abs(got - truth)[others].sum(), truth[others].sum()
     floor = 0.05 * light.mean()
     return Measured(

@@ -8,6 +8,7 @@
     beneath = "stack.toml"          # layers and slices beneath it, `films.read_layers`; or a list
     substrate = "SiO2"              # below them; default: the material
     thin = true                     # light goes through: a sheet of a clear material; default false
+    block = true                    # the upper face of a clear solid, on both sides; default false
     wavelengths = [380, 730]        # nm
     tolerance = 0.01
     polarised = true                # with Mueller matrices; default false
@@ -41,7 +42,7 @@ from .profiles import GENERATORS, Profile, read_profile
 
 _KEYS = (
     "method", "profile", "material", "superstrate", "layers", "beneath", "substrate", "thin",
-    "wavelengths", "tolerance", "solver", "resolution", "polarised", "output", "arguments",
+    "block", "wavelengths", "tolerance", "solver", "resolution", "polarised", "output", "arguments",
 )  # fmt: skip
 
 
@@ -53,6 +54,7 @@ class SolvedRecipe:
     ----------
     profile, material, superstrate, thin, settings, layers, beneath, substrate : arguments of
         `solve_orders`.
+    block : whether `solve_block` solves it.
     output : path of the table.
     """
 
@@ -65,6 +67,7 @@ class SolvedRecipe:
     layers: Layers = ()
     beneath: Layers = ()
     substrate: str | None = None
+    block: bool = False
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
@@ -106,6 +109,7 @@ class SolvedRecipe:
                 layers,
                 beneath,
                 None if substrate is None else str(substrate),
+                _flag(content, "block"),
             )
         except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error

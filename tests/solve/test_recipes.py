@@ -21,7 +21,7 @@ RECIPE = {
     "method": '"solved"', "profile": '"blazed"', "material": '"Al"', "superstrate": "1.5",
     "wavelengths": "[400, 700]", "tolerance": "0.02", "solver": '"coupled"', "resolution": "20",
     "output": '"groove.nc"', "layers": '[["SiO2", 0.1], ["2.3", 0.05]]',
-    "beneath": '[["Al2O3", 0.1], [0.1, ["2.3", 0.1, 0.4]]]', "substrate": '"Al"',
+    "beneath": '[["Al2O3", 0.1], [0.1, ["2.3", 0.1, 0.4]]]', "substrate": '"Al"', "block": "true",
 }  # fmt: skip
 ARGUMENTS = {"period": "1.2", "depth": "0.2", "direction": '"ascending"'}
 #: TOML of values that hardly fit.
@@ -45,6 +45,7 @@ def test_a_recipe_is_read(tmp_path):
     assert recipe.layers == (("SiO2", 0.1), ("2.3", 0.05))
     assert recipe.beneath == (("Al2O3", 0.1), (0.1, ["2.3", 0.1, 0.4]))
     assert recipe.settings.wavelengths == (400.0, 700.0)
+    assert recipe.block
     assert recipe.output == tmp_path / "groove.nc"
 
 
