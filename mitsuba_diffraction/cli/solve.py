@@ -71,7 +71,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group.add_argument(
         "--layer", metavar="M:T", type=_layer, action="append", dest="layers",
         help="film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; once for "
-        "each, from the material upwards; solved by coupled waves",
+        "each, from the material upwards",
     )  # fmt: skip
     group.add_argument(
         "--beneath", metavar="M:T", type=_layer, action="append",

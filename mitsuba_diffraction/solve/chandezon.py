@@ -12,6 +12,14 @@ With r' = B d + J d⊥ and d⊥ across d, a field F(u) exp(iρv) of harmonics α
 where B and J stand for their Toeplitz matrices. They multiply derivatives of the field along and
 across d, which are continuous in a medium, so that Laurent's rule holds (Li 1996, J. Opt. Soc. Am.
 A 13, 1870). In all mounts E and B along the grooves obey (1), with k across the grooves.
+
+Films are bounded by the surface moved along d, on which modes have the factor exp(iρv). Their
+admittance is carried up from the material: with fields ψ = (E, B) along the grooves, and fields
+φ = Yψ across them,
+
+    (Y − Y⁺) F⁺ a = (Y⁻ − Y) F⁻ b                                                       (2)
+
+has the amplitudes a of modes upwards, in modes b downwards, with admittances Y⁺ and Y⁻ alone.
 """
 
 from __future__ import annotations
@@ -20,11 +28,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import toeplitz
+from scipy.linalg import block_diag, toeplitz
 
 from ..errors import DiffractionError
 from .profiles import Profile
 from .stations import Real, Station
+from .structure import Structure
 
 Complex = NDArray[Any]
 
@@ -34,6 +43,8 @@ _SAMPLES = 8192
 _AT_EDGES = 0.02
 # Sides must turn by less: d lies above all of them
 _WIDEST = np.radians(175.0)
+# Slope up to which films are moved along z, so that they are as thick along z everywhere
+_UPRIGHT = np.radians(80.0)
 # Straight sides of a profile with edges at most: each needs some hundred samples
 _MOST_SIDES = 32
 
@@ -48,9 +59,13 @@ class Chandezon:
     ----------
     profile : one period of the grooves: smooth, or of few straight sides.
     harmonics : spatial frequencies on either side of the middle one.
+    structure : films on the profile, as thick along z everywhere. On a profile with walls the film
+        is the profile moved obliquely: it has its thickness on the widest side, and coats walls.
     """
 
-    def __init__(self, profile: Profile, harmonics: int) -> None:
+    def __init__(
+        self, profile: Profile, harmonics: int, structure: Structure | None = None
+    ) -> None:
         self.period, self.harmonics = profile.period, harmonics
         if reason := refused(profile):
             raise DiffractionError(
@@ -59,7 +74,15 @@ class Chandezon:
             )
         x, z = profile.closed
         angles = np.arctan2(np.diff(z), np.diff(x))
-        middle = 0.5 * (angles.min() + angles.max())
+        films = structure.films if structure else ()
+        middle = float(0.5 * (angles.min() + angles.max()))
+        if films and np.abs(angles).max() < _UPRIGHT:
+            middle = 0.0
+        #: Direction d, and lengths of films along it, µm.
+        self._direction = -np.sin(middle), np.cos(middle)
+        widest = angles[np.argmax(np.diff(x))]
+        lengthened = np.cos(widest) / np.cos(widest - middle)
+        self._lengths = [film.thickness * float(lengthened) for film in films]
         self._curve = curve = _smooth(x, z) if profile.corners == 0 else _with_edges(x, z)
         #: J and B of the samples.
         self._across = curve.slope_x * np.cos(middle) + curve.slope_z * np.sin(middle)
@@ -89,15 +112,48 @@ class Chandezon:
         beta = np.sqrt(k**2 - alpha[places] ** 2)
         down = self._plane_waves(alpha, places, -beta)
         above = self._modes(alpha, k**2, 1.0)
-        pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
-        flux = np.sqrt(beta / beta[:, None])
-        results = []
-        for wavelength, index, y in pairs:
-            squared = (2.0 * np.pi / wavelength) ** 2 * (index**2 - y**2)
-            below = self._modes(alpha, squared, -1.0)
-            fields = _reflected(above, below, down, alpha * y, index**2, k**2 / squared)
-            results.append(flux[:, None, :, None] * fields)
-        return np.stack(results)
+        indices = np.stack([station.indices, *station.media], axis=-1)
+        pairs = zip(station.wavelengths, indices, station.along, strict=True)
+        factor = self._factor(alpha[places], beta)
+        return np.stack(
+            [
+                factor * _reflected(above, self._admittance(alpha, *pair), down, alpha * pair[2], k)
+                for pair in pairs
+            ]
+        )
+
+    def _factor(self, alpha: Real, beta: Real) -> Complex:
+        """Return the ratio of fluxes (j, 1, q, 1), with phases from the top of films to z = 0."""
+        x, z = (sum(self._lengths) * part for part in self._direction)
+        came, left = np.exp(1j * (alpha * x - beta * z)), np.exp(-1j * (alpha * x + beta * z))
+        flux = np.sqrt(beta / beta[:, None]) * came[:, None] * left
+        return np.asarray(flux[:, None, :, None])
+
+    def _admittance(self, alpha: Real, wavelength: float, indices: Complex, y: float) -> Complex:
+        """Return Y (2n, 2n) of the material under its films, see (2).
+
+        indices : of the material, and of the films upwards.
+        """
+        wavenumber = 2.0 * np.pi / wavelength
+        squared = wavenumber**2 * (indices**2 - y**2)
+        media = list(zip(indices**2, squared, strict=True))
+        epsilon, square = media[0]
+        total = _admittance(self._modes(alpha, square, -1.0), alpha * y, epsilon, square)
+        for length, (epsilon, square) in zip(self._lengths, media[1:], strict=True):
+            up, down = (self._modes(alpha, square, sign) for sign in (1.0, -1.0))
+            rising, falling = (
+                _admittance(waves, alpha * y, epsilon, square) for waves in (up, down)
+            )
+            fields, came = (block_diag(waves.field, waves.field) for waves in (up, down))
+            back = np.linalg.solve((total - rising) @ fields, (falling - total) @ came)
+            there, here = (
+                np.tile(np.exp(1j * sign * waves.rho * length), 2)
+                for sign, waves in ((1.0, up), (-1.0, down))
+            )
+            upwards = fields @ (there[:, None] * back * here)
+            both = rising @ upwards + falling @ came
+            total = np.linalg.solve((upwards + came).T, both.T).T
+        return np.asarray(total)
 
     def _modes(self, alpha: Real, squared: complex, sign: float) -> _Waves:
         """Return the modes of (1) of a medium of this k², upwards (sign 1) or downwards (−1).
@@ -120,7 +176,10 @@ class Chandezon:
         beside = inverse @ (alpha[:, None] * field - rho * (along @ field))
         waves = self._plane_waves(alpha, known, sign * z[known].real)
         normal = 1j * (rho * (across @ field) - along @ beside)
-        return _Waves(np.hstack([field, waves.field]), np.hstack([normal, waves.normal]))
+        return _Waves(
+            np.hstack([field, waves.field]), np.hstack([normal, waves.normal]),
+            np.hstack([rho, waves.rho]),
+        )  # fmt: skip
 
     def _plane_waves(self, alpha: Real, places: NDArray[np.int64], beta: Real) -> _Waves:
         """Return the waves exp(iαx + iβz) of some places on the surface."""
@@ -132,7 +191,10 @@ class Chandezon:
             frequencies = place - np.arange(len(alpha))
             columns.append([_coefficients(values)[frequencies] for values in (wave, normal)])
         shape = (len(places), 2, len(alpha))
-        return _Waves(*np.array(columns, complex).reshape(shape).transpose(1, 2, 0))
+        x, z = self._direction
+        rho = alpha[places] * x + beta * z + 0j
+        field, normal = np.array(columns, complex).reshape(shape).transpose(1, 2, 0)
+        return _Waves(field, normal, rho)
 
 
 def refused(profile: Profile) -> str:
@@ -156,27 +218,35 @@ class _Curve(NamedTuple):
 
 
 class _Waves(NamedTuple):
-    """Harmonics (n, waves) of fields on the surface, and of |r'| times the normal derivative."""
+    """Harmonics (n, waves) of fields on the surface, and of |r'| times the normal derivative.
+
+    rho : (waves,) rate along d.
+    """
 
     field: Complex
     normal: Complex
+    rho: Complex
 
 
-def _reflected(
-    above: _Waves, below: _Waves, down: _Waves, along: Real, epsilon: complex, ratio: complex
-) -> Complex:
+def _admittance(waves: _Waves, along: Real, epsilon: complex, squared: complex) -> Complex:
+    """Return Y (2n, 2n) of waves in one direction in a medium.
+
+    along : α y. squared : k² across the grooves.
+
+    B is that along −y, of light whose E is along d × y. Fields across the grooves are
+    (y ∂_u E + ∂_n B)/k² and (y ∂_u B − ε ∂_n E)/k², over ik₀.
+    """
+    turn, slope = np.diag(1j * along), np.linalg.solve(waves.field.T, waves.normal.T).T
+    return np.block([[turn, slope], [-epsilon * slope, turn]]) / squared
+
+
+def _reflected(above: _Waves, below: Complex, down: _Waves, along: Real, k: float) -> Complex:
     """Return the fields (j, 2, q, 2) of the last waves above, in light of the waves `down`.
 
-    along : α y. ratio : k² above over that below.
-
-    Unknowns are E and B on the surface, along −y: that of light whose E is along d × y. Those
-    across the grooves are (ik₀y ∂_u E + ik₀ ∂_n B)/k² and (ik₀y ∂_u B − ik₀ε ∂_n E)/k².
+    below : admittance under the surface. along, k : as for `_admittance`, above it.
     """
-    upper = np.linalg.solve(above.field.T, above.normal.T).T
-    lower = ratio * np.linalg.solve(below.field.T, below.normal.T).T
-    turn = np.diag(-1j * along * (1.0 - ratio))
-    system = np.block([[turn, lower - upper], [upper - epsilon * lower, turn]])
-    source = down.normal - upper @ down.field
+    system = k**2 * (below - _admittance(above, along, 1.0, k**2))
+    source = down.normal - np.linalg.solve(above.field.T, above.normal.T).T @ down.field
     none, count = np.zeros_like(source), source.shape[1]
     surface = np.linalg.solve(system, np.block([[none, source], [-source, none]]))
     incident = np.block([[down.field, none], [none, down.field]])

@@ -5,7 +5,7 @@ from the Fourier coefficients of ε (Moharam, Grann, Pommet and Gaylord 1995, JO
 Li's rules for products of discontinuous functions (Li 1996, JOSA A 13, 1870). One reflection matrix
 serves all channels. Films on the profile, as thick along z everywhere, are further media of layers:
 walls have none, as if they had been evaporated from above. Slices beneath the profile are layers of
-their own. Slopes of metal converge slowly in TM: use the integral method for them.
+their own. Slopes of metal converge slowly in TM: use another method for them.
 """
 
 from __future__ import annotations

@@ -29,10 +29,16 @@ from .nodes import Place
 from .profiles import Profile
 from .sheet import sheet_efficiencies
 from .stations import Complex, Grating, Real, Solver, on_both_sides
+from .structure import Structure
 
 #: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
 METHODS: dict[str, Callable[[Profile, int], Solver]] = {
     "integral": IntegralSolver,
+    "coupled": CoupledWaves,
+    "chandezon": Chandezon,
+}
+#: Solvers of layers by name: from a profile, a resolution and a structure.
+LAYERED: dict[str, Callable[[Profile, int, Structure], Solver]] = {
     "coupled": CoupledWaves,
     "chandezon": Chandezon,
 }
@@ -69,12 +75,14 @@ class Problem:
 def method_for(grating: Grating) -> str:
     """Return the solver for a grating.
 
-    Coupled waves for films and slices, Chandezon's method for slopes, else the integral method.
+    Chandezon's method for slopes, also under films; coupled waves for other films and for slices,
+    else the integral method.
     """
-    if grating.structure:
-        return "coupled"
-    sloped = not (grating.is_perfect or grating.thin or refused(grating.profile))
-    return "chandezon" if sloped else "integral"
+    flat = grating.profile.depth == 0.0
+    sloped = not (grating.is_perfect or grating.thin or flat or refused(grating.profile))
+    if sloped and not grating.structure.is_beneath:
+        return "chandezon"
+    return "coupled" if grating.structure else "integral"
 
 
 def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
@@ -86,10 +94,10 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
         method = method_for(grating)
     check_choice("method", method, (AUTO, *METHODS))
     structure = grating.structure
-    if structure and method != "coupled":
+    if structure and (method not in LAYERED or (structure.is_beneath and method != "coupled")):
         raise DiffractionError(
-            f"method {method} has one medium below the profile and one above; use method=coupled, "
-            "or leave out layers, beneath and substrate"
+            f"method {method} does not solve these layers; use method=coupled, or leave out "
+            "layers, beneath and substrate"
         )
     content = hashlib.sha256(
         repr(
@@ -112,8 +120,8 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
     grating = problem.grating
-    if grating.structure:  # which coupled waves alone have
-        return CoupledWaves(grating.profile, problem.resolution, grating.structure)
+    if grating.structure:
+        return LAYERED[problem.method](grating.profile, problem.resolution, grating.structure)
     return METHODS[problem.method](grating.profile, problem.resolution)
 
 

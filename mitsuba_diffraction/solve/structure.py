@@ -51,6 +51,11 @@ class Structure:
         return bool(self.films or self.slices or self.substrate)
 
     @property
+    def is_beneath(self) -> bool:
+        """Whether media lie beneath the profile's material."""
+        return bool(self.slices or self.substrate)
+
+    @property
     def materials(self) -> tuple[Material, ...]:
         """Materials of the films, of the slices' parts, and of the substrate, in this order."""
         parts = (part.material for layer in self.slices for part in layer.parts)
