@@ -47,6 +47,8 @@ SPECTRA = Consumer(
 )
 #: Default wavelengths: first, last and step, nm.
 FIRST, LAST, STEP = 300.0, 830.0, 5.0
+# Directions that are measured in one kernel.
+_NODES_AT_ONCE = 1 << 18
 #: Wavelengths that a spectrum may have.
 MAX_WAVELENGTHS = 10_000
 
@@ -233,15 +235,18 @@ def _signals(
     progress: Progress,
 ) -> Reals:
     """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
-    lobe = lobe_width(sigma, lam)
-    parts = 3 if mi.is_polarized else 1
-    result = np.zeros((parts, lam.size, len(geometry.detectors)))
-    for n, angle in enumerate(geometry.detectors):
-        progress(n, len(geometry.detectors), "detectors")
-        directions, weights = cone(geometry, angle, lobe)
-        result[:, :, n] = _integrals(bsdf, geometry, lam, before, directions, weights)
-    progress(len(geometry.detectors), len(geometry.detectors), "detectors")
-    return result
+    lobe, count = lobe_width(sigma, lam), len(geometry.detectors)
+    parts, done = [], 0
+    while done < count:
+        progress(done, count, "detectors")
+        cones = [cone(geometry, geometry.detectors[done], lobe)]
+        together = max(_NODES_AT_ONCE // len(cones[0][1]), 1)
+        following = geometry.detectors[done + 1 : done + together]
+        cones += [cone(geometry, angle, lobe) for angle in following]
+        parts.append(_integrals(bsdf, geometry, lam, before, cones))
+        done += len(cones)
+    progress(count, count, "detectors")
+    return np.concatenate(parts, axis=-1)
 
 
 def _integrals(
@@ -249,34 +254,35 @@ def _integrals(
     geometry: Geometry,
     lam: Reals,
     before: Callable[[float], None] | None,
-    directions: Reals,
-    weights: Reals,
+    cones: Sequence[tuple[Reals, Reals]],
 ) -> Reals:
-    """Return ∫ f cosθo dωo, (1 or 3, n).
+    """Return ∫ f cosθo dωo over cones of equal numbers of nodes, (1 or 3, n, cones).
 
     The detector is Mitsuba's camera and the lamp its emitter: `eval` has the lamp's cosine, and its
     Mueller matrix is for light that goes from the lamp to the detector.
     """
     light = light_direction(geometry)
+    directions, weights = map(np.concatenate, zip(*cones, strict=True))
     si = _interaction(mi.Vector3f(*(upload(mi.Float, column) for column in directions.T)))
     towards = mi.Vector3f(*(float(c) for c in light))
     dr.make_opaque(towards)
-    turned = weights * directions[:, 2] / light[2]
+    turned = (weights * directions[:, 2] / light[2]).reshape(len(cones), -1)
     stokes = _stokes(light, across_plane(geometry))
     context, channels = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
     packet = channels if before is None else 1
-    sums = np.zeros((3 if mi.is_polarized else 1, lam.size))
+    sums = np.zeros((3 if mi.is_polarized else 1, lam.size, len(cones)))
     for first in range(0, lam.size, packet):
         if before is not None:
             before(float(lam[first]))
         index = np.minimum(first + np.minimum(np.arange(channels), packet - 1), lam.size - 1)
-        values = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in lam[index]])
-        dr.make_opaque(values)  # one kernel for all wavelengths
-        si.wavelengths = values
+        wavelengths = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in lam[index]])
+        dr.make_opaque(wavelengths)  # one kernel for all wavelengths
+        si.wavelengths = wavelengths
         f = bsdf.eval(context, si, towards)
         parts = [f] if not mi.is_polarized else [f[0, 0], f[0, 1], f[0, 2]]
         dr.eval(parts)
-        found = np.stack([np.asarray(x, np.float64) @ turned for x in parts])
+        values = (np.asarray(x, np.float64).reshape(channels, *turned.shape) for x in parts)
+        found = np.stack([np.einsum("cdn,dn->cd", each, turned) for each in values])
         used = min(packet, lam.size - first)
         if mi.is_polarized:
             turn = stokes[1] * found[1] + stokes[2] * found[2]

@@ -110,7 +110,7 @@ def _of_heights(
     lam: Any, bar: Bar, *, quiet: bool = False,
 ) -> Spectra:  # fmt: skip
     """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
-    from ..analysis.media import in_medium
+    from ..analysis.media import in_medium, medium_index
     from ..analysis.scans import Scan, read_scan, table_of
     from ..analysis.spectra import table_range
     from ..heights.coherence import blur
@@ -128,7 +128,8 @@ def _of_heights(
     if line and not quiet and args.crops is None:
         _say_first(args, line)
     if table.settings.window_width is not None:
-        _say_once(args, blur(table.window_width))
+        index = medium_index(args.ext_ior, float(lam[0]))
+        _say_once(args, blur(table.window_width, index))
     if args.light_azimuth == "auto":
         gratings = dominant_periods(patches[0])
         geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)

@@ -97,12 +97,15 @@ def width_reason(settings: TableSettings, patches: Sequence[HeightField]) -> str
     return f"{width:.4g} µm, over which sunlight is coherent"
 
 
-def blur(width: float) -> str:
-    """Say within which angle of the mirror a scan of a width, µm, knows no light but the mirror."""
+def blur(width: float, medium: float = 1.0) -> str:
+    """Say within which angle of the mirror a scan of a width, µm, knows no light but the mirror.
+
+    medium : index of the medium above, by which the width has been multiplied.
+    """
     angle = math.degrees(math.asin(min(_GREEN / width, 1.0)))  # of the longest wave in the scan
     return (
-        f"a scan of {width:.4g} µm knows nothing of light within {angle:.2g}° of the mirror "
-        "but the mirror"
+        f"a scan of {width / medium:.4g} µm knows nothing of light within {angle:.2g}° of the "
+        "mirror but the mirror"
     )
 
 
