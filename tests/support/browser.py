@@ -36,8 +36,11 @@ ONE_SAMPLE = f"""{{
 """
 
 
-def load_scene() -> Any:
-    """A grating on a roll over diffuse grey, on chequered ground, under a sun and a lamp."""
+def load_scene(**surface: Any) -> Any:
+    """A grating on a roll over diffuse grey, on chequered ground, under a sun and a lamp.
+
+    surface : parameters of the roll's BSDF in place of these; None leaves one out.
+    """
     import mitsuba as mi
     import numpy as np
 
@@ -50,6 +53,10 @@ def load_scene() -> Any:
     chequers[::2, ::2] = [0.5, 0.3, 0.2]
     grating = md.gratings.sinusoidal(period=1.6, depth=0.06, periods=4)
     grey = {"type": "diffuse", "reflectance": 0.1}
+    parameters = {
+        "coherence_width": 6, "orientation": 30.0, "int_ior": 1.5, "second_order": True,
+        "pigment": grey,
+    } | surface  # fmt: skip
     film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1]}
     return mi.load_dict(
         {
@@ -61,8 +68,7 @@ def load_scene() -> Any:
             "roll": {
                 "type": "cylinder", "p0": [-1.2, 0.3, 0.9], "p1": [1.2, -0.3, 0.9], "radius": 0.9,
                 "bsdf": md.bsdf_dict(
-                    grating, coherence_width=6, orientation=30.0, int_ior=1.5, second_order=True,
-                    pigment=grey,
+                    grating, **{k: v for k, v in parameters.items() if v is not None}
                 ),
             },
             "ground": {

@@ -23,22 +23,19 @@ from ...progress import Progress, silent
 from ..glsl.emitters import Emitters
 from ..glsl.materials import (
     Diffracting,
+    Material,
     pack_conservation,
     pack_emission,
     pack_relief,
     pack_surface,
 )
 from ..glsl.methods import CONSUMERS
-from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene, Surface, load, read_scene
-from ..glsl.source import (
-    display_definitions,
-    fragment_parts,
-    plain_source,
-    vertex_source,
-)
+from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
 from ..glsl.texels import Packed
+from .header import Header, SurfaceEntry
 from .light import packed_light, packed_surroundings
+from .materials import changeable, named_definitions, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
@@ -149,79 +146,6 @@ class Viewer:
         )
 
 
-@dataclass(frozen=True)
-class SurfaceEntry:
-    """Surface of a scene in the page's header.
-
-    Attributes
-    ----------
-    mesh, parts : numbers of its sections (`sections`).
-    emits : whether it emits light.
-    height_scale : height scale of the scene; null where nothing diffracts.
-    table : number of its table; 0 where nothing diffracts.
-    programs : number of its shader's source, by method.
-    """
-
-    name: str
-    mesh: dict[str, Any]
-    parts: dict[str, Any]
-    emits: bool
-    height_scale: float | None
-    table: int
-    programs: dict[str, int]
-
-
-@dataclass(frozen=True)
-class Header:
-    """Data of a page beside its arrays; `page/data.js` reads the fields by name.
-
-    Attributes
-    ----------
-    light, around : see `light.packed_light` and `light.packed_surroundings`.
-    tables : numbers of each table's sections, by method.
-    octaves, energy_pages : ends of the slider of height scales, and pages of energy scales.
-    background : radiance of the sky, linear sRGB.
-    box, subject : corners of the scene, and of what diffracts.
-    programs : section of the distinct sources; the page replaces LIGHTS_LIT by its light's
-        definitions and appends one of `mains`.
-    vertex, shadow, shown : other sources.
-    loss, left_out, omissions : see `Page`.
-    orders : brightest orders of each table.
-    sections : position and layout of each section.
-    """
-
-    title: str
-    surfaces: list[SurfaceEntry]
-    light: dict[str, Any]
-    around: dict[str, Any] | None
-    tables: dict[str, list[dict[str, Any]]]
-    methods: list[str]
-    omissions: list[str]
-    background: list[float]
-    camera: dict[str, Any]
-    box: list[list[float]]
-    subject: list[list[float]]
-    programs: int
-    shown: dict[str, str]
-    loss: dict[str, tuple[float, float]]
-    left_out: dict[str, str]
-    orders: list[list[list[float]]]
-    sections: list[dict[str, Any]]
-    octaves: tuple[float, float] = (OCTAVES[0], OCTAVES[-1])
-    energy_pages: int = len(OCTAVES)
-    mains: dict[str, str] = field(
-        default_factory=lambda: {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")}
-    )
-    vertex: str = field(default_factory=lambda: vertex_source("web"))
-    shadow: str = field(default_factory=lambda: plain_source("position.frag", dialect="web"))
-
-    def json(self) -> str:
-        """Return the header as JSON for an element of a page."""
-        text = json.dumps(self, default=vars, ensure_ascii=False)
-        # "</script" would end the element, and "<!--<script" its end
-        return text.replace("<", "\\u003c")
-
-
 def _filled(header: Header, data: bytes) -> str:
     """Fill the template of the page."""
     parts: dict[str, Callable[[], str]] = {
@@ -270,22 +194,36 @@ def _packed(
         mesh = sections_of(packed_mesh(surface.vertices), sections.add)
         stored.append((common, mesh, packed_parts(common, sections)))
     light = packed_light(scene, emitters, sections)
+    coats = sorted(
+        {_coat(s.material) for s in scene.surfaces if changeable(s.material.diffraction)}
+    )
+    materials = packed_materials(coats, sections)
     progress(0, 0, "light between surfaces")
     around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections, bounces)
     room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
     sources: list[str] = []
+
+    def program(method: str, known: dict[str, str]) -> int:
+        """Return the number of a shader's source."""
+        source = _source(method, {**known, **definitions, "SHADOWED": "", "LIVE": ""})
+        if source not in sources:
+            sources.append(source)
+        return sources.index(source)
+
     entries = []
     for surface, (common, mesh, parts) in zip(scene.surfaces, stored, strict=True):
-        described = surface.material.diffraction and surface.material.diffraction.described
+        diffraction = surface.material.diffraction
+        described = None if diffraction is None else diffraction.described
         number = numbers[id(described.table)] if described else 0
-        programs = {}
-        for method in shown:
-            own = packed[method, number].packed.definitions if described else {}
-            source = _source(method, {**common.definitions, **own, **definitions, "SHADOWED": ""})
-            if source not in sources:
-                sources.append(source)
-            programs[method] = sources.index(source)
+        known = {
+            method: {
+                **common.definitions,
+                **(packed[method, number].packed.definitions if described else {}),
+            }
+            for method in shown
+        }
+        given = known if changeable(diffraction) else {}
         entries.append(
             SurfaceEntry(
                 surface.name,
@@ -294,7 +232,10 @@ def _packed(
                 surface.radiance is not None,
                 described.height_scale.number if described else None,
                 number,
-                programs,
+                {method: program(method, d) for method, d in known.items()},
+                {method: program(method, named_definitions(d)) for method, d in given.items()},
+                coats.index(_coat(surface.material)) if given else 0,
+                described is not None and described.nested is not None,
             )
         )
     count = range(len(tables))
@@ -329,9 +270,18 @@ def _packed(
         left_out=left_out,
         orders=[strongest_orders(table.described) for table in tables],
         sections=[],
+        octaves=(OCTAVES[0], OCTAVES[-1]),
+        energy_pages=len(OCTAVES),
+        materials=materials,
     )
     data, layouts = sections.joined()
     return replace(header, sections=layouts), data
+
+
+def _coat(material: Material) -> float:
+    """Return the index of a surface's coat, 1 without one."""
+    diffraction = material.diffraction
+    return (diffraction and diffraction.described.coat) or 1.0
 
 
 def _common(surface: Surface) -> Packed:

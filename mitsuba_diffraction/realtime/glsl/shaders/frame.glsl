@@ -10,6 +10,10 @@ uniform mat3 mask_uv;
 uniform mat4 view_projection;
 #endif
 
+#ifdef LIVE
+uniform vec2 patch_turn;          // (cos, sin) of the page's control, by which all patches are turned
+#endif
+
 // Clamp texture coordinates to a picture.
 vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
 
@@ -30,7 +34,11 @@ vec2 patch_frame(vec2 texcoord, vec3 axis)
     axis = texture(axis_map, place).rgb;
 #endif
     float turned = length(axis.xy);
-    return axis.z * (turned > 1e-6 ? axis.xy / turned : vec2(1.0, 0.0));
+    vec2 unit = turned > 1e-6 ? axis.xy / turned : vec2(1.0, 0.0);
+#ifdef LIVE
+    unit = vec2(dot(unit, vec2(patch_turn.x, -patch_turn.y)), dot(unit, patch_turn.yx));
+#endif
+    return axis.z * unit;
 }
 
 // Whether another surface of the mix is drawn in this pixel. Where several have a weight, pixels

@@ -19,6 +19,10 @@ uniform sampler2D colour_map;
 uniform mat3 colour_uv;
 #endif
 
+#ifdef LIVE
+uniform vec4 live_pigment;        // colour of the page's control; w = 1 where it replaces the scene's
+#endif
+
 #ifdef BUMPED
 uniform sampler2D bump_map;       // heights along the normal, in the scene's unit
 uniform mat3 bump_uv;
@@ -155,6 +159,9 @@ void main()
     of_colour = within(of_colour, vec2(textureSize(colour_map, 0)));
 #endif
     pigment = texture(colour_map, of_colour).rgb;
+#endif
+#if defined(LIVE) && defined(DIFFRACTING)
+    pigment = mix(pigment, live_pigment.rgb, live_pigment.a);
 #endif
     vec2 rotation = patch_frame(v_texcoord, v_axis);
 #ifdef PIGMENT_IN_LIGHT

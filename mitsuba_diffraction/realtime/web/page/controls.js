@@ -5,6 +5,10 @@ const METHODS = { fast: "Colours summed up beforehand", exact: "Every wavelength
 
 const element = (id) => document.getElementById(id);
 
+// Linear sRGB of a colour input's text, and its text.
+const colourOf = (text) => [1, 3, 5].map((n) => parseInt(text.slice(n, n + 2), 16) / 255).map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));
+const colourText = (colour) => `#${colour.map((x) => Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055)).toString(16).padStart(2, "0")).join("")}`;
+
 class Controls {
   constructor(viewer, fail) {
     this.viewer = viewer;
@@ -26,6 +30,10 @@ class Controls {
     element("exposure").value = Math.log2(viewer.exposure);
     element("heights").value = Math.log2(viewer.heights);
     element("wavelength").value = viewer.wavelength ?? 375;
+    element("turn").value = viewer.turn;
+    element("coherence").value = Math.log2(viewer.coherence);
+    element("material").value = viewer.material ?? "";
+    if (viewer.pigment) element("pigment").value = colourText(viewer.pigment);
     element("shadows").checked = viewer.shadows;
     element("kind").value = viewer.lights.kind;
     this.mark();
@@ -191,6 +199,7 @@ class Controls {
       this.label();
       viewer.touch();
     });
+    this.surface();
     const [first, last] = header.octaves;
     Object.assign(element("heights"), { min: first, max: last });
     element("reset").addEventListener("click", () => this.reset());
@@ -204,8 +213,28 @@ class Controls {
     const lines = [`Error of rounded colours: ${losses.join("; ")}; 1 is just visible.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
     for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
-    lines.push("Light between surfaces is a mean over small parts of the scene, in the scene's own light. While something moves, a few lights represent all, without it. Lights other than the scene's and moved lights are sets of points, without reflections of their shapes in narrow lobes.");
+    lines.push("Sliders and materials change direct light; energy is conserved for the scene's material, and the second order is left out of others. Light between surfaces is a mean over small parts of the scene, in the scene's own light. While something moves, a few lights represent all, without it. Lights other than the scene's and moved lights are sets of points, without reflections of their shapes in narrow lobes.");
     element("about").textContent = lines.join(" ");
+  }
+
+  // Controls of what diffracts, where the scene has a surface that they change.
+  surface() {
+    const { viewer } = this, { header } = viewer;
+    const slide = (name, change) => element(name).addEventListener("input", () => {
+      change(element(name).value);
+      this.label();
+      viewer.touch();
+      this.map.update();
+    });
+    slide("turn", (value) => (viewer.turn = Number(value)));
+    slide("pigment", (value) => (viewer.pigment = colourOf(value)));
+    element("pigment").parentElement.hidden = !header.surfaces.some(({ pigmented }) => pigmented);
+    element("coherence").parentElement.hidden = !header.methods.includes("exact");
+    element("coherence").addEventListener("input", () => this.change({ coherence: 2 ** Number(element("coherence").value) }));
+    element("material").parentElement.hidden = !header.materials.length;
+    element("material").add(new Option("The scene's", ""));
+    header.materials.forEach(({ name }, n) => element("material").add(new Option(name, n)));
+    element("material").addEventListener("change", ({ target: { value } }) => this.change({ material: value === "" ? null : Number(value) }));
   }
 
   // Button for touch screens: one finger moves the light instead of turning.
@@ -256,6 +285,9 @@ class Controls {
     const stops = Number(element("exposure").value);
     element("exposure_value").textContent = `${stops > 0 ? "+" : stops < 0 ? "−" : ""}${Math.abs(stops).toFixed(1)} EV`;
     element("heights_value").textContent = `× ${this.viewer.heights.toFixed(2)}`;
+    element("turn_value").textContent = `${this.viewer.turn}°`;
+    element("coherence_value").textContent = `× ${this.viewer.coherence.toFixed(2)}`;
+    element("pigment_value").textContent = this.viewer.pigment ? "" : "the scene's";
     const { wavelength } = this.viewer;
     element("wavelength_value").textContent = wavelength === null ? "all" : `${wavelength} nm`;
   }
@@ -265,9 +297,10 @@ class Controls {
     const { header } = viewer;
     Object.assign(viewer.camera, new Camera(header.camera, header.subject, header.box));
     viewer.lights.reset();
-    viewer.exposure = viewer.heights = 1;
+    viewer.exposure = 1;
     viewer.shadows = true;
-    this.change({ wavelength: null, kind: viewer.lights.kinds[0] });
+    viewer.undress();
+    this.change({ wavelength: null, coherence: 1, material: null, kind: viewer.lights.kinds[0] });
     this.all();
     this.moved();
   }

@@ -147,13 +147,20 @@ class Target {
   }
 }
 
+// Constants of a table of orders for a coherence width times a factor of at most 1. The window of
+// orders other than the mirror's is narrower than that already where the patch is.
+function narrower({ sigma, order_0_ratio = 1, area_factor }, factor) {
+  const mirror = factor * sigma * Math.sqrt(order_0_ratio), others = Math.min(sigma, mirror);
+  return { sigma: others, order_0_ratio: (mirror / others) ** 2, area_factor: area_factor * (others / sigma) ** 2 };
+}
+
 const RESPONSES = 4; // rows, one per light
 const PIXEL = { floats: new Float32Array(4), bytes: new Uint8Array(4) };
 
 class Drawing {
   static async load(gl, header, data, progress) {
     const drawing = new Drawing();
-    Object.assign(drawing, { gl, header, data, programs: {}, tables: {} });
+    Object.assign(drawing, { gl, header, data, programs: {}, tables: {}, materials: {} });
     drawing.surfaces = [];
     for (const surface of header.surfaces) {
       await progress(`Unpacking ${surface.name}`);
@@ -178,22 +185,26 @@ class Drawing {
     return drawing;
   }
 
-  // Load a method's tables and compile its programs; lit: `viewer.lit`.
-  async prepare(method, lit, progress) {
+  // Load a method's tables and compile its programs; lit: `viewer.lit`; material: number of a
+  // material that surfaces are given, or null.
+  async prepare(method, lit, progress, material = null) {
     if (!this.tables[method]) {
       await progress("Unpacking colours");
       const tables = [];
       for (const table of this.header.tables[method]) tables.push(await Part.load(this.gl, this.data, table));
       this.tables[method] = tables;
     }
+    if (material !== null && !this.materials[material])
+      this.materials[material] = await Promise.all(this.header.materials[material].parts.map((part) => Part.load(this.gl, this.data, part)));
     await progress("Preparing");
-    for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light);
+    for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light, "surface", material);
   }
 
   // Program of a surface, compiled once for each source, definitions of the light and main function.
-  program(surface, method, lit, main = "surface") {
+  program(surface, method, lit, main = "surface", material = null) {
     const { gl, header } = this;
-    const number = surface.programs[method], key = `${number} ${lit} ${main}`;
+    const { [method]: number } = material === null || !(method in surface.named) ? surface.programs : surface.named;
+    const key = `${number} ${lit} ${main}`;
     const fragment = () => this.sources[number].replace("#define LIGHTS_LIT 1\n", lit) + header.mains[main];
     return (this.programs[key] ??= new Program(gl, main === "map" ? header.shown.vertex : header.vertex, fragment()));
   }
@@ -228,17 +239,27 @@ class Drawing {
     });
   }
 
+  // Use a surface's program, constants and textures, as the controls change them; view: from
+  // Viewer.viewed, with `lit`.
+  dressed(surface, view, main) {
+    const { method, material, coherence } = view;
+    const program = this.program(surface, method, view.lit, main, material), table = this.tables[method][surface.table];
+    program.use();
+    surface.part.use(program);
+    if (material !== null && method in surface.named) this.materials[material][surface.coat].use(program);
+    table.use(program);
+    program.texture("responses", this.responses);
+    if (coherence !== 1) program.set(narrower(table.uniforms, coherence));
+    return program;
+  }
+
   // Draw all surfaces with a main function; view: from Viewer.begin.
   drawSurfaces(view, main) {
     const octaves = Math.log2(view.heights);
     const [first, last] = this.header.octaves;
     const page = ((octaves - first) / (last - first)) * (this.header.energy_pages - 1);
     this.surfaces.forEach((surface, number) => {
-      const program = this.program(surface, view.method, view.lit, main);
-      program.use();
-      surface.part.use(program);
-      this.tables[view.method][surface.table].use(program);
-      program.texture("responses", this.responses);
+      const program = this.dressed(surface, view, main);
       program.texture("shadow_map", this.shadows[view.moving ? "coarse" : "fine"].texture);
       if (view.looksUp) this.around.use(program, surface.table);
       program.set({

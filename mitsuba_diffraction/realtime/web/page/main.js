@@ -61,7 +61,7 @@ async function start() {
   const viewer = new Viewer(canvas, await Drawing.load(gl, header, data, busy), header);
   window.viewer = viewer;
   textToView(location.hash.slice(1), viewer);
-  const prepared = () => viewer.drawing.prepare(viewer.drawn, viewer.lit, busy);
+  const prepared = () => viewer.drawing.prepare(viewer.drawn, viewer.lit, busy, viewer.material);
   await prepared();
   viewer.fit();
   viewer.controls = new Controls(viewer, fail);

@@ -81,16 +81,13 @@ class BrdfMap {
   draw({ wi, wo, stretch, surface, light }) {
     const { viewer, gl } = this;
     const { drawing } = viewer;
-    const program = drawing.program(surface, viewer.drawn, viewer.lit.one, "map");
+    const view = viewer.viewed();
     if (viewer.drawn === "exact") drawing.setResponses([light]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.drawn);
-    program.use();
-    surface.part.use(program);
-    drawing.tables[viewer.drawn][surface.table].use(program);
-    program.texture("responses", drawing.responses);
+    const program = drawing.dressed(surface, { ...view, lit: viewer.lit.one }, "map");
     const white = { ...light, place: [0, 0, 1, 0], colour: [1, 1, 1] };
     program.set({
-      ...viewer.viewed().uniforms, ...lightUniforms([white], viewer.colour()), wavenumbers: viewer.header.light.wavenumbers,
+      ...view.uniforms, ...lightUniforms([white], viewer.colour()), wavenumbers: viewer.header.light.wavenumbers,
       height_scale: surface.height_scale * viewer.heights, light_direction: wo, side: SIDE, stretch,
       exposure: 4 * viewer.exposure / (viewer.drawn === "exact" && viewer.wavelength === null ? Math.max(dot(light.colour, LUMINANCE), 1e-6) : 1),
     });

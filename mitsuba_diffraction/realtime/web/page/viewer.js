@@ -26,7 +26,9 @@ class Viewer {
     this.wavelength = null; // wavelength of monochromatic light, nm
     this.shadows = true;
     this.exposure = 1;
-    this.heights = 1;
+    this.coherence = 1;   // factor on the coherence width
+    this.material = null; // number in the header's materials
+    this.undress();
     this.free = 1;        // share of the width beside the panel
     this.lift = 0;        // share of the height that the panel covers as a sheet below
     this.most = undefined; // number of samples instead of the default
@@ -41,6 +43,13 @@ class Viewer {
     this.report = () => {};
   }
 
+  // Show the scene's surfaces, but for changes that need other programs.
+  undress() {
+    this.heights = 1;
+    this.turn = 0;        // degrees by which patches are turned
+    this.pigment = null;  // linear sRGB in place of the pigments beneath
+  }
+
   get enough() {
     return this.most ?? (this.shadows && this.lights.count > 1 ? 256 : 64);
   }
@@ -49,9 +58,9 @@ class Viewer {
     return performance.now() - this.changed < STILL;
   }
 
-  // Method that draws: `exact` for monochromatic light.
+  // Method that draws: `exact` for monochromatic light and other coherence widths.
   get drawn() {
-    return this.wavelength === null ? this.method : "exact";
+    return this.wavelength === null && this.coherence === 1 ? this.method : "exact";
   }
 
   // Whether environment and emitters are drawn: all light is the scene's, and none has been moved.
@@ -118,7 +127,7 @@ class Viewer {
     const casters = far ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces.filter(({ emits }) => !emits);
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
     // draw moving pictures by the faster method
-    const method = moving && this.wavelength === null && drawing.tables.fast ? "fast" : this.drawn;
+    const method = moving && this.drawn === this.method && drawing.tables.fast ? "fast" : this.drawn;
     if (method === "exact") drawing.setResponses(chosen);
     const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
     const colour = this.colour();
@@ -140,7 +149,10 @@ class Viewer {
     const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0], exposure: 1 };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
-    return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, uniforms };
+    const turn = (this.turn * Math.PI) / 180, { material, coherence, pigment } = this;
+    const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment;
+    Object.assign(uniforms, { patch_turn: [Math.cos(turn), Math.sin(turn)], live_pigment: base ? [...base, 1] : [0, 0, 0, 0] });
+    return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, material, coherence, uniforms };
   }
 
   // Linear sRGB of monochromatic light, or null for all wavelengths.
@@ -255,18 +267,19 @@ class Viewer {
     });
   }
 
-  // Change method, wavelength or kind of light, after compiling the programs for it.
+  // Change method, wavelength, coherence, material or kind of light, after compiling the programs.
   async change(change, progress) {
-    const before = { method: this.method, wavelength: this.wavelength, kind: this.lights.kind };
-    const set = ({ method = this.method, wavelength = this.wavelength, kind = this.lights.kind }) => {
-      Object.assign(this, { method, wavelength });
+    const set = ({ kind, ...others }) => {
+      Object.assign(this, others);
       this.lights.kind = kind;
     };
-    set(change);
+    const { method, wavelength, coherence, material, lights: { kind } } = this;
+    const before = { method, wavelength, coherence, material, kind }, after = { ...before, ...change };
+    set(after);
     const { drawn, lit } = this;
     set(before); // meanwhile, draw with the programs that exist
-    await this.drawing.prepare(drawn, lit, progress);
-    set(change);
+    await this.drawing.prepare(drawn, lit, progress, after.material);
+    set(after);
     this.touch();
   }
 }

@@ -1,0 +1,80 @@
+"""Materials that a page can give to its surfaces: indices of the vocabulary, packed for shaders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...optics.materials import METALS, TISSUES
+from ...plugin.conductors import tabulated_index
+from ..glsl.materials import Diffracting
+from ..glsl.packing import pack_conductor
+from ..glsl.texels import Packed, Texture, as_half
+from .sections import Section, Sections, as_columns, packed_array, packed_parts
+
+#: Names as authors write them, by the tables' names; of two spellings the first.
+NAMES = {name: name for name in TISSUES} | {
+    symbol: name for name, symbol in reversed(METALS.items())
+}
+
+
+@dataclass(frozen=True)
+class MaterialEntry:
+    """Material in the page's header.
+
+    Attributes
+    ----------
+    name : name in the vocabulary.
+    absorbs : whether light that is not reflected is absorbed, and none reaches a base beneath.
+    parts : numbers of its sections, for each index of `coats`.
+    """
+
+    name: str
+    absorbs: bool
+    parts: list[dict[str, Any]]
+
+
+def changeable(surface: Diffracting | None) -> bool:
+    """Return whether a surface can show another material: solved orders and mirrors cannot."""
+    material = surface.described.material if surface else None
+    return material is not None and material.index is not None
+
+
+def named_definitions(definitions: dict[str, str]) -> dict[str, str]:
+    """Return a surface's definitions with a material of `packed_materials`."""
+    others = {name: text for name, text in definitions.items() if name != "SECOND_ORDER"}
+    return {**others, "SURFACE_KIND": "2"}
+
+
+def packed_materials(coats: Sequence[float], sections: Sections) -> list[MaterialEntry]:
+    """Pack all materials in air.
+
+    coats : indices of the layers above the structures, 1 without one.
+    """
+    if not coats:
+        return []
+    entries = []
+    for symbol, name in NAMES.items():
+        absorbs = symbol not in TISSUES or TISSUES[symbol].absorbs
+        wavelengths, index = tabulated_index(symbol)
+        parts = []
+        for coat in coats:
+            packed = pack_conductor(wavelengths, index.real / coat, index.imag / coat)
+            (texture,) = packed.textures
+            half = Texture(texture.name, as_half(texture.data.astype(np.float32)))
+            parts.append(
+                packed_parts(
+                    Packed((half,), packed.uniforms), sections, {half.name: _section(half)}
+                )
+            )
+        entries.append(MaterialEntry(name, absorbs, parts))
+    return entries
+
+
+def _section(texture: Texture) -> Section:
+    """Compress half floats that differ little from one texel to the next."""
+    bits = as_columns(texture.data, texture.data.shape[2]).view(np.uint16)
+    return packed_array(bits, differences=True)
