@@ -61,7 +61,7 @@ def loaded_in_media(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """
     changed = dict(parameters)
     if _disperses(coat := changed.get("coat_ior")):
-        changed["coat_ior"] = index_at_sodium(coat, "coat_ior")
+        changed["coat_ior"] = index_at_sodium(str(coat), "coat_ior")
     if _disperses(changed.get("ext_ior")):
         changed["lateral_scale"] = 1.0
     return changed

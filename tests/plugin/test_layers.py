@@ -78,8 +78,8 @@ def test_the_thesis_blend_is_its_formula():
     ("parameters", "text"),
     [
         ({"layering": "blend"}, "transmission, thesis"),
-        ({"layering": "thesis"}, "there is none"),
-        ({"diffuse_weight": 0.2}, "belongs to layering='thesis'"),
+        ({"layering": "thesis"}, "nested BSDF"),
+        ({"diffuse_weight": 0.2}, "layering='thesis'"),
         ({"layering": "thesis", "diffuse_weight": 1.5, "beneath": GREY}, "between 0 and 1"),
         ({"shadowing": "smith"}, "none, vcavity"),
         ({"orientation": "north"}, "must be a number"),
