@@ -16,7 +16,7 @@ import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...plugin.description import Consumer, Feature
+from ...plugin.description import Consumer, Feature, Surface
 from .maps import Map
 from .materials import GLSL, Diffracting, Material, pack_conservation, pack_surface, packed_by
 from .methods import CONSUMERS
@@ -81,6 +81,7 @@ class Shader:
     textures : textures, named like their samplers.
     functions : names of the functions in `code`, by method.
     surface : description of the surface in a few words.
+    coherence_width : 4σ of the mirror lobe's amplitude window, µm.
     """
 
     code: str
@@ -88,12 +89,14 @@ class Shader:
     textures: tuple[Texture, ...]
     functions: dict[str, str]
     surface: str
+    coherence_width: float
 
     def constants(self) -> dict[str, Any]:
         """Return functions, uniforms and textures for a program, as JSON types."""
         return {
             "generator": f"mitsuba_diffraction {version('mitsuba_diffraction')}",
             "surface": self.surface,
+            "coherence_width": self.coherence_width,
             "functions": self.functions,
             "uniforms": self.uniforms,
             "textures": {
@@ -138,7 +141,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
     tables = {method: _tables(method, surface) for method in methods}
-    return _joined(common, tables, described.lateral_scale.number, surface.words)
+    return _joined(common, tables, described, surface.words)
 
 
 def export_shader(
@@ -181,8 +184,9 @@ def _tables(method: str, surface: Diffracting) -> Packed:
     return tables | pack_responses([daylight])
 
 
-def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: str) -> Shader:
+def _joined(common: Packed, tables: dict[str, Packed], described: Surface, words: str) -> Shader:
     """Join the shared source with each method's, under prefixed names."""
+    stretch = described.lateral_scale.number
     definitions = dict(common.definitions)
     for packed in tables.values():
         definitions |= packed.definitions
@@ -209,12 +213,13 @@ def _joined(common: Packed, tables: dict[str, Packed], stretch: float, surface: 
         declared |= _declared(packed, prefix, method_names) | _declared(packed, _PREFIX, names)
     functions = {method: EXPORTED[method] for method in tables}
     head = _HEAD.format(
-        version=version("mitsuba_diffraction"), surface=surface,
+        version=version("mitsuba_diffraction"), surface=words,
         functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
     )  # fmt: skip
     text = f"{head}\n" + pruned("".join(code) + _BENEATH, _PREFIX)
     textures = {texture.name: texture for texture in declared.textures}  # methods share some
-    return Shader(text, dict(declared.uniforms), tuple(textures.values()), functions, surface)
+    width = stretch * described.coherence_width
+    return Shader(text, dict(declared.uniforms), tuple(textures.values()), functions, words, width)
 
 
 def _declared(packed: Packed, prefix: str, names: set[str]) -> Packed:

@@ -1,5 +1,5 @@
 // Diffraction as a material of three.js (r158 or later; tested with r187), over a diffuse base of the
-// colour `color`, under all lights of the scene and a sampled environment.
+// colour `color`, under all lights of the scene, a sampled environment and a mirrored room.
 import * as THREE from "three";
 import { EXRLoader } from "three/addons/loaders/EXRLoader.js";
 
@@ -13,50 +13,72 @@ async function texture(url, { type, filter, wrap }) {
 }
 
 const LIGHT = (name) => `
-void RE_Direct_Diffraction(const in IncidentLight light, const in vec3 position, const in vec3 normal,
-    const in vec3 eye, const in vec3 coat, const in LambertMaterial material, inout ReflectedLight reflected) {
+#ifdef ROOM
+uniform sampler2D md_room;
+uniform vec3 md_mirror; // (kσ)² of the mirror lobe, for red, green and blue
+bool sampled = false;
+#endif
+void RE_Direct_Orders(IncidentLight light, vec3 position, vec3 normal,
+    vec3 eye, vec3 coat, LambertMaterial material, inout ReflectedLight reflected) {
   vec3 s = normalize(vTangent - normal * dot(normal, vTangent)), t = cross(normal, s);
   mat3 frame = mat3(s, t, normal);
   vec3 wi = eye * frame, wo = light.direction * frame;
   vec3 base = saturate(wo.z) * BRDF_Lambert(material.diffuseColor) * diffraction_transmission(wi, wo);
-  reflected.directDiffuse += light.color * (base + ${name}(wi, wo));
+  vec3 orders = ${name}(wi, wo);
+#ifdef ROOM
+  wi += wo;
+  if (sampled) orders *= smoothstep(4.0, 9.0, md_mirror.r * dot(wi.xy, wi.xy));
+#endif
+  reflected.directDiffuse += light.color * (base + orders);
 }
 #undef RE_Direct
-#define RE_Direct RE_Direct_Diffraction
+#define RE_Direct RE_Direct_Orders
 #if SAMPLES > 0
-uniform vec3 md_environment[2 * SAMPLES];
+uniform vec3 md_lights[2 * SAMPLES];
 #endif
 `;
+// the mirror lobe has the peak R (kσ)²/π
 const ENVIRONMENT = `
+IncidentLight it;
+#define ADD RE_Direct(it, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, reflectedLight)
+#ifdef ROOM
+it.direction = reflect(-geometryViewDir, geometryNormal);
+it.color = textureLod(md_room, equirectUv(inverseTransformDirection(it.direction, viewMatrix)), 0.0).rgb
+  * PI / (md_mirror * max(dot(it.direction, geometryNormal), 1e-3));
+ADD;
+sampled = true;
+#endif
+#if SAMPLES > 0
 for (int n = 0; n < SAMPLES; ++n) {
-  IncidentLight sample_;
-  sample_.direction = normalize((viewMatrix * vec4(md_environment[2 * n], 0.0)).xyz);
-  sample_.color = md_environment[2 * n + 1];
-  sample_.visible = true;
-  RE_Direct(sample_, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, reflectedLight);
+  it.direction = (viewMatrix * vec4(md_lights[2 * n], 0.0)).xyz;
+  it.color = md_lights[2 * n + 1];
+  ADD;
 }
+#endif
 `;
 
 // Create the material. folder: folder of constants.json; method: "fast" or "exact"; environment:
-// result of `sampled`; others: parameters of MeshLambertMaterial. Geometries need the attribute
-// `tangent` (`computeTangents()`), along the patch's x axis.
-export async function diffractionMaterial(folder = ".", { method = "fast", environment = [], ...parameters } = {}) {
+// result of `sampled`; room: equirectangular texture that order 0 mirrors; others: parameters of
+// MeshLambertMaterial. Geometries need the attribute `tangent` (`computeTangents()`), along the
+// patch's x axis.
+export async function diffractionMaterial(folder = ".", { method = "fast", environment = [], room = null, ...parameters } = {}) {
   const constants = await (await fetch(`${folder}/constants.json`)).json();
   const code = await (await fetch(`${folder}/diffraction.glsl`)).text();
   const name = constants.functions[method];
   if (!name) throw new Error(`method ${method} was not exported, only ${Object.keys(constants.functions)}`);
-  const uniforms = { md_environment: { value: environment } };
+  const uniforms = { md_lights: { value: environment }, md_room: { value: room } };
+  uniforms.md_mirror = { value: [0.611, 0.549, 0.464].map((length) => ((0.5 * Math.PI * constants.coherence_width) / length) ** 2) };
   for (const [key, value] of Object.entries(constants.uniforms)) uniforms[key] = { value };
   for (const [key, entry] of Object.entries(constants.textures))
     uniforms[key] = { value: await texture(`${folder}/${entry.file}`, entry) };
   const material = new THREE.MeshLambertMaterial({ color: 0, ...parameters });
-  material.defines = { USE_TANGENT: "", SAMPLES: environment.length / 2 };
+  material.defines = { USE_TANGENT: "", SAMPLES: environment.length / 2, ...(room && { ROOM: "" }) };
   material.customProgramCacheKey = () => code + name;
   material.onBeforeCompile = (shader) => {
     Object.assign(shader.uniforms, uniforms);
     const add = (chunk, text) => (shader.fragmentShader = shader.fragmentShader.replace(`#include <${chunk}>`, text));
     add("lights_lambert_pars_fragment", `#include <lights_lambert_pars_fragment>\n${code}${LIGHT(name)}`);
-    if (environment.length) add("lights_fragment_end", `${ENVIRONMENT}#include <lights_fragment_end>`);
+    if (environment.length || room) add("lights_fragment_end", `${ENVIRONMENT}#include <lights_fragment_end>`);
   };
   return material;
 }
