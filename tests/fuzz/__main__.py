@@ -48,8 +48,9 @@ _SHARES = {
 ROUND = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
 ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
-#: less than one, and some where kernels are compiled on a slow machine.
-_BUSY, _HANG = 40, 900
+#: less than one, and some where kernels are compiled on a slow machine. Scales of energy of a thick
+#: film whose lengths vary take a minute.
+_BUSY, _HANG = 90, 900
 _SHOWN = 300  # characters of a failure
 
 
