@@ -14,8 +14,9 @@ from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
 from ..scene.load import set_variant
+from ..settings import TableSettings
 from . import options
-from .console import Bar
+from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
 from .report import check_outputs, save_report
 
@@ -33,8 +34,7 @@ _SURFACE = (
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
     "mode", "material", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
-    "height_scale",
-    "basis", "second_order", "preset",
+    "height_scale", "basis", "second_order", "preset",
 )  # fmt: skip
 
 
@@ -79,10 +79,9 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
         help="light for the colours, daylight or equal energy; default: D65",
     )  # fmt: skip
     group.add_argument(
-        "--cosine",
-        action="store_true",
+        "--cosine", action="store_true",
         help="map f·cosθo, the radiance of a lit surface, instead of f",
-    )
+    )  # fmt: skip
     options.add_exposure(
         group, None,
         "exposure of the PNG in stops; default: half of the diffracted light is darker than white",
@@ -251,13 +250,17 @@ class Evaluated(NamedTuple):
 def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
     """Map the renderer's BSDF."""
     from ..analysis.maps import LightDirection, brdf_map, check_map
-    from .console import mitsuba_warnings
 
     light = LightDirection(args.theta, args.phi)
     check_map(bands, args.resolution, args.samples, args.spectral)
     variant = set_variant(args.mode)
+    notes = _notes(args)
     with mitsuba_warnings(), Bar(args) as bar:
-        bsdf = surface_bsdf(args)
+        with warnings.catch_warnings():
+            if notes:  # the plugin has them only when it builds the table
+                say_warning(notes)
+                warnings.filterwarnings("ignore", r".*\bnotes? on '", DiffractionWarning)
+            bsdf = surface_bsdf(args)
         result = brdf_map(
             bsdf, light.theta, light.phi, resolution=args.resolution, samples=args.samples,
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
@@ -266,17 +269,25 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
     return Evaluated(result, _surface(bsdf), variant)
 
 
+def _notes(args: argparse.Namespace) -> str:
+    """Return a line on the notes on heights; "" of presets, recipes and tables."""
+    others = FileKind.TABLE, FileKind.ORDERS, FileKind.RECIPE
+    if args.preset is not None or kind_of(args.source) in others:
+        return ""
+    with warnings.catch_warnings():  # `surface_bsdf` reads the heights, too
+        warnings.simplefilter("ignore", DiffractionWarning)
+        patch, settings = options.load_patch(args)
+        return options.notes(args, patch, TableSettings(**settings))
+
+
 def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
     """Map a method of the thesis."""
     from ..analysis.maps import LightDirection, check_map
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
 
-    light, samples, single = (
-        LightDirection(args.theta, args.phi),
-        args.samples or 1,
-        args.wavelength,
-    )
+    light = LightDirection(args.theta, args.phi)
+    samples, single = args.samples or 1, args.wavelength
     check_map(bands, args.resolution, args.samples, spectral=False)
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
@@ -342,8 +353,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     if (index := medium_index(args.ext_ior)) != 1.0:
         if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):
             raise DiffractionError(
-                f"'{args.source}' is a table, of lengths in air; leave --ext-ior out, or give "
-                "heights"
+                f"'{args.source}' is a table of lengths in air; for --ext-ior give its heights"
             )
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)

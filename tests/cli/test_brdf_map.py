@@ -80,6 +80,15 @@ def test_a_scan_narrower_than_the_coherence_width_is_marked(run, heights):
         assert channels_of("a.exr")[1]["surface"].endswith(f"coherence width {width}")
 
 
+def test_notes_on_heights_are_printed_with_a_table_from_the_cache_too(run, heights):
+    steep = [*QUICK, "--height-unit", "nm", "--crop", "4"]
+    np.save("steep.npy", 400.0 * np.random.default_rng(0).random((64, 64)))
+    first, second = (run("brdf-map", "steep.npy", *steep) for _ in range(2))
+    for ran in (first, second):
+        assert ran.code == 0, ran.err
+        assert ran.err.count("on 'steep.npy'") == 1
+
+
 def test_one_wavelength_is_one_channel_and_a_picture_in_false_colours(run, heights):
     ran = run("brdf-map", heights, *QUICK[:-2], "-o", "a.exr", "--wavelength", "550")
     assert ran.code == 0, ran.err
