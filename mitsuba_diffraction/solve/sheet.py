@@ -42,7 +42,7 @@ def check_clear(material: Material, wavelengths: tuple[float, float]) -> None:
     index = material.index(wavelengths)
     if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:
         raise DiffractionError(
-            f"material {material.name}: light goes through a thin sheet of a clear material only; "
+            f"material {material.name}: light goes through a clear material only; "
             f"give its index, a real number of {LEAST_INDEX:g} to 100, such as 1.58"
         )
 
