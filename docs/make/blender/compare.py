@@ -36,6 +36,7 @@ class Comparison:
     noise : mean ΔE2000 that two such pictures of the same light would have.
     noise_of_cycles : the part of Cycles' picture in it.
     seconds : of Cycles, for all samples.
+    covered : blocks that the shape covers.
     """
 
     mitsuba: Picture
@@ -44,6 +45,7 @@ class Comparison:
     noise: float
     noise_of_cycles: float
     seconds: Seconds
+    covered: NDArray[np.bool_]
 
     @property
     def beyond_noise(self) -> float:
@@ -86,7 +88,8 @@ def compare(
             0.5 * _mean_delta_e(*pair, white, covered) for pair in halves_of_blocks
         ]  # the mean of two halves has half the noise of their difference
         difference = _mean_delta_e(reference, other, white, covered)
-        found.append(Comparison(means[0], means[1], difference, math.hypot(*noise), noise[1], time))
+        whole = math.hypot(*noise)
+        found.append(Comparison(*means, difference, whole, noise[1], time, covered))
     return found
 
 
