@@ -111,8 +111,9 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if any(word.startswith("--theta") for word in rest) and command == "solve":
         return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
-    # a sheet has a material that light goes through
-    return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
+    # sheets and blocks have materials that light goes through
+    opaque = command == "solve" and {"--thin", "--block"}.isdisjoint(rest)
+    return [*_PERFECT, *small] if opaque else small
 
 
 def small_look(command: str, value: str) -> str:
@@ -159,6 +160,7 @@ def small_tree(folder: Path) -> Path:
     drawn(32, 1).save(folder / "logo.png")
     write_board(folder / "bottle.obj")
     (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
+    (folder / "mirror.toml").write_text('layers = [["SiO2", 0.1], ["1.95", 0.07]]', "utf-8")
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
         for program in blocks("docs/orders.md", "python"):
