@@ -111,9 +111,10 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if any(word.startswith("--theta") for word in rest) and command == "solve":
         return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
-    # sheets and blocks have materials that light goes through
-    opaque = command == "solve" and {"--thin", "--block"}.isdisjoint(rest)
-    return [*_PERFECT, *small] if opaque else small
+    if "--block" in rest:  # by coupled waves
+        return [*small, "--resolution", "20"]
+    # a sheet has a material that light goes through
+    return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
 
 
 def small_look(command: str, value: str) -> str:
