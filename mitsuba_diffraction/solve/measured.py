@@ -29,8 +29,8 @@ _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
 _DIGITS = 9
 #: Share of the light that reversed light has elsewhere, above which a file hardly holds powers:
-#: samples 10° apart have 0.02, efficiencies without the ratio of cosines 0.27.
-_ONE_WAY = 0.1
+#: samples 5 to 10° apart have 0.02 to 0.04, efficiencies without the ratio of cosines 0.27.
+_ONE_WAY = 0.07
 
 
 class _Samples(NamedTuple):
