@@ -21,7 +21,7 @@ from mitsuba_diffraction.scene.parameters import parameters_of
 from mitsuba_diffraction.scene.stage import STUDIO
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
-from tests.support.pages import FENCE, PAGES, blocks, first_columns, spans, typed
+from tests.support.pages import FENCE, PAGES, blocks, files_of, first_columns, spans, typed
 
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
@@ -34,7 +34,7 @@ _COMMAND = re.compile(r"(\.venv/bin/)?(mitsuba-diffraction|python -m|make) ")
 
 
 COMMANDS = [
-    pytest.param(words, id=f"{page}: {' '.join(words)}"[:90])
+    pytest.param(page, words, id=f"{page}: {' '.join(words)}"[:90])
     for page in PAGES
     for text in (
         *blocks(page, "sh"),
@@ -44,8 +44,11 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize("words", COMMANDS)
-def test_a_documented_command_is_one(words):
+@pytest.mark.parametrize(("page", "words"), COMMANDS)
+def test_a_documented_command_is_one(page, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in files_of(page).items():  # the parser reads files of layers
+        (tmp_path / name).write_text(text, encoding="utf-8")
     program, *rest = words
     match Path(program).name, rest:
         case "mitsuba-diffraction", _:
@@ -154,6 +157,7 @@ def test_no_code_block_escapes():
             "ARCHITECTURE.md": {""},
             "docs/cluster.md": {"text", "toml"},
             "docs/from-scan.md": {"r"},
+            "docs/orders.md": {"toml"},
             "docs/survey.md": {"toml"},
         }.get(page, set())
         assert {language for language, _ in found} <= {"sh", "python", "xml", "json"} | drawn, page

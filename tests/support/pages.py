@@ -34,6 +34,12 @@ def blocks(page: str, language: str) -> list[str]:
     return [text for name, text in FENCE.findall(PAGES[page]) if name == language]
 
 
+def files_of(page: str) -> dict[str, str]:
+    """The TOML files of a page by name: their blocks begin with `# NAME`."""
+    named = (re.match(r"# (\S+\.toml)\n", text) for text in blocks(page, "toml"))
+    return {found[1]: found.string for found in named if found}
+
+
 def spans(page: str) -> list[str]:
     """Code within a page's sentences, on one line each."""
     return [" ".join(s.split()) for s in re.findall(r"`([^`]+)`", FENCE.sub("", PAGES[page]))]
