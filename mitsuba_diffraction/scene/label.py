@@ -34,8 +34,11 @@ _CAMERA, _FAR, _MIDDLE = 8.0, 400.0, 3.0
 _DISTANCE, _RING = 600.0, (6.0, 80.0)
 # Half of the card's larger side, cm, and its part of the picture of 4 by 3
 _CARD, _FILLED, _PICTURE = 3.0, 0.86, 4.0 / 3.0
-# Heights at which a label's surface is looked at
+# Heights at which a label's surface is looked at, and columns and rows where its coordinates are
 _HEIGHTS = 33
+_COLUMNS, _ROWS = 9, 3
+# Turns that are tried for a label that a seam cuts, degrees
+_TURNS = tuple(sign * turn for turn in range(15, 181, 15) for sign in (1, -1))
 # Factors on the patch's period that the plugin's table serves well
 _STRETCH = (0.4, 1.5)
 
@@ -48,11 +51,13 @@ class Place(NamedTuple):
     matrix : (2, 3), centimetres to the right and upwards from the label's middle, of (u, v, 1).
     size : (width, height), cm.
     elevations : of the surface's normal, degrees, evenly from the label's lower to its upper edge.
+    cut : whether the texture coordinates leave the label within it, as at a seam.
     """
 
     matrix: Floats
     size: tuple[float, float]
     elevations: Floats
+    cut: bool = False
 
 
 def card(aspect: float) -> Place:
@@ -77,7 +82,8 @@ def front(
     height : of the label's middle, as a share of the mesh's height.
     up, turn : axis that points upwards, and degrees around it, as in the scene.
 
-    Raises a DiffractionError if the mesh has no texture coordinates, or no area of them there.
+    Raises a DiffractionError if the mesh has no texture coordinates, no area of them there, or a
+    seam of them within the label.
     """
     own = load_mesh(file)  # coordinates before those without area are replaced
     if own.uv is None:
@@ -86,43 +92,80 @@ def front(
             "Blender"
         )
     mesh = fitted_mesh(file, up=up)
-    sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
-    rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    corners, uv = (mesh.positions @ rotation.T)[mesh.faces], own.uv[own.faces]
-    normals = (mesh.normals @ rotation.T)[mesh.faces]
-    sides = np.ptp(corners.reshape(-1, 3), axis=0)
-    wide, z = width * sides[0], height * sides[2]
+    uv = own.uv[own.faces]
+
+    def place_at(turn: float) -> Place | None:
+        """Place at a turn; None if the coordinates have no area there."""
+        sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
+        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        corners = (mesh.positions @ rotation.T)[mesh.faces]
+        sides = np.ptp(corners.reshape(-1, 3), axis=0)
+        normals = (mesh.normals @ rotation.T)[mesh.faces]
+        return _place(corners, normals, uv, width * sides[0], height * sides[2], aspect)
+
+    place = place_at(turn)
+    if place is None:
+        raise DiffractionError(
+            f"mesh '{file}': its texture coordinates have no area in the label's middle; unwrap it "
+            "again, or turn another side to the front"
+        )
+    if place.cut:
+        others = (turn + step for step in _TURNS)
+        whole = next((t for t in others if (p := place_at(t)) is not None and not p.cut), None)
+        raise DiffractionError(
+            f"mesh '{file}': a seam of its texture coordinates cuts the label; "
+            + ("unwrap it again" if whole is None else f"choose --turn {whole:g}")
+            + ", or a smaller --width"
+        )
+    return place
+
+
+def _place(
+    corners: Floats, normals: Floats, uv: Floats, wide: float, z: float, aspect: float
+) -> Place | None:
+    """Return the place of a label on the side that looks to −y; None without area of coordinates.
+
+    corners, normals, uv : (m, 3, 3 or 2) of the triangles' corners.
+    wide, z : width of the label and height of its middle, cm.
+    """
+    facing = normals.sum(axis=1)
 
     def normal_at(z: float) -> tuple[int, Floats, Floats]:
-        number, weights = _in_front(corners, z, normals.sum(axis=1))
+        number, weights, _ = _in_front(corners, 0.0, z, facing)
         normal = weights @ normals[number]
         return number, weights, normal / np.linalg.norm(normal)
 
     number, weights, normal = normal_at(z)
-    right = np.array([-normal[1], normal[0], 0.0]) / math.hypot(normal[0], normal[1])
-    rise = math.hypot(normal[0], normal[1]) * wide / aspect
+    level = math.hypot(normal[0], normal[1])
+    right, high = np.array([-normal[1], normal[0], 0.0]) / level, wide / aspect
+    rise = level * high
     steep = [normal_at(z + part * rise)[2][2] for part in np.linspace(-0.5, 0.5, _HEIGHTS)]
     edges = corners[number, 1:] - corners[number, 0]
     flat = np.stack([edges @ right, edges @ np.cross(normal, right)])  # (2, 2), columns are edges
     steps = (uv[number, 1:] - uv[number, 0]).T
     if abs(np.linalg.det(steps)) < 1e-12:
-        raise DiffractionError(
-            f"mesh '{file}': its texture coordinates have no area in the label's middle; unwrap it "
-            "again, or turn another side to the front"
-        )
+        return None
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
     elevations = np.degrees(np.arcsin(np.clip(steep, -1.0, 1.0)))
-    return Place(np.column_stack([linear, shift]), (wide, wide / aspect), elevations)
+    place = Place(np.column_stack([linear, shift]), (wide, high), elevations)
+    for x in np.linspace(-0.5, 0.5, _COLUMNS):
+        for y in np.linspace(-0.5, 0.5, _ROWS):
+            number, weights, hit = _in_front(corners, x * wide, z + y * rise, facing)
+            seen = place.matrix @ [*(weights @ uv[number]), 1.0]
+            # a seam leads out of the label; a curved front moves its edge by less
+            if hit and np.any(np.abs(seen / place.size - [x, y]) > 0.5):
+                return place._replace(cut=True)
+    return place
 
 
-def _in_front(corners: Floats, z: float, normals: Floats) -> tuple[int, Floats]:
-    """Return the triangle seen first from −y at x = 0 and this height, and its barycentric place.
+def _in_front(corners: Floats, x: float, z: float, normals: Floats) -> tuple[int, Floats, bool]:
+    """Return the triangle seen first from −y at this place, its barycentric weights, and True.
 
-    Where the axis meets no triangle, it is the nearest one that faces −y.
+    Where no triangle is, it is the nearest one that faces −y, and False.
     """
     a, b, c = np.moveaxis(corners[..., [0, 2]], 1, 0)
-    point = np.array([0.0, z])
+    point = np.array([x, z])
 
     def area(p: Floats, q: Floats, r: Floats) -> Floats:
         return np.asarray(
@@ -137,9 +180,10 @@ def _in_front(corners: Floats, z: float, normals: Floats) -> tuple[int, Floats]:
     if hit.any():
         depth = np.where(hit, np.einsum("ij,ij->i", weights, corners[..., 1]), np.inf)
         number = int(depth.argmin())
-        return number, weights[number]
+        return number, weights[number], True
     away = np.linalg.norm(corners.mean(axis=1)[:, [0, 2]] - point, axis=1)
-    return int(np.where(normals[:, 1] < 0.0, away, np.inf).argmin()), np.full(3, 1.0 / 3.0)
+    number = int(np.where(normals[:, 1] < 0.0, away, np.inf).argmin())
+    return number, np.full(3, 1.0 / 3.0), False
 
 
 def geometry(elevations: Floats) -> tuple[float, Floats]:

@@ -127,6 +127,33 @@ def test_on_a_mesh_it_is_as_a_diffuse_texture_on_an_obj(
     )
 
 
+def write_can(file: Path, seam: float) -> None:
+    """Write a cylinder, z up; its texture coordinates begin at this azimuth, degrees from −y."""
+    around = np.radians(seam - 90.0) + np.linspace(0, 2 * np.pi, 49)
+    lines = [f"v {3 * np.cos(a)} {3 * np.sin(a)} {z}" for z in (0, 6) for a in around]
+    lines += [f"vt {u} {v}" for v in (0, 1) for u in np.linspace(0, 1, 49)]
+    corners = ((k, k + 1, k + 50, k + 49) for k in range(1, 49))
+    lines += ["f " + " ".join(f"{k}/{k}" for k in quad) for quad in corners]
+    file.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("seam", [0.0, 20.0, -20.0])
+def test_a_label_that_a_seam_cuts_is_refused_with_a_turn_that_serves(
+    tmp_path: Path, seam: float
+) -> None:
+    mi.set_variant("llvm_ad_rgb")
+    can = tmp_path / "can.obj"
+    write_can(can, seam)
+    options: Any = {"width": 0.6, "height": 0.5, "up": "z"}  # which covers ±37° of azimuth
+    with pytest.raises(DiffractionError, match="seam of its texture coordinates") as refused:
+        label.front(can, _ASPECT, **options)
+    turn = float(str(refused.value).split("--turn ")[1].split(",")[0])
+    assert abs(turn) < 90
+    assert not label.front(can, _ASPECT, turn=turn, **options).cut
+    write_can(can, 60.0)
+    assert not label.front(can, _ASPECT, **options).cut
+
+
 @pytest.mark.parametrize("elevation", [-8.0, 0.0, 20.0])
 def test_the_ring_stands_where_its_first_order_reaches_the_camera(elevation: float) -> None:
     elevations = elevation + np.linspace(-3, 3, 5)
