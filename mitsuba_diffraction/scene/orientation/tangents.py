@@ -159,7 +159,10 @@ class TangentReport:
             ]
         lines = []
         if not self.has_normals:
-            lines.append("no vertex normals: every triangle reflects like a flat mirror")
+            lines.append(
+                "no vertex normals: every triangle reflects like a flat mirror; export smooth "
+                "normals, or write the mesh with the command 'tangents', which adds them"
+            )
         if self.degenerate >= 0.01:
             lines.append(
                 f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
