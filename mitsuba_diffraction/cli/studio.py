@@ -44,8 +44,8 @@ def add_studio(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     group.add_argument(
         "--base", metavar="COLOUR|FILE|METAL",
-        help="pigment of a skin: 'r,g,b', '#804020', sienna or a picture (by the mesh's texture "
-        "coordinates); or name of the metal, e.g. gold",
+        help="pigment of a skin: 'r,g,b', '#804020', sienna, a picture (by the mesh's texture "
+        "coordinates) or the mesh's .glb, for its base colour; or name of the metal, e.g. gold",
     )  # fmt: skip
     group.add_argument(
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"

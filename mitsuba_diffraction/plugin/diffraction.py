@@ -172,7 +172,7 @@ The light beneath
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
     or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
-    picture, which texture coordinates lay over the surface.
+    picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
 layering : string [transmission]
     Share of the light for the nested BSDF. `transmission`: T(ωi) T(ωo) with T = 1 − a and a the
     albedo of the diffracting surface; under a coat, the reflectance of both flat faces. `thesis`:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError, quoted
-from ..files import read_text, readable_file
+from ..extras import optional
+from ..files import GLTF, read_text, readable_file
 from ..optics.colour import decode_srgb
 from .types import BSDF
 
@@ -32,7 +33,7 @@ def pigment_bsdf(text: str | float) -> BSDF:
 
     text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
         "sienna", a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
-        cent, or a picture.
+        cent, a picture, or a glTF file, whose material's base colour is taken.
 
     Raises a DiffractionError if the text is not one of these, or the spectrum is not one or ends
     within 400 to 700 nm.
@@ -106,10 +107,38 @@ def _reflectance(text: str) -> dict[str, Any]:
         return {"type": "spectrum", "value": pairs}
     if Path(text).suffix.lower() in PICTURES:
         return {"type": "bitmap", "filename": str(readable_file(text).absolute())}
+    if Path(text).suffix.lower() in GLTF:
+        return _base_colour(readable_file(text))
     colour = _colour(text)
     if len(set(colour)) == 1:
         return {"type": "uniform", "value": colour[0]}
     return {"type": "rgb", "value": colour}
+
+
+def _base_colour(file: Path) -> dict[str, Any]:
+    """Return the base colour of a glTF file's material: factor, times a texture if it has one.
+
+    Linear values, as glTF 2.0 (Khronos 2021), section 3.9.2, defines factor and texture.
+    """
+    trimesh = optional("trimesh", f"pigment='{file}'")
+    try:
+        meshes = trimesh.load_scene(file, process=False).geometry.values()
+    except Exception as error:  # whatever the package makes of damaged files
+        raise DiffractionError(f"pigment='{file}': cannot be read as glTF") from error
+    materials = {id(m): m for mesh in meshes if (m := getattr(mesh.visual, "material", None))}
+    own = [m for m in materials.values() if isinstance(m, trimesh.visual.material.PBRMaterial)]
+    if len(own) != 1:
+        raise DiffractionError(
+            f"pigment='{file}': it has {len(own)} materials, and a pigment is one; bake their base "
+            "colours into a picture, and give that"
+        )
+    given = own[0].baseColorFactor
+    factor = np.ones(3) if given is None else np.asarray(given)[:3] / 255.0
+    picture = own[0].baseColorTexture
+    if picture is None:
+        return {"type": "rgb", "value": factor.tolist()}
+    linear = decode_srgb(np.asarray(picture.convert("RGB")) / 255.0) * factor
+    return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32))}
 
 
 def _colour(text: str) -> list[float]:
@@ -123,8 +152,8 @@ def _colour(text: str) -> list[float]:
     if len(numbers) != 3 or not all(0.0 <= number <= 1.0 for number in numbers):
         raise DiffractionError(
             f"pigment={quoted(text)} is not a colour: give a grey from 0 to 1, 'r,g,b', '#804020', "
-            f"a name of CSS such as sienna, a spectrum ({', '.join(SPECTRA)}) or a picture "
-            f"({', '.join(PICTURES)})"
+            f"a name of CSS such as sienna, a spectrum ({', '.join(SPECTRA)}), a picture "
+            f"({', '.join(PICTURES)}) or a mesh with a base colour ({', '.join(GLTF)})"
         )
     return numbers
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from PIL import Image
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.materials import METALS, TISSUES
 from mitsuba_diffraction.plugin.conductors import tabulated_range
 from mitsuba_diffraction.plugin.pigment import pigment_bsdf, pigment_range
@@ -35,6 +38,55 @@ def test_a_flat_tissue_reflects_by_its_index(spectral, name):
     n = TISSUES[name].index(lam)
     # single precision, and the lobe is within 1e-3 of the cone
     assert found.value[:, 0] == pytest.approx(np.abs((n - 1) / (n + 1)) ** 2, rel=4e-3)
+
+
+def write_gltf(file, materials):
+    """Write a square for each of these materials of trimesh."""
+    trimesh = pytest.importorskip("trimesh")
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    scene = trimesh.Scene()
+    for material in materials:
+        visual = trimesh.visual.TextureVisuals(uv=np.array(corners)[:, :2], material=material)
+        scene.add_geometry(
+            trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
+        )
+    scene.export(file)
+
+
+def test_base_colour_of_gltf_is_its_picture_times_its_factor(spectral, tmp_path):
+    pbr = pytest.importorskip("trimesh").visual.material.PBRMaterial
+    random = np.random.default_rng(5)
+    picture = Image.fromarray(random.integers(0, 256, (4, 8, 3), np.uint8))
+    picture.save(tmp_path / "base.png")
+    files = {name: tmp_path / f"{name}.glb" for name in ("plain", "dimmed", "flat", "several")}
+    write_gltf(files["plain"], [pbr(baseColorTexture=picture)])
+    write_gltf(
+        files["dimmed"], [pbr(baseColorTexture=picture, baseColorFactor=[0.4, 0.4, 0.4, 1.0])]
+    )
+    write_gltf(files["flat"], [pbr(baseColorFactor=[0.2, 0.2, 0.2, 1.0])])
+    write_gltf(files["several"], [pbr(baseColorFactor=[g, 0.1, 0.1, 1.0]) for g in (0.2, 0.6)])
+
+    def seen(name):
+        """Reflectances at the middles of the picture's texels."""
+        u, v = np.meshgrid((np.arange(8) + 0.5) / 8, (np.arange(4) + 0.5) / 4)
+        si = dr.zeros(mi.SurfaceInteraction3f, u.size)
+        si.uv = mi.Point2f(u.ravel(), v.ravel())
+        si.wavelengths = mi.Spectrum(450.0, 520.0, 590.0, 650.0)
+        si.wi = mi.Vector3f(0, 0, 1)
+        return np.array(pigment_bsdf(str(tmp_path / name)).eval_diffuse_reflectance(si))
+
+    truth = seen("base.png")
+    assert np.ptp(truth) > 0.5
+    # textures of half precision
+    assert seen("plain.glb") == pytest.approx(truth, abs=2e-3)
+    # Mitsuba's spectrum of a colour is smooth, and of one that is dimmed not quite proportional
+    assert seen("dimmed.glb").mean() == pytest.approx(0.4 * truth.mean(), rel=0.05)
+    assert seen("flat.glb") == pytest.approx(0.2, abs=1e-3)
+    with pytest.raises(DiffractionError, match="2 materials"):
+        pigment_bsdf(str(files["several"]))
+    files["flat"].write_bytes(b"glTF")
+    with pytest.raises(DiffractionError, match="cannot be read as glTF"):
+        pigment_bsdf(str(files["flat"]))
 
 
 def test_pigment_under_keratin_reflects_its_spectrum(spectral, tmp_path):
