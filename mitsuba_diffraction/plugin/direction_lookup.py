@@ -30,6 +30,7 @@ class DirectionLookup:
 
     def __init__(self) -> None:
         self.present = False
+        self._ones: DirectionalTable | None = None
         self._values: Buffer = None
         self._nodes: Buffer = None
         self._last, self._varies = 0, False
@@ -44,13 +45,20 @@ class DirectionLookup:
         scales: ScaleRange,
         slopes: Sequence[tuple[Float, list[DirectionalTable]]] = (),
     ) -> None:
-        """Take the tables at evenly spaced height scales, or none.
+        """Take the tables at evenly spaced height scales, or none, where all values are 1.
+
+        While derivatives are taken, values of 1 take the place of tables that are no longer needed:
+        an optimisation compiles no other kernel.
 
         slopes : differentiable numbers, and derivatives of the tables with respect to them.
         """
+        if tables is None and self._ones is not None and scales.differentiable:
+            tables = [self._ones] * len(nodes)
         self.present = tables is not None
         if tables is None:
             return
+        if scales.differentiable:
+            self._ones = DirectionalTable(tables[0].wavelengths, np.ones_like(tables[0].values))
         height_scale, varies = scales.height_scale, scales.varies
         maps = _maps(tables, scales.centre)
         rates = [(number, _maps(rate, scales.centre)) for number, rate in slopes]
