@@ -19,7 +19,7 @@ _WORDS = {"the command '": "'mitsuba-diffraction ", "material:": "--material "}
 #: Parameters that remedies in messages name.
 _REMEDIES = (
     "accept", "channel", "coherence_width", "crop", "fill", "height_unit", "level", "max_height",
-    "method", "patch", "periodic", "pixel_size", "polarised", "windows",
+    "method", "patch", "periodic", "pixel_size", "polarised", "turn", "windows",
 )  # fmt: skip
 _REMEDY = re.compile(rf"(?<!-D )\b({'|'.join(_REMEDIES)})=(\w++(?:[.+-]\w++)*+)(?! \()")
 #: Options that are not called after their parameters.

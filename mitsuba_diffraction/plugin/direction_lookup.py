@@ -47,8 +47,8 @@ class DirectionLookup:
     ) -> None:
         """Take the tables at evenly spaced height scales, or none, where all values are 1.
 
-        While derivatives are taken, values of 1 take the place of tables that are no longer needed:
-        an optimisation compiles no other kernel.
+        While derivatives are taken, values of 1 stand for no tables after there were some: an
+        optimisation compiles no other kernel.
 
         slopes : differentiable numbers, and derivatives of the tables with respect to them.
         """

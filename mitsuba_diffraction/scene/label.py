@@ -114,8 +114,8 @@ def front(
         whole = next((t for t in others if (p := place_at(t)) is not None and not p.cut), None)
         raise DiffractionError(
             f"mesh '{file}': a seam of its texture coordinates cuts the label; "
-            + ("unwrap it again" if whole is None else f"choose --turn {whole:g}")
-            + ", or a smaller --width"
+            + ("unwrap it again" if whole is None else f"choose turn={whole:g}")
+            + ", or a smaller width"
         )
     return place
 

@@ -14,8 +14,9 @@ from mitsuba_diffraction.cli.scene_options import put_on_stage, scene_parameters
 from mitsuba_diffraction.cli.studio import take_studio
 from mitsuba_diffraction.scene.parameters import parameters_of
 from mitsuba_diffraction.scene.stage import STUDIO
+from tests.support import ROOT
 
-MESH = STUDIO.parent / "meshes" / "knot.ply"
+MESH = ROOT / "scenes" / "meshes" / "knot.ply"  # which a wheel does not bring along
 
 
 @pytest.fixture
