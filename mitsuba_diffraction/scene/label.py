@@ -125,6 +125,8 @@ def _place(
 ) -> Place | None:
     """Return the place of a label on the side that looks to −y; None without area of coordinates.
 
+    Raises a DiffractionError if that side's normals point away from −y.
+
     corners, normals, uv : (m, 3, 3 or 2) of the triangles' corners.
     wide, z : width of the label and height of its middle, cm.
     """
@@ -136,6 +138,11 @@ def _place(
         return number, weights, normal / np.linalg.norm(normal)
 
     number, weights, normal = normal_at(z)
+    if normal[1] > 0.0:
+        raise DiffractionError(
+            "the mesh's normals point inwards where the label is to lie; turn them outwards, e.g. "
+            "in Blender"
+        )
     level = math.hypot(normal[0], normal[1])
     right, high = np.array([-normal[1], normal[0], 0.0]) / level, wide / aspect
     rise = level * high
@@ -176,7 +183,7 @@ def _in_front(corners: Floats, x: float, z: float, normals: Floats) -> tuple[int
     whole = area(a, b, c)
     parts = np.stack([area(point, b, c), area(a, point, c), area(a, b, point)], 1)
     weights = parts / np.where(whole == 0.0, np.nan, whole)[:, None]
-    hit = (weights >= -1e-9).all(axis=1) & (normals[:, 1] < 0.0)
+    hit = (weights >= -1e-9).all(axis=1)
     if hit.any():
         depth = np.where(hit, np.einsum("ij,ij->i", weights, corners[..., 1]), np.inf)
         number = int(depth.argmin())

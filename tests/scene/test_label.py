@@ -169,6 +169,14 @@ def test_what_cannot_bear_a_label_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DiffractionError, match="no texture coordinates"):
         label.front(mesh, 1.0, width=0.5, height=0.5)
     write_board(mesh)
+    inwards = [
+        " ".join([line[0], *line.split()[:0:-1]]) if line[0] == "f" else line
+        for line in mesh.read_text().splitlines()
+    ]
+    mesh.write_text("\n".join(inwards))
+    with pytest.raises(DiffractionError, match="normals point inwards"):
+        label.front(mesh, 1.0, width=0.5, height=0.5, up="z")
+    write_board(mesh)
     mesh.write_text(mesh.read_text().replace("vt 1.0", "vt 0.0"))
     with pytest.raises(DiffractionError, match="no area in the label's middle"):
         label.front(mesh, 1.0, width=0.5, height=0.5, up="z")
