@@ -57,8 +57,8 @@ def add_studio(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     group.add_argument(
         "--clamp", metavar="L", type=number_between(1e-3, 1e6),
-        help="limit each sample to L times white, against bright dots; 10 to 30 leaves most "
-        "highlights as they are",
+        help="limit each sample to L times white, against bright dots; 200 leaves most of the "
+        "streaks that a structure makes of the sun",
     )  # fmt: skip
 
 
@@ -73,7 +73,10 @@ def take_studio(args: argparse.Namespace) -> None:
     is_mesh = args.scene.suffix.lower() in MESHES
     if args.env is not None or args.sun is not None:
         sky = str(STUDIO.parent / ("daylight.xml" if args.env is None else "environment.xml"))
-        values |= {"light": "outdoors.xml", "sky": sky} if is_mesh else {"light": sky}
+        # a light with its own floor
+        floored = is_mesh or (parameters_of(args.scene) or {}).get("light") == "ring.xml"
+        outdoors = str(STUDIO.with_name("outdoors.xml"))
+        values |= {"light": outdoors, "sky": sky} if floored else {"light": sky}
     if args.env is not None:
         values["environment"] = str(check_panorama(Path(args.env)).absolute())
     if args.sun is not None:

@@ -45,7 +45,7 @@ def parameters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_a_panorama_and_a_sun_light_the_scene_outdoors(parameters):
     values, _ = parameters("--preset", "cd", "--env", "sky.hdr", "--sun", "120,40")
-    assert values["light"] == "outdoors.xml"
+    assert Path(values["light"]).name == "outdoors.xml"
     assert Path(values["sky"]).name == "environment.xml"
     assert Path(values["environment"]).name == "sky.hdr"
     assert (values["sun_azimuth"], values["sun_elevation"]) == ("120", "40")
@@ -53,6 +53,15 @@ def test_a_panorama_and_a_sun_light_the_scene_outdoors(parameters):
     values, _ = parameters("--preset", "cd", "--sun=-30,10", "-D", "sun_elevation=12")
     assert Path(values["sky"]).name == "daylight.xml"
     assert values["sun_elevation"] == "12"  # -D goes before
+
+
+def test_a_sky_over_a_label_comes_with_a_floor():
+    label = STUDIO.with_name("label.xml")
+    args = build_parser().parse_args(["render", str(label), "--sun", "120,40"])
+    take_studio(args)
+    values = dict(args.parameters)
+    assert Path(values["light"]).name == "outdoors.xml"
+    assert "floor" in (parameters_of(label, values) or {})
 
 
 @pytest.mark.parametrize(
