@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .. import orders
+from .. import orders, stacks
 from ..published import Published
 from .markdown import percent, table
 from .measurements import Measurements
@@ -67,6 +67,10 @@ printed digits, or the error of the printed method.
 
 {_published(measured.published)}
 
+## Films, layers and blocks
+
+{_stacks(measured)}
+
 Measured gratings: [measured.md](measured.md)."""
 
 
@@ -108,3 +112,11 @@ def _published(cases: tuple[Published, ...]) -> str:
             f"{case.source}: {case.grating}; tolerance {case.tolerance:g}.\n\n{table(header, rows)}"
         )
     return "\n\n".join(parts)
+
+
+def _stacks(measured: Measurements) -> str:
+    rows = [
+        [row.case, row.light, f"{row.found:.5f}", f"{row.truth:.5f}", row.beside]
+        for row in stacks.compared(measured.quick)
+    ]
+    return table(["surface", "light", "solved", "truth", "by"], rows)

@@ -1,0 +1,201 @@
+"""Films, layers beneath a profile and blocks, beside closed forms and other solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mitsuba_diffraction.optics.coat import face_transmittance
+from mitsuba_diffraction.solve.block import solve_block
+from mitsuba_diffraction.solve.chandezon import Chandezon
+from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.films import structure_of
+from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.orders import Settings
+from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
+from mitsuba_diffraction.solve.stations import Grating
+from mitsuba_diffraction.tables.orders import cells
+
+_RANGE = (500.0, 600.0)
+#: Silica and another oxide, from the substrate upwards: indices, and thicknesses in µm.
+MIRROR = (("1.46", 0.1), ("1.95", 0.075)) * 3
+#: Silica ridges on a dielectric mirror for s light of 532 nm at 45°: period, depth, µm, and duty.
+RIDGES = (0.3762, 0.36, 0.6)
+#: Layers beneath these ridges.
+BENEATH = (*(("1.46", 0.104), ("1.95", 0.073)) * 14, ("1.46", 0.05))
+_HARMONICS = 6
+
+
+class Compared(NamedTuple):
+    """A share of light by the package, and by another program or a closed form.
+
+    case, light : in words.
+    beside : what is compared with.
+    """
+
+    case: str
+    light: str
+    found: float
+    truth: float
+    beside: str
+
+
+def stacked(
+    profile: Profile, material: str = "1.46", superstrate: float = 1.0, **media: object
+) -> Grating:
+    """Return a grating with films and layers; media are arguments of `structure_of`."""
+    substance = material_of(material, _RANGE)
+    structure = structure_of(profile, substance, _RANGE, **media)  # type: ignore[arg-type]
+    return Grating(profile, substance, superstrate, _RANGE, structure=structure)
+
+
+def efficiencies(
+    grating: Grating, harmonics: int, theta: float, wavelength: float
+) -> dict[int, np.ndarray]:
+    """Return efficiencies (2,) of s and p light by order, of light across the grooves.
+
+    harmonics : of coupled waves, or of Chandezon's method for slopes.
+    theta, wavelength : of the light, degrees and nm.
+    """
+    period = grating.optical_period
+    cell = cells.to_cell(-np.sin(np.radians(theta)), 0.0, wavelength, period)
+    w = float(cells.w_of(cell.k_continuous, wavelength, _RANGE, period))
+    kind = CoupledWaves if grating.profile.name.startswith("lamellar") else Chandezon
+    solver = kind(grating.profile, harmonics, grating.structure)
+    place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
+    j = int(cell.channel)
+    powers = (np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2).sum(axis=-1)
+    return {j - q: powers[:, q] for q in range(powers.shape[1])}
+
+
+def by_ikarus(theta: float, wavelength: float) -> dict[int, np.ndarray]:
+    """Return efficiencies (2,) of s and p light by order, of `RIDGES` by ikarus-rcwa."""
+    import ikarus
+
+    (period, depth, duty), pixels = RIDGES, 40
+    ridge = np.repeat((np.arange(pixels) < duty * pixels).astype(int)[:, None], 2, axis=1)
+    solved = []
+    for turn in (0.0, 90.0):
+        solver = ikarus.RCWA(
+            1e-6 * period, 1e-6 * period, resolution=(pixels, 2), n_orders=(_HARMONICS, 0)
+        )
+        solver.add_uniform_layer(np.inf, 1.0)
+        solver.add_layer(1e-6 * depth, ridge, [1.0, 1.46])
+        for index, thickness in reversed(BENEATH):
+            solver.add_uniform_layer(1e-6 * thickness, float(index))
+        solver.add_uniform_layer(np.inf, 1.46)
+        solver.set_source(
+            wavelength=1e-9 * wavelength, theta=theta, polarization="linear", linear_pol_angle=turn
+        )
+        solved.append(solver.simulate()[2])
+    return {
+        m: np.array([float(each.R_orders[each.order_index(m, 0)]) for each in solved])
+        for m in (0, 1)
+    }
+
+
+def quarter_wave_reflectance(low: float, high: float, substrate: float, pairs: int) -> float:
+    """Return R of layers of a quarter wavelength: Born and Wolf, section 1.6.5."""
+    ratio = high**2 / substrate * (high / low) ** (2 * pairs)
+    return float(((1 - ratio) / (1 + ratio)) ** 2)
+
+
+def compared(quick: bool = False) -> Iterator[Compared]:
+    """Yield all comparisons; those with closed forms alone if quick."""
+    yield from _closed_forms()
+    if not quick:
+        yield from _transfer_matrices()
+        yield from _ridges()
+        yield from _sine()
+
+
+def _closed_forms() -> Iterator[Compared]:
+    low, high, pairs, lam = 1.46, 2.35, 5, 550.0
+    thick = [(str(index), 1e-3 * lam / 4 / index) for index in (low, high)]
+    beneath = [thick[1], *(thick * pairs)]
+    surface = stacked(lamellar(0.5, 0.0), "1.52", beneath=beneath)
+    yield Compared(
+        "11 layers of a quarter wavelength on glass", f"0°, {lam:g} nm",
+        float(efficiencies(surface, 2, 1e-3, lam)[0].mean()),
+        quarter_wave_reflectance(low, high, 1.52, pairs), "closed form",
+    )  # fmt: skip
+    index = 1.5
+    block = solve_block(
+        lamellar(0.4, 1e-7), index, settings=Settings((500.0, 560.0), tolerance=0.1, resolution=4)
+    )
+    for theta, from_within in ((30.0, False), (80.0, False), (30.0, True), (41.0, True)):
+        x = np.sin(np.radians(theta)) * (index if from_within else 1.0)
+        cosine = float(np.sqrt(1.0 - x * x))
+        found = block.efficiency(x, 0.0, 530.0, 0, from_below=from_within, transmitted=True)
+        side = "within" if from_within else "above"
+        yield Compared(
+            "a block's flat face, transmitted", f"{theta:g}° from {side}", float(found),
+            float(face_transmittance(cosine, index)), "Fresnel",
+        )  # fmt: skip
+
+
+def _transfer_matrices() -> Iterator[Compared]:
+    import tmm
+
+    lam, metal = 540.0, {"layers": [("1.38", 0.12)], "beneath": MIRROR, "substrate": "Al"}
+    films: Sequence[tuple[str, float]] = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
+    flat = {
+        "a film, a mirror of 6 layers, aluminium": stacked(lamellar(0.5, 0.0), **metal),
+        "three films on aluminium, slopes": stacked(sinusoidal(0.5, 1e-9), "Al", layers=films),
+    }
+    aluminium = complex(material_of("Al", _RANGE).index(lam)[()])
+    stacks = (
+        ([1.0, 1.38, *(1.95, 1.46) * 3, aluminium], [120.0, *(75.0, 100.0) * 3]),
+        ([1.0, 1.38, 2.3 + 0.01j, 1.46, aluminium], [120.0, 60.0, 80.0]),
+    )
+    for (case, surface), (indices, depths) in zip(flat.items(), stacks, strict=True):
+        for theta in (10.0, 50.0):
+            got = efficiencies(surface, 3, theta, lam)[0]
+            for name, found in zip("sp", got, strict=True):
+                stack = (name, indices, [np.inf, *depths, np.inf], np.radians(theta), lam)
+                light = f"{theta:g}°, {lam:g} nm, {name}"
+                yield Compared(case, light, float(found), tmm.coh_tmm(*stack)["R"], "tmm")
+
+
+def _ridges() -> Iterator[Compared]:
+    theta, lam = 45.0, 532.0
+    surface = stacked(lamellar(*RIDGES), beneath=BENEATH)
+    ours, theirs = efficiencies(surface, _HARMONICS, theta, lam), by_ikarus(theta, lam)
+    for order in (1, 0):
+        for light, name in enumerate("sp"):
+            found, truth = float(ours[order][light]), float(theirs[order][light])
+            case = f"ridges on a mirror of 29 layers, order {order}"
+            beside = "ikarus-rcwa"
+            if order and name == "s":
+                # Applied Optics 38, 6257
+                beside += "; Hehl et al. 1999: 1 computed, 0.97 measured"
+            yield Compared(case, f"{theta:g}°, {lam:g} nm, {name}", found, truth, beside)
+
+
+def _sine() -> Iterator[Compared]:
+    profile, index, limits = sinusoidal(0.4, 0.05), 1.5, (500.0, 560.0)
+    table = solve_block(profile, index, settings=Settings(limits, tolerance=0.02, resolution=8))
+    # the block below, as a thin sheet's upper side, with channels of the light above
+    side = Grating(profile, material_of(index, limits), 1.0, limits, thin=True)
+    station = side.station(1, 0, 0.3, 0.4, [0.3])
+    powers = 0.5 * (np.abs(IntegralSolver(profile, 50).amplitudes(station)[0]) ** 2).sum((1, 3))
+    n, y, lam = station.channels, station.along[0], 1e3 * station.wavelengths[0]
+    numbers = np.concatenate([np.arange(n), station.inside])
+    x = np.sqrt(1.0 - y * y) * station.sines_of(numbers)
+    below = np.arange(len(numbers)) >= n
+    for j in (0, len(numbers) - 1):
+        within = bool(below[j])
+        theta = np.degrees(np.arcsin(np.hypot(x[j], y) / (index if within else 1.0)))
+        light = f"{theta:.0f}° from {'within' if within else 'above'}, {lam:.0f} nm"
+        others = np.flatnonzero(numbers != numbers[j])
+        for q in others[np.argsort(-powers[j, others])][:2]:
+            order = numbers[j] - numbers[q]
+            found = table.efficiency(
+                x[j], y, lam, order, from_below=within, transmitted=bool(below[q] != within)
+            )
+            side_of_order = "within" if below[q] else "above"
+            case = f"table of a block's sinusoidal face, order {order:d} {side_of_order}"
+            yield Compared(case, light, float(found), float(powers[j, q]), "gratinglab")
