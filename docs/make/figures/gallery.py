@@ -132,6 +132,11 @@ PICTURES = (
         "(orders.md#efficiencies-from-another-program-or-measured) takes its place by one option.",
     ),
     _scene(
+        "laser_through_plate", "A laser through a plate",
+        "The back of the plate is a [block](orders.md#blocks) with lines of 1 µm. Total reflection "
+        "guides other orders until they meet the grating again, and leave beside the first.",
+    ),
+    _scene(
         "spectrometer", "A grating spectrometer",
         "Lamp light through a slit and a clear grating onto a screen, traced from the lamp. The "
         "grating has [solved orders](orders.md#thin-sheets).",
