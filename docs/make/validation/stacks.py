@@ -198,4 +198,5 @@ def _sine() -> Iterator[Compared]:
             )
             side_of_order = "within" if below[q] else "above"
             case = f"table of a block's sinusoidal face, order {order:d} {side_of_order}"
+            case = case.replace("-", "−")
             yield Compared(case, light, float(found), float(powers[j, q]), "gratinglab")
