@@ -83,7 +83,7 @@ def front(
     up, turn : axis that points upwards, and degrees around it, as in the scene.
 
     Raises a DiffractionError if the mesh has no texture coordinates, no area of them there, or a
-    seam of them within the label.
+    seam of them within the label, or if its normals point inwards there.
     """
     own = load_mesh(file)  # coordinates before those without area are replaced
     if own.uv is None:
@@ -94,24 +94,26 @@ def front(
     mesh = fitted_mesh(file, up=up)
     uv = own.uv[own.faces]
 
-    def place_at(turn: float) -> Place | None:
-        """Place at a turn; None if the coordinates have no area there."""
+    def place_at(turn: float) -> Place:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         corners = (mesh.positions @ rotation.T)[mesh.faces]
         sides = np.ptp(corners.reshape(-1, 3), axis=0)
         normals = (mesh.normals @ rotation.T)[mesh.faces]
-        return _place(corners, normals, uv, width * sides[0], height * sides[2], aspect)
+        try:
+            return _place(corners, normals, uv, width * sides[0], height * sides[2], aspect)
+        except DiffractionError as error:
+            raise DiffractionError(f"mesh '{file}': {error}") from error
+
+    def serves(turn: float) -> bool:
+        try:
+            return not place_at(turn).cut
+        except DiffractionError:
+            return False
 
     place = place_at(turn)
-    if place is None:
-        raise DiffractionError(
-            f"mesh '{file}': its texture coordinates have no area in the label's middle; unwrap it "
-            "again, or turn another side to the front"
-        )
     if place.cut:
-        others = (turn + step for step in _TURNS)
-        whole = next((t for t in others if (p := place_at(t)) is not None and not p.cut), None)
+        whole = next((turn + step for step in _TURNS if serves(turn + step)), None)
         raise DiffractionError(
             f"mesh '{file}': a seam of its texture coordinates cuts the label; "
             + ("unwrap it again" if whole is None else f"choose turn={whole:g}")
@@ -122,10 +124,11 @@ def front(
 
 def _place(
     corners: Floats, normals: Floats, uv: Floats, wide: float, z: float, aspect: float
-) -> Place | None:
-    """Return the place of a label on the side that looks to −y; None without area of coordinates.
+) -> Place:
+    """Return the place of a label on the side that looks to −y.
 
-    Raises a DiffractionError if that side's normals point away from −y.
+    Raises a DiffractionError if that side's normals point away from −y, or its texture coordinates
+    have no area in the label's middle.
 
     corners, normals, uv : (m, 3, 3 or 2) of the triangles' corners.
     wide, z : width of the label and height of its middle, cm.
@@ -140,8 +143,7 @@ def _place(
     number, weights, normal = normal_at(z)
     if normal[1] > 0.0:
         raise DiffractionError(
-            "the mesh's normals point inwards where the label is to lie; turn them outwards, e.g. "
-            "in Blender"
+            "its normals point inwards at the label; turn them outwards, e.g. in Blender"
         )
     level = math.hypot(normal[0], normal[1])
     right, high = np.array([-normal[1], normal[0], 0.0]) / level, wide / aspect
@@ -151,7 +153,10 @@ def _place(
     flat = np.stack([edges @ right, edges @ np.cross(normal, right)])  # (2, 2), columns are edges
     steps = (uv[number, 1:] - uv[number, 0]).T
     if abs(np.linalg.det(steps)) < 1e-12:
-        return None
+        raise DiffractionError(
+            "its texture coordinates have no area in the label's middle; unwrap it again, or turn "
+            "another side to the front"
+        )
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
     elevations = np.degrees(np.arcsin(np.clip(steep, -1.0, 1.0)))

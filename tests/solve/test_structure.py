@@ -22,7 +22,6 @@ from mitsuba_diffraction.solve.profiles import lamellar, sinusoidal
 from mitsuba_diffraction.solve.resolution import places_to_test, resolution_error
 from mitsuba_diffraction.solve.stations import reversed_light
 
-RANGE = (500.0, 600.0)
 PERIOD = 0.5
 #: A slice of two materials and a gap, and a ridge across the period's end, as of a scale of Morpho.
 SLICES = (

@@ -9,16 +9,16 @@ import numpy as np
 
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.solve.block import solve_block
-from mitsuba_diffraction.solve.chandezon import Chandezon
-from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.films import structure_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.jobs import AUTO, problem_of, solver_of
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings
 from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import cells
 
+# Wavelengths of the structures, nm
 _RANGE = (500.0, 600.0)
 #: Silica and another oxide, from the substrate upwards: indices, and thicknesses in µm.
 MIRROR = (("1.46", 0.1), ("1.95", 0.075)) * 3
@@ -33,7 +33,7 @@ class Compared(NamedTuple):
     """A share of light by the package, and by another program or a closed form.
 
     case, light : in words.
-    beside : what is compared with.
+    beside : name of the other program, or of the closed form.
     """
 
     case: str
@@ -57,14 +57,13 @@ def efficiencies(
 ) -> dict[int, np.ndarray]:
     """Return efficiencies (2,) of s and p light by order, of light across the grooves.
 
-    harmonics : of coupled waves, or of Chandezon's method for slopes.
+    harmonics : of the solver that the package chooses.
     theta, wavelength : of the light, degrees and nm.
     """
     period = grating.optical_period
     cell = cells.to_cell(-np.sin(np.radians(theta)), 0.0, wavelength, period)
     w = float(cells.w_of(cell.k_continuous, wavelength, _RANGE, period))
-    kind = CoupledWaves if grating.profile.name.startswith("lamellar") else Chandezon
-    solver = kind(grating.profile, harmonics, grating.structure)
+    solver = solver_of(problem_of(grating, AUTO, harmonics))
     place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
     j = int(cell.channel)
     powers = (np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2).sum(axis=-1)
