@@ -107,7 +107,7 @@ def add_surface_source(parser: argparse.ArgumentParser) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if there is no such look.
+    Raises a DiffractionError if there is no such look, or the pigment is a picture.
     """
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
@@ -117,6 +117,10 @@ def take_source(args: argparse.Namespace) -> None:
         args.source = find_preset(args.preset).patch
     if args.material is not None and args.int_ior is not None:
         args.parser.error("argument --int-ior: not allowed with argument --material")
+    if args.pigment is not None:
+        from ..plugin.pigment import pigment_range
+
+        pigment_range(args.pigment)
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:

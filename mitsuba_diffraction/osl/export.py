@@ -267,6 +267,8 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
 
     Raises a DiffractionError if the BSDF beneath is not diffuse, or varies.
     """
+    import mitsuba as mi
+
     if described.nested is None:
         return 0.0, 0.0, 0.0
     bsdf, lam = described.nested.bsdf, np.linspace(380.0, 740.0, 36)
@@ -274,7 +276,9 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
         "the BSDF beneath the surface has no single diffuse colour, which OSL cannot show; leave "
         "it out, and link its picture to Pigment in Blender"
     )
-    if bsdf.class_name() != "SmoothDiffuse":
+    # bitmaps and patterns have a transform; other textures are looked up at three places
+    placed = any(key.endswith("to_uv") for key in mi.traverse(bsdf).keys())  # noqa: SIM118
+    if bsdf.class_name() != "SmoothDiffuse" or placed:
         raise DiffractionError(refusal)
     places = [_reflectance(bsdf, uv, lam) for uv in ((0.3, 0.3), (0.7, 0.2), (0.6, 0.9))]
     if np.ptp(places, axis=0).max() > 1e-4:  # rounding of single precision is far below

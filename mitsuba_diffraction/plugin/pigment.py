@@ -44,10 +44,16 @@ def pigment_bsdf(text: str | float) -> BSDF:
 def pigment_range(text: str | float | None) -> tuple[float, float]:
     """Return the wavelengths, nm, between which a pigment is known; without limits of a colour.
 
-    Raises a DiffractionError if the text is not a pigment.
+    Raises a DiffractionError if the text is not a pigment, or is a picture, which has a colour only
+    where there are texture coordinates.
     """
     if text in (None, "none"):
         return 0.0, math.inf
+    if Path(str(text)).suffix.lower() in (*PICTURES, *GLTF):
+        raise DiffractionError(
+            f"pigment={quoted(str(text))} varies over a mesh, and a patch alone has one pigment; "
+            "give a colour or a spectrum"
+        )
     if Path(str(text)).suffix.lower() not in SPECTRA:
         _reflectance(str(text))
         return 0.0, math.inf

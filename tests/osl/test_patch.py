@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
@@ -80,6 +81,16 @@ def test_surfaces_that_the_shader_lacks_are_refused(tmp_path, some_variant, para
         md.osl.export(bsdf, tmp_path / "out")
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_picture_of_one_colour_almost_everywhere_is_refused(tmp_path, some_variant):
+    grey = np.full((16, 16, 3), 120, np.uint8)
+    grey[0, 0] = 255
+    Image.fromarray(grey).save(tmp_path / "base.png")
+    parameters = {"energy_conserving": False, "pigment": str(tmp_path / "base.png")}
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False, **parameters))
+    with pytest.raises(DiffractionError, match="no single diffuse colour"):
+        md.osl.export(bsdf, tmp_path / "out")
 
 
 def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):

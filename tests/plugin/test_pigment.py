@@ -84,6 +84,9 @@ def test_base_colour_of_gltf_is_its_picture_times_its_factor(spectral, tmp_path)
     assert seen("flat.glb") == pytest.approx(0.2, abs=1e-3)
     with pytest.raises(DiffractionError, match="2 materials"):
         pigment_bsdf(str(files["several"]))
+    for name in ("base.png", "flat.glb"):
+        with pytest.raises(DiffractionError, match="varies over a mesh"):
+            pigment_range(str(tmp_path / name))
     files["flat"].write_bytes(b"glTF")
     with pytest.raises(DiffractionError, match="cannot be read as glTF"):
         pigment_bsdf(str(files["flat"]))
