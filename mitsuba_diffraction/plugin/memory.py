@@ -55,21 +55,11 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
     return array
 
 
-def upload_numbers(kind: Kind, values: NDArray[np.generic]) -> Buffer:
-    """Upload an array for `read`, filled up to an even count with a zero."""
-    return upload(kind, np.pad(values.ravel(), (0, values.size % 2)))
-
-
 def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:
-    """Gather a number per lane from an array of `upload_numbers`; 0 in inactive lanes."""
+    """Gather a number per lane; 0 in inactive lanes."""
     if not dr.is_jit_v(mi.Float):
         return kind(source[index] if active else 0)
-    if dr.backend_v(mi.Float) is not dr.JitBackend.LLVM:
-        return dr.gather(kind, source, index, active)
-    # of packets of two LLVM makes fewer instructions, and no branches lane by lane
-    pair = mi.ArrayXu if kind is mi.UInt32 else mi.ArrayXf
-    even, odd = dr.gather(pair, source, index >> 1, active, shape=(2, dr.width(index)))
-    return dr.select((index & 1) == 0, even, odd)
+    return dr.gather(kind, source, index, active)
 
 
 def float_of_bits(bits: Index) -> Float:
@@ -82,10 +72,12 @@ def float_of_bits(bits: Index) -> Float:
 def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True) -> list[Packet]:
     """Gather the record with this index, of so many floats, in the largest packets that fit.
 
-    Inactive lanes of JIT variants get zeros, and read no memory.
+    Inactive lanes get zeros, and read no memory.
     """
     if not dr.is_jit_v(mi.Float):
-        return [mi.ArrayXf(source[index * floats : (index + 1) * floats])]
+        return [
+            mi.ArrayXf(source[index * floats : (index + 1) * floats] if active else [0.0] * floats)
+        ]
     size = packet_size(floats)
     count = floats // size
     kind = mi.ArrayXf16 if dr.type_v(source) is dr.VarType.Float16 else mi.ArrayXf

@@ -21,7 +21,7 @@ from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, TablePoint
-from .memory import index_between, once_a_table, read, read_record, upload, upload_numbers
+from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
 from .transmission.crossing import Crossing
@@ -35,7 +35,7 @@ class PolarCoordinates:
         grid = table.grid
         self.rings, self.step, self.smallest = grid.rings, grid.step, grid.smallest
         starts = [grid.start(n) for n in range(grid.rings)]
-        self._starts = upload_numbers(mi.UInt32, np.array([*starts, grid.bins], np.uint32))
+        self._starts = upload(mi.UInt32, np.array([*starts, grid.bins], np.uint32))
 
     def ring(self, squared_radius: Float) -> Float:
         """Position among the rings; below 0 inside the smallest."""
@@ -131,11 +131,11 @@ class RGBPower:
         proposals = colour_proposals(table)
         self._rings, self._bins = proposals.rings.shape[1], table.grid.bins
         self._most = max(table.grid.counts)
-        self._ring_sums = upload_numbers(mi.Float, proposals.rings)
-        self._azimuth_sums = upload_numbers(mi.Float, proposals.azimuths)
-        self._occupied = upload_numbers(mi.Float, proposals.occupied.astype("float32"))
+        self._ring_sums = upload(mi.Float, proposals.rings)
+        self._azimuth_sums = upload(mi.Float, proposals.azimuths)
+        self._occupied = upload(mi.Float, proposals.occupied.astype("float32"))
         self._zs = len(proposals.order_0)
-        self._order_0 = upload_numbers(mi.Float, proposals.order_0)
+        self._order_0 = upload(mi.Float, proposals.order_0)
         self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma_0 / lam) ** 2 for lam in LOBES]

@@ -24,7 +24,7 @@ import numpy as np
 from ..tables.sampling import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
 from .arithmetic import clip, float_of, index_of, maximum, minimum
-from .memory import float_of_bits, index_between, once_a_table, read, upload_numbers
+from .memory import float_of_bits, index_between, once_a_table, read, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn evenly over the hemisphere.
@@ -62,9 +62,9 @@ class OrderSampler:
         self._origin, self._cell = densities.origin, densities.cell
         self._rows, self._columns = densities.columns.shape[1], densities.columns.shape[2] - 1
         self._words = densities.levels.shape[2] // 4
-        self._row_sums = upload_numbers(mi.Float, densities.rows)
-        self._column_sums = upload_numbers(mi.Float, densities.columns)
-        self._levels = upload_numbers(mi.UInt32, densities.levels.view(np.uint32))
+        self._row_sums = upload(mi.Float, densities.rows)
+        self._column_sums = upload(mi.Float, densities.columns)
+        self._levels = upload(mi.UInt32, densities.levels.view(np.uint32))
         self._lobes = densities.lobes
         # Share of a window's lobe that lies within a cell, when the lobe is at its centre
         self._within = [math.erf(0.5 * table.sigma * cell) for cell in densities.cell]
@@ -72,10 +72,8 @@ class OrderSampler:
             table.sigma / (math.sqrt(math.pi) * within) if lobe else 1.0 / cell
             for lobe, within, cell in zip(self._lobes, self._within, densities.cell, strict=True)
         ]
-        self._units = upload_numbers(
-            mi.Float, densities.units * np.float32(largest[0] * largest[1])
-        )
-        self._order_0 = upload_numbers(mi.Float, densities.order_0)
+        self._units = upload(mi.Float, densities.units * np.float32(largest[0] * largest[1]))
+        self._order_0 = upload(mi.Float, densities.order_0)
         self._last_band = len(densities.units) - 1.0
         self._bands_per_kappa = len(densities.units) / (BANDED * table.expansion.kappa_max)
         self._last = len(densities.order_0) - 1.0

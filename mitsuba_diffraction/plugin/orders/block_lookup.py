@@ -72,8 +72,7 @@ class BlockLookup(OrderLookup):
         ports = row.channels * 2
         inputs = tuple(vars(row).values()), entering, flat
         others = sum_of(ports, add, inputs, mi.Float(0.0))
-        known = sum(row.weights[1:], row.weights[0]) > 0.5  # else beyond the table's wavelengths
-        mirror = dr.select(known, maximum(1.0 - others, 0.0), 0.0)
+        mirror = dr.select(row.lit, maximum(1.0 - others, 0.0), 0.0)
         scale = dr.rcp(maximum(others, 1.0))
         return BlockRow(**vars(row), own=own, entering=entering, flat=flat, mirror=mirror,
                         scale=scale)  # fmt: skip

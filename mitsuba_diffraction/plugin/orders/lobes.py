@@ -22,7 +22,7 @@ from ...tables.orders.daylight import CHANNELS, ENDS, daylight_weights
 from ..arithmetic import clip, index_of, maximum, minimum
 from ..directions import Pair
 from ..loops import sum_of
-from ..memory import index_between, read_record, upload, upload_numbers
+from ..memory import index_between, read_record, upload
 from ..sampling import BELOW_ONE, invert
 from ..types import Colour, Context, Float, Index, Interaction, Mask, Spectrum, Vector2f
 from .block_lookup import BlockLookup
@@ -221,7 +221,7 @@ class DaylightLobes(_Window):
         self._order_0 = upload(mi.Float, np.pad(order_0, ((0, 0), (0, 3))).astype("float32"))
         self._wavelengths = len(order_0)
         self._bins = len(weights.cumulative) - 1
-        self._cumulative = upload_numbers(mi.Float, weights.cumulative.astype("float32"))
+        self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
     def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
         """See `Lobes.reflected`."""

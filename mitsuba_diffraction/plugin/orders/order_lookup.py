@@ -20,7 +20,7 @@ from ...optics.orders import (
 from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners
 from ..arithmetic import float_of, index_of, maximum
-from ..memory import index_between, once_a_table, read, read_record, upload, upload_numbers
+from ..memory import index_between, once_a_table, read, read_record, upload
 from ..types import Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
@@ -42,7 +42,8 @@ class Row:
     start : record of port 0.
     channel : j of the incident light.
     channels : number of channels of a side.
-    weights : of the eight corners of a cell; 0 beyond the table's wavelengths.
+    weights : of the eight corners of a cell.
+    lit : whether the table has light of the wavelength.
     incident, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
     """
@@ -53,6 +54,7 @@ class Row:
     channel: Index
     channels: Index
     weights: list[Float]
+    lit: Mask
     incident: Vector2f
     wavelength: Float
     face: Float
@@ -90,7 +92,7 @@ class OrderLookup:
     def __init__(self, table: OrderTable) -> None:
         records = corners(table)
         self._cells = records.cells
-        self._starts = upload_numbers(mi.UInt32, records.starts)
+        self._starts = upload(mi.UInt32, records.starts)
         self._values = upload(mi.Float16, records.values)
         self._period = 1e3 * table.optical_period
         self._last = float(table.last_band)
@@ -124,7 +126,7 @@ class OrderLookup:
         kind = index_of(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
         channels = index_of(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
         lit = (vacuum >= self._reach[0]) & (vacuum <= self._reach[1])
-        cell, weights = mi.UInt32(0), [dr.select(lit, mi.Float(1.0), 0.0)]
+        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
         for coordinate, count in zip(places, self._cells, strict=True):
             position = coordinate * float(count)
             lower = index_between(dr.floor(position), 0.0, count - 1.0)
@@ -140,7 +142,7 @@ class OrderLookup:
         face = mi.Float(0.0)
         if self.coated:
             face = 1.0 - self._through(cos_i)
-        light = index_of(channel), channels, weights, incident, vacuum, face
+        light = index_of(channel), channels, weights, lit, incident, vacuum, face
         return Row(kind, cell, start, *light)
 
     @staticmethod
@@ -205,11 +207,12 @@ class OrderLookup:
         return Drawn(*at(port - 1), reached > target)
 
     def _between(self, row: Row, q: Index, part: int, active: Mask) -> Float:
-        """Interpolate a channel between the corners of a cell.
+        """Interpolate a channel between the corners of a cell; 0 where the table has no light.
 
         part : of a record, see `tables.orders.grids.Corners`.
         """
-        corners = read_record(self._values, (row.start + q) * self._parts + part, 8, active)
+        record = (row.start + q) * self._parts + part
+        corners = read_record(self._values, record, 8, active & row.lit)
         value = row.weights[0] * mi.Float(corners[0])
         for weight, corner in zip(row.weights[1:], corners[1:], strict=True):
             value = dr.fma(weight, mi.Float(corner), value)

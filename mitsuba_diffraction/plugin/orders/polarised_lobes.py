@@ -26,7 +26,7 @@ from ...tables.orders.polarised import ODD
 from ..arithmetic import maximum, minimum
 from ..boundary import mueller, turn, turned
 from ..directions import Pair
-from ..memory import read, read_record, upload, upload_numbers
+from ..memory import read, read_record, upload
 from ..types import Context, Float, Mask, Spectrum, Vector3f
 from .lobes import Lit, SpectralLobes
 from .order_lookup import OrderLookup, Row
@@ -53,12 +53,12 @@ class PolarisedLookup(OrderLookup):
     def __init__(self, table: OrderTable) -> None:
         super().__init__(table)
         records = matrices(table, self._cells)
-        self._matrix_starts = upload_numbers(mi.UInt32, records.starts)
+        self._matrix_starts = upload(mi.UInt32, records.starts)
         self._matrices = upload(mi.Float16, records.values)
 
     def wave(self, row: Row, order: Float, y: Float, active: Mask) -> Wave:
         """Return the light of an order; y : direction cosine of the light along the grooves."""
-        q, active = self.port(row, order, active)
+        q, active = self.port(row, order, active & row.lit)
         channels = row.channels
         first = read(mi.UInt32, self._matrix_starts, row.kind) + row.channel * channels + q
         n_rho, n_w = self._cells.rho, self._cells.w
