@@ -6,9 +6,11 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 OrderTable         solved efficiencies of a grating's orders
+CrossedTable       those of a crossed grating, imported
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
+solve_crossed      those of a crossed grating
 read_orders        orders from a file of efficiencies
 profiles           one period of a grating's grooves
 tradeoff           accuracy against speed and memory, setting by setting
@@ -52,7 +54,7 @@ from .heights import HeightField, gratings  # noqa: E402
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .plugin.registration import register_in_all  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
-from .tables.orders import OrderTable  # noqa: E402
+from .tables.orders import CrossedTable, OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster, osl
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
     from .solve import profiles
+    from .solve.crossed import solve_crossed
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
     from .thesis import period_fit
@@ -70,6 +73,7 @@ register_in_all()
 
 __version__ = version(__name__)
 __all__ = [
+    "CrossedTable",
     "DiffractionError",
     "DiffractionTable",
     "DiffractionWarning",
@@ -89,6 +93,7 @@ __all__ = [
     "read_orders",
     "reference",
     "shader_comparison",
+    "solve_crossed",
     "solve_orders",
     "spectrum",
     "tradeoff",
@@ -112,6 +117,7 @@ _FUNCTIONS = {
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
     "read_orders": "solve.measured",
+    "solve_crossed": "solve.crossed",
     "solve_orders": "solve.orders",
     "spectrum": "analysis.spectra",
 }

@@ -20,7 +20,7 @@ from ..heights.recipes import Recipe
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.build.build import build_with
-from ..tables.orders import OrderTable
+from ..tables.orders import CrossedTable, OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
@@ -63,7 +63,7 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
         return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
-def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
+def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: Any) -> Any:
     """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
@@ -76,7 +76,7 @@ def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
     from ..plugin.orders.orders_block import diffraction_orders
 
     with tempfile.TemporaryDirectory() as folder:
-        solved = isinstance(table, OrderTable)
+        solved = isinstance(table, OrderTable | CrossedTable)
         file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
         props = mi.Properties("diffraction_orders" if solved else "diffraction")

@@ -389,7 +389,7 @@ def _surface(bsdf: Any) -> str:
     described: Surface = bsdf.describe()
     turn, scale = described.orientation.number, described.height_scale.number
     turned = [f"turned by {turn:g}°"] if turn != 0.0 else []
-    if described.orders is not None:
+    if described.solved:
         width = f"coherence width {described.coherence_width:g} µm"
         return "; ".join([described.text, width, *turned])
     model = f"{described.model}, second order" if described.second_order else described.model

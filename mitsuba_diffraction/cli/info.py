@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..tables.orders import OrderTable
+    from ..tables.orders import load_any_orders
 
     readable_file(file)
     kind = kind_of(file)
@@ -96,7 +96,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         return _table(file)
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
-        return {"kind": "table of orders", **OrderTable.load(file).summary()}
+        return {"kind": "table of orders", **load_any_orders(file).summary()}
     return _heights(file, args)
 
 

@@ -29,12 +29,12 @@ def measured_spectra(
     args: argparse.Namespace, file: Path, geometry: Any, lam: Any, bar: Bar
 ) -> list[Spectra]:
     """Measure the spectra of one file, or of its crops."""
-    from ..tables.orders import OrderTable
+    from ..tables.orders import load_any_orders
     from ..tables.store import loaded_table
 
     kind = kind_of(file)
     if kind is FileKind.ORDERS:
-        return [_of_table(args, OrderTable.load(file), file, geometry, lam, bar)]
+        return [_of_table(args, load_any_orders(file), file, geometry, lam, bar)]
     if kind is FileKind.TABLE:
         return [_of_table(args, loaded_table(file), file, geometry, lam, bar)]
     how = _treatment(args, file).options

@@ -62,11 +62,11 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from ..solve.listing import list_orders
-    from ..tables.orders import OrderTable
+    from ..tables.orders import load_any_orders
 
     output = args.output or Path(f"{args.table.stem}.csv")
     check_outputs([output], [args.table], "list of orders")
-    table = OrderTable.load(args.table)
+    table = load_any_orders(args.table)
     low, high = table.wavelengths
     steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)
     wavelengths = args.wavelength or np.linspace(low, high, steps + 1)
@@ -76,8 +76,7 @@ def run(args: argparse.Namespace) -> int:
     light = "s and p" if args.polarised else "unpolarised light"
     print(
         f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
-        f"{len(np.unique(rows[:, 1:3], axis=0))} directions, orders {rows[:, 3].min():.0f} to "
-        f"{rows[:, 3].max():.0f}, {light}"
+        f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"
     )
     save_report(args, {"file": str(output), "columns": listing.columns, "lines": rows.tolist()})
     return 0

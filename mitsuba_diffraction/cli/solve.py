@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..solve.films import Layers
     from ..solve.orders import Estimate
     from ..solve.recipes import SolvedRecipe
-    from ..tables.orders import OrderTable
+    from ..tables.orders import CrossedTable, OrderTable
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
@@ -51,6 +51,16 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_output(parser, "the table; default: SOURCE's name with .nc", ".nc")
     group = parser.add_argument_group("the grating")
     group.add_argument("--period", metavar="D", type=number_between(0.01, 1000), help="µm")
+    group.add_argument(
+        "--crossed", action="store_true", default=None,
+        help="SOURCE is one period of heights in x and y: an array (.npy) in µm, or an image with "
+        "--depth from black to white; needs --period; reflection in air, by ikarus-rcwa (extra "
+        "crossed), for dielectrics",
+    )  # fmt: skip
+    group.add_argument(
+        "--period-y", metavar="D", type=number_between(0.01, 1000),
+        help="µm, of a crossed grating, along y; default: --period",
+    )  # fmt: skip
     group.add_argument(
         "--depth", metavar="H", type=number_between(0, 100), help="µm, of a generator"
     )
@@ -130,7 +140,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "--import", dest="imports", action="store_true",
         help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
         "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
-        "incidence or more; needs --period",
+        "incidence or more; order_x, order_y for order make a crossed grating; needs --period",
     )  # fmt: skip
     parser.add_argument(
         "--jobs", metavar="N", type=whole_number(1),
@@ -149,7 +159,13 @@ def run(args: argparse.Namespace) -> int:
 
         _check_import(args)
         check_outputs([output], [source], "table")
-        table = read_orders(source, args.period, superstrate=args.superstrate or 1.0)
+        period = (args.period, args.period_y) if args.period_y else args.period
+        table: OrderTable | CrossedTable = read_orders(
+            source, period, superstrate=args.superstrate or 1.0
+        )
+    elif args.crossed:
+        check_outputs([output], [source], "table")
+        table = _solve_crossed(source, args)
     else:
         recipe = recipe_of(args)
         output = recipe.output
@@ -176,12 +192,56 @@ def _check_import(args: argparse.Namespace) -> None:
             args.parser.error(f"argument --{option}: is for a solution; --import has efficiencies")
 
 
+#: Options that crossed gratings do not have.
+_GROOVES_ONLY = (
+    "duty", "direction", "superstrate", "layers", "beneath", "substrate", "thin", "block",
+    "tolerance", "accept", "solver", "polarised", "theta", "phi", "imports",
+)  # fmt: skip
+
+
+def _solve_crossed(source: Path, args: argparse.Namespace) -> CrossedTable:
+    """Solve a crossed grating."""
+    from ..heights.read import LoadOptions, read_heights
+    from ..solve.crossed import solve_crossed
+
+    for name in _GROOVES_ONLY:
+        if getattr(args, name):
+            option = {"layers": "layer", "imports": "import"}.get(name, name)
+            args.parser.error(f"argument --{option}: not allowed with --crossed")
+    if args.period is None:
+        args.parser.error("argument --crossed: needs --period, µm")
+    cell = read_heights(
+        source,
+        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="none"),
+    )
+    rows, columns = cell.heights.shape
+    sizes = args.period / columns, (args.period_y or args.period) / rows
+    if abs(sizes[0] / sizes[1] - 1.0) > 1e-6:
+        args.parser.error(
+            f"argument --period-y: '{source}' has {columns} x {rows} pixels, which are not square "
+            "over these periods"
+        )
+    limits = args.wavelength_range or (380.0, 780.0)
+    with _executor(args) as (executor, _), Bar(args, " directions") as bar:
+        return solve_crossed(
+            replace(cell, pixel_size=sizes[0]),
+            1.5 if args.material is None else args.material,
+            wavelengths=limits,
+            step=args.step or 20.0,
+            harmonics=args.resolution or 0,
+            executor=executor,
+            progress=bar,
+        )
+
+
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     """Return the problem of a recipe and of the options that override it."""
     from ..solve.orders import Settings
     from ..solve.recipes import SolvedRecipe, profile_of
 
     source = Path(args.source)
+    if args.period_y is not None:
+        args.parser.error("argument --period-y: profiles are one-dimensional; add --crossed")
     shape = {
         name: value
         for name in ("period", "depth", "duty", "direction")
@@ -317,7 +377,7 @@ def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
         yield pool, jobs
 
 
-def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
+def _report(table: OrderTable | CrossedTable, output: Path) -> Iterator[tuple[str, str]]:
     """Yield lines on the table, each with its label."""
     facts: dict[str, Any] = dict(table.header)
     low, high = table.wavelengths
@@ -329,7 +389,7 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
     if facts.get("solver_error") is not None:
         yield "", f"its next resolution changes {facts['solver_error']:.2g} of the light"
     size = output.stat().st_size / 1e6
-    yield "table", f"{len(table.bands)} bands, {size:.2g} MB on disk"
+    yield "table", f"{table.layout}, {size:.2g} MB on disk"
     if "error_mean" in facts:
         yield (
             "error",

@@ -85,6 +85,17 @@ def order_direction(x: Number, y: Number, order: Number, stride: Number) -> Orde
 
 
 @formula
+def crossed_square(x: Number, y: Number, shift_x: Number, shift_y: Number) -> Number:
+    """Return the squared cosine of an order of a crossed grating, at most 0 where it is evanescent.
+
+    x, y : tangential part of the mirror direction of the incident light.
+    shift_x, shift_y : m_x λ/d_x and m_y λ/d_y.
+    """
+    out_x, out_y = x + shift_x, y + shift_y
+    return 1.0 - out_x * out_x - out_y * out_y
+
+
+@formula
 def port_power(z: Number, other: Number) -> Number:
     """Return G = 4z/|z + z'|², the factor of a channel in orders of an interface's light.
 

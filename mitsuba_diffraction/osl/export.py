@@ -57,6 +57,7 @@ OSL = Consumer(
     ),
     "export the surface without, or render it with Mitsuba",
     remedies={
+        Feature.CROSSED: "render it with Mitsuba",
         Feature.LIMITED: "export a table of all orders, or the height field",
         Feature.MIX: "export its surfaces one by one, and mix their shaders in Blender",
         Feature.VARYING_ORIENTATION: "export a number, and give the texture to the script in "

@@ -19,7 +19,7 @@ from ..heights.field import HeightField
 from ..optics.geometry import sigma_of
 from ..optics.slope_ratios import SlopeRatios
 from ..tables.directional import DirectionalTable
-from ..tables.orders import OrderTable
+from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 from .types import BSDF, Interaction, Texture
 
@@ -29,6 +29,7 @@ class Feature(Enum):
 
     HEIGHTS = "table", "a table of heights"
     ORDERS = "table", "solved orders"
+    CROSSED = "table", "orders of a crossed grating"
     MIX = "table", "a mix of surfaces (diffraction_mix)"
     VARYING_WEIGHTS = "", "weights that vary"
     LIMITED = "", "a table that lacks orders (frequency_limit)"
@@ -167,7 +168,7 @@ class Surface:
     stacked : whether a stack of layers lies on the structure.
     """
 
-    table: DiffractionTable | OrderTable
+    table: DiffractionTable | OrderTable | CrossedTable
     text: str
     coherence_width: float
     orientation: Quantity
@@ -196,8 +197,13 @@ class Surface:
 
     @property
     def orders(self) -> OrderTable | None:
-        """Table of solved orders, or None."""
+        """Table of solved orders of grooves, or None."""
         return self.table if isinstance(self.table, OrderTable) else None
+
+    @property
+    def solved(self) -> bool:
+        """Whether the surface has solved orders, of grooves or of a crossed grating."""
+        return not isinstance(self.table, DiffractionTable)
 
     @property
     def sigma(self) -> float:
@@ -207,7 +213,7 @@ class Surface:
     @property
     def shortest_wavelength(self) -> float:
         """Shortest wavelength that the table serves, nm; 0 for solved orders."""
-        return 0.0 if self.orders else self.patch.wavelength_range[0]
+        return 0.0 if self.solved else self.patch.wavelength_range[0]
 
     def features(self) -> set[Feature]:
         """Return all features that the surface has."""
@@ -216,8 +222,9 @@ class Surface:
         scales = self.energy is not None and not tall.texture
         present = {
             Feature.ORDERS: self.orders is not None,
-            Feature.HEIGHTS: self.orders is None,
-            Feature.LIMITED: self.orders is None and self.patch.limited,
+            Feature.CROSSED: isinstance(self.table, CrossedTable),
+            Feature.HEIGHTS: not self.solved,
+            Feature.LIMITED: not self.solved and self.patch.limited,
             Feature.TRANSMISSION: self.transmits,
             Feature.COAT: self.coat is not None,
             Feature.FILM: self.film is not None,

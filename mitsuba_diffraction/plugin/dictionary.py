@@ -10,7 +10,7 @@ import mitsuba as mi
 from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
-from ..tables.orders import OrderTable
+from ..tables.orders import CrossedTable, OrderTable
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -29,13 +29,13 @@ class HeightData(mi.Object):
 class OrderData(mi.Object):
     """Table of orders in an object that a dictionary of Mitsuba's can hold."""
 
-    def __init__(self, table: OrderTable) -> None:
+    def __init__(self, table: OrderTable | CrossedTable) -> None:
         super().__init__()
         self.table = table
 
 
 def bsdf_dict(
-    field: HeightField | OrderTable | str | os.PathLike[str],
+    field: HeightField | OrderTable | CrossedTable | str | os.PathLike[str],
     plugin: str = "diffraction",
     **parameters: Any,
 ) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def bsdf_dict(
     """
     check_choice("bsdf_dict: plugin", plugin, PLUGINS)
     arguments = {name: value for name, value in parameters.items() if value is not None}
-    if isinstance(field, OrderTable):
+    if isinstance(field, OrderTable | CrossedTable):
         return {"type": ORDERS, "data": OrderData(field), **arguments}
     if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
         return {"type": ORDERS, "table": os.fspath(field), **arguments}

@@ -9,11 +9,14 @@ the variables R_s, R_p [, T_s, T_p] over the dimensions wavelength, theta, phi a
 order, with a coordinate variable each; `units` of coordinates are nm (default), um or m, and
 degrees (default) or radians. The column or dimension of φ may be missing: φ = 0.
 
+The CSV of a crossed grating has the columns order_x and order_y in place of order.
+
 The light comes from ωi = (sinθ cosφ, sinθ sinφ, cosθ), with x along the grating vector and y along
-the grooves, θ and φ within the superstrate, and order m leaves with x = mλ/d − sinθ cosφ.
-Wavelengths (in vacuum), θ and φ form a regular grid, and mirrored φ (φ and −φ) need not be listed.
-θ below 0 is light from the other side: φ + 180°. R and T are reflected and transmitted shares of
-the incident light, for light of s and of p polarisation. T is transmitted by a thin sheet.
+the grooves, θ and φ within the superstrate, and order m leaves with x = mλ/d − sinθ cosφ; order
+(m_x, m_y) of a crossed grating with y = m_y λ/d_y − sinθ sinφ as well. Wavelengths (in vacuum), θ
+and φ form a regular grid, and mirrored φ (φ and −φ) of grooves need not be listed. θ below 0 is
+light from the other side: φ + 180°. R and T are reflected and transmitted shares of the incident
+light, for light of s and of p polarisation. T is transmitted by a thin sheet.
 """
 
 from __future__ import annotations
@@ -37,6 +40,8 @@ from .stations import Real
 AXES = ("wavelength", "theta", "phi", "order")
 REFLECTED, TRANSMITTED = ("R_s", "R_p"), ("T_s", "T_p")
 CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
+#: Columns of a crossed grating, instead of the last one.
+PAIR = ("order_x", "order_y")
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
 #: Bytes of a CSV at most: two million lines. NetCDF files may be larger.
@@ -56,7 +61,7 @@ class Efficiencies(NamedTuple):
     Attributes
     ----------
     wavelengths, theta, phi : (a,), (b,), (c,) ascending; nm in vacuum, degrees.
-    orders : (m,) whole numbers, ascending.
+    orders : (m,) whole numbers, ascending; (m, 2) of a crossed grating.
     values : (a, b, c, m, 2) reflected, or (a, b, c, m, 4) reflected and transmitted, of light of s
         and of p polarisation; NaN where the file has none.
     """
@@ -115,7 +120,9 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
     reader = csv.reader(text.splitlines(), delimiter=delimiter)
     names = [name.strip() for name in first.split(delimiter)]
     kinds = _kinds(names, shown, "column")
-    axes = [name for name in CSV_AXES if name != "phi_deg" or name in names]
+    crossed = not set(PAIR).isdisjoint(names)
+    axes = [name for name in CSV_AXES[:3] if name != "phi_deg" or name in names]
+    axes += PAIR if crossed else CSV_AXES[3:]
     if missing := [name for name in axes if name not in names]:
         raise DiffractionError(
             f"{shown} has no column {missing[0]}; the first line must name "
@@ -141,11 +148,20 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
     table = np.array(rows)
     if "phi_deg" not in axes:
         table = np.insert(table, 2, 0.0, axis=1)
-    return _regular(table[:, :4], table[:, 4:], shown)
+    if not crossed:
+        return _regular(table[:, :4], table[:, 4:], shown)
+    _check_orders(table[:, 3:5].ravel(), shown)
+    pairs, numbers = np.unique(table[:, 3:5].astype(np.int64), axis=0, return_inverse=True)
+    return _regular(np.column_stack([table[:, :3], numbers]), table[:, 5:], shown, pairs)
 
 
-def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
-    """Put lines on the grid that they form: (n, 4) coordinates, (n, 2) or (n, 4) efficiencies."""
+def _regular(
+    lights: Real, powers: Real, shown: str, pairs: NDArray[np.int64] | None = None
+) -> Efficiencies:
+    """Put lines on the grid that they form: (n, 4) coordinates, (n, 2) or (n, 4) efficiencies.
+
+    pairs : orders of a crossed grating, if the last coordinate numbers them.
+    """
     _check_axes(list(lights.T), shown)
     axes, places = zip(
         *(np.unique(column, return_inverse=True) for column in lights.T), strict=True
@@ -166,7 +182,8 @@ def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
     flat = values.reshape(-1, powers.shape[1])
     place = light * shape[3] + places[3]
     numbers, counts = np.unique(place, return_counts=True)
-    grid = Efficiencies(axes[0], axes[1], axes[2], axes[3].astype(np.int64), values)
+    orders = axes[3].astype(np.int64) if pairs is None else pairs
+    grid = Efficiencies(axes[0], axes[1], axes[2], orders, values)
     if (counts > 1).any():
         twice = int(numbers[counts > 1][0])
         raise DiffractionError(
@@ -282,6 +299,10 @@ def _check_axes(axes: Sequence[Real], shown: str) -> None:
     """Check the ranges of wavelengths (nm), angles (degrees) and orders, as in `AXES`."""
     wavelengths, theta, phi, orders = axes
     check_light(wavelengths, theta, phi, shown)
+    _check_orders(orders, shown)
+
+
+def _check_orders(orders: Real, shown: str) -> None:
     whole = (orders == np.round(orders)) & (np.abs(orders) <= 2 * MOST_BANDS)
     _check_all("order", orders, whole, f"a whole number of at most {2 * MOST_BANDS}", shown)
 

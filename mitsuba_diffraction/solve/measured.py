@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
-from scipy.spatial import QhullError
 
 from ..errors import DiffractionError, warn
-from ..tables.orders import Band, OrderTable, cells
+from ..tables.orders import Band, CrossedTable, OrderTable, cells
 from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
 from .efficiencies import ROUNDING, Efficiencies, read_efficiencies
+from .measured_crossed import crossed_table, warn_of_gaps
+from .scattered import interpolated
 from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
@@ -63,9 +62,15 @@ class _Samples(NamedTuple):
 
 
 def read_orders(
-    path: str | os.PathLike[str], period: float, *, superstrate: float = 1.0
-) -> OrderTable:
+    path: str | os.PathLike[str],
+    period: float | tuple[float, float],
+    *,
+    superstrate: float = 1.0,
+) -> OrderTable | CrossedTable:
     """Return the table of orders of a file of efficiencies; see `solve.efficiencies`.
+
+    A file with order_x and order_y makes the table of a crossed grating, of reflected light without
+    polarisation (`solve.measured_crossed`).
 
     Where the file has light in the plane across the grooves alone (φ = 0), conical light gets the
     efficiencies of the in-plane light with the same orders. That is exact for perfect conductors.
@@ -82,13 +87,29 @@ def read_orders(
     Parameters
     ----------
     path : long CSV, or NetCDF.
-    period : µm.
-    superstrate : index of the medium above, to which θ and φ belong.
+    period : µm; of a crossed grating along x and along y, or one number for both.
+    superstrate : index of the medium above, to which θ and φ belong; 1 of a crossed grating.
     """
     header: dict[str, Any] = {
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
     }  # fmt: skip
-    return table_of(read_efficiencies(path), period, superstrate, repr(os.fspath(path)), header)
+    grid, shown = read_efficiencies(path), repr(os.fspath(path))
+    if grid.orders.ndim == 2:
+        if superstrate != 1.0:
+            raise DiffractionError(
+                f"superstrate={superstrate:g}: crossed gratings lie in air; leave it out, and give "
+                "the angles in air"
+            )
+        periods = period if isinstance(period, tuple) else (period, period)
+        crossed = crossed_table(grid, periods, shown, header)
+        warn_of_gaps(crossed, grid, shown)
+        return crossed
+    if isinstance(period, tuple):
+        raise DiffractionError(
+            f"period={period[0]:g},{period[1]:g} µm: {shown} has the orders of grooves, with one "
+            "period; crossed gratings have order_x and order_y"
+        )
+    return table_of(grid, period, superstrate, shown, header)
 
 
 def table_of(
@@ -273,7 +294,7 @@ def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.fl
             values[:, :, :, j, j] = lowest.sum(axis=1).mean(axis=0)
         elif len(here) and several:
             known = np.stack([samples.of_order(j - q)[here] for q in range(size)], axis=1)
-            values[:, :, :, j] = _interpolated(coordinates[here], known, places)
+            values[:, :, :, j] = interpolated(coordinates[here], known, places)
         else:
             big_k = k + cells.sine_squared(grid[1])
             s = cells.from_cell(k, kind, j, grid[0], grid[1], 2e3 / big_k, 1.0).x  # at c = 1
@@ -335,13 +356,3 @@ def _through_samples(k: int, counts: Counts, samples: _Samples, values: Real) ->
     kinds = changed.reshape(*changed.shape[:5], -1, 2)  # reflected, and transmitted; s and p
     total = kinds.sum(axis=(4, 5), keepdims=True)
     return np.asarray((kinds / np.maximum(total, 1.0)).reshape(changed.shape))
-
-
-def _interpolated(points: Real, values: Real, places: Real) -> Real:
-    """Interpolate values (n, …) at points (n, axes) linearly; use the nearest value outside."""
-    flat = values.reshape(len(values), -1)
-    result = NearestNDInterpolator(points, flat)(places)
-    with contextlib.suppress(QhullError):  # too few points, or all on a line
-        linear = LinearNDInterpolator(points, flat)(places)
-        result = np.where(np.isnan(linear), result, linear)
-    return np.asarray(result).reshape(*places.shape[:-1], *values.shape[1:])

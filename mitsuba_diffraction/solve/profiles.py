@@ -176,8 +176,8 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     """
     if (kind := kind_of(path)) in (FileKind.IMAGE, FileKind.EXR, FileKind.NPY, FileKind.JPEG):
         raise DiffractionError(
-            f"'{path}' ({kind}): expected one period of a line, CSV of x, z in µm; heights over "
-            "an area (crossed gratings) are not solved: render them with the BSDF 'diffraction'"
+            f"'{path}' ({kind}): profiles are one-dimensional, one period of a line, CSV of x, z "
+            "in µm; crossed gratings: one period of heights, by solve_crossed"
         )
     rows: list[list[float]] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):

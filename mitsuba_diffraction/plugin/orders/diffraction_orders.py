@@ -62,7 +62,7 @@ import mitsuba as mi
 
 from ...errors import warn
 from ...optics.geometry import sigma_of
-from ...tables.orders import OrderTable
+from ...tables.orders import CrossedTable, OrderTable
 from ..description import Nested, Surface
 from ..directions import Pair, PatchFrame, Site
 from ..nesting import NestingBSDF
@@ -78,9 +78,10 @@ from ..types import (
     Vector2f,
     Vector3f,
 )
+from .crossed_lobes import CrossedDaylightLobes, CrossedWindow
 from .grating_parameters import Parameters
-from .lobes import DaylightLobes, Lobes, SpectralLobes
-from .polarised_lobes import PolarisedLobes
+from .lobes import DaylightLobes, Lobes, SpectralLobes, Window
+from .polarised_lobes import PolarisedLobes, PolarisedLookup
 
 
 class DiffractionOrders(NestingBSDF):
@@ -195,10 +196,17 @@ class DiffractionOrders(NestingBSDF):
 
 def _lobes_of(read: Parameters) -> Lobes:
     """Return the lobes of the current variant."""
+    table, width = read.table, read.coherence_width
+    if isinstance(table, CrossedTable):
+        crossed = CrossedWindow(table, width)
+        if mi.is_rgb:
+            return CrossedDaylightLobes(crossed)
+        return SpectralLobes(crossed, read.wavelength)
     if mi.is_rgb:
-        return DaylightLobes(read.table, read.coherence_width)
-    kind = PolarisedLobes if mi.is_polarized and read.table.polarised else SpectralLobes
-    return kind(read.table, read.coherence_width, read.wavelength)
+        return DaylightLobes(Window(table, width))
+    if mi.is_polarized and table.polarised:
+        return PolarisedLobes(Window(table, width, PolarisedLookup), read.wavelength)
+    return SpectralLobes(Window(table, width), read.wavelength)
 
 
 #: Visible wavelengths, nm, that a table should reach: eyes see less than 1 % of daylight beyond.
@@ -206,7 +214,7 @@ _SEEN = (410.0, 690.0)
 _warned: list[bool] = []
 
 
-def _warn_of_wavelengths(table: OrderTable) -> None:
+def _warn_of_wavelengths(table: OrderTable | CrossedTable) -> None:
     """Warn of visible light that a table does not reflect."""
     least, most = table.reach
     if not mi.is_monochromatic and (least > _SEEN[0] or most < _SEEN[1]):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...errors import DiffractionError
 from ...heights.lengths import is_auto
 from ...settings import USUAL_WIDTH, checked
-from ...tables.orders import OrderTable
+from ...tables.orders import CrossedTable, OrderTable, load_any_orders
 from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
 from ..properties import class_of
@@ -19,7 +19,7 @@ from ..types import BSDF, Properties
 #: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
 LEAST_PERIODS = 2.0
 
-_tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
+_tables: weakref.WeakValueDictionary[str, OrderTable | CrossedTable] = weakref.WeakValueDictionary()
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Parameters:
     nested : the BSDF beneath, or None.
     """
 
-    table: OrderTable
+    table: OrderTable | CrossedTable
     coherence_width: float
     orientation: Orientation
     wavelength: float
@@ -64,7 +64,7 @@ def read_parameters(props: Properties) -> Parameters:
     )
 
 
-def _table(props: Properties) -> OrderTable:
+def _table(props: Properties) -> OrderTable | CrossedTable:
     if ("table" in props) == ("data" in props):
         raise DiffractionError(
             f"{ORDERS} takes one of table, a file of orders, and data, an "
@@ -78,10 +78,10 @@ def _table(props: Properties) -> OrderTable:
     name = props.get("table")
     if not isinstance(name, str):
         raise DiffractionError(f"table={name!r} must be the name of a file")
-    return loaded_once(resolved_path(name, "table"), OrderTable.load, _tables)
+    return loaded_once(resolved_path(name, "table"), load_any_orders, _tables)
 
 
-def _coherence_width(props: Properties, table: OrderTable) -> float:
+def _coherence_width(props: Properties, table: OrderTable | CrossedTable) -> float:
     value = props.get("coherence_width", "auto")
     width = USUAL_WIDTH if is_auto(value) else checked("coherence_width", value)
     if width < LEAST_PERIODS * table.period:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -32,7 +32,7 @@ from .order_lookup import OrderLookup, Row, order_lookup
 Below = Mask | None
 
 #: Squared distance from a lobe's centre, in units of its width, beyond which it is 0.
-_REACH = 18.0
+REACH = 18.0
 #: Sum of efficiencies below which nothing is drawn, against division by 0.
 _MIN_SUM = 1e-12
 
@@ -64,7 +64,7 @@ class Lit(NamedTuple):
     row: Row
     value: Float
     peak: Float
-    terms: list[tuple[Float, Float, Float]]
+    terms: list[tuple[Any, Float, Float]]
 
 
 @dataclass
@@ -107,52 +107,72 @@ class Lobes(Protocol):
         """Return the sum of the orders' efficiencies, of all sides."""
 
 
-class _Window:
-    """Lobe of an order, in units of orders.
+class Window:
+    """Lobe of an order under the coherence window, in units of orders.
+
+    kind : of the look-up.
 
     Attributes
     ----------
     sigma : standard deviation σ of the amplitude window, µm.
     period : µm.
+    lookup : of the table.
     """
 
-    lookup_kind: type[OrderLookup] = OrderLookup
-
-    def __init__(self, table: OrderTable, coherence_width: float) -> None:
+    def __init__(
+        self, table: OrderTable, coherence_width: float, kind: type[OrderLookup] = OrderLookup
+    ) -> None:
         self.sigma, self.period = sigma_of(coherence_width), table.period
-        self.lookup = order_lookup(table, BlockLookup if table.block else self.lookup_kind)
+        self.lookup: Any = order_lookup(table, BlockLookup if table.block else kind)
         self._sharpness = (2.0 * math.pi * self.sigma / self.period) ** 2
         # where an order's neighbour adds to its lobe
-        self._overlaps = 0.25 * self._sharpness < _REACH
+        self._overlaps = 0.25 * self._sharpness < REACH
 
-    def orders(self, position: Float) -> list[Float]:
-        """Return the orders whose lobes reach a position, in units of orders along x."""
-        nearest = dr.round(position)
-        if not self._overlaps:
-            return [nearest]
-        return [nearest, nearest + dr.select(position < nearest, -1.0, 1.0)]
+    def position(self, uv: Vector2f, wavelength: Float) -> Vector2f:
+        """Return the tangential part of ωi + ωo in units of orders."""
+        return uv * (1e3 * self.period * dr.rcp(wavelength))
 
-    def lobe(self, position: Vector2f, order: Float) -> Float:
+    def orders(self, position: Vector2f) -> list[Any]:
+        """Return the orders whose lobes reach a position."""
+        return nearest(position.x, self._overlaps)
+
+    def lobe(self, position: Vector2f, order: Any) -> Float:
         """Return exp(−σ²|q − q_m|²), of a position in units of orders."""
         return order_lobe(position.x - order, position.y, self._sharpness)
 
-    def drawn(self, row: Row, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
+    def mirrored(self) -> Any:
+        """Return order 0."""
+        return mi.Float(0.0)
+
+    def centre(self, order: Any, wavelength: Float) -> Vector2f:
+        """Return the tangential part of ωi + ωo at an order's centre."""
+        return mi.Vector2f(order * wavelength * (1e-3 / self.period), 0.0)
+
+    def drawn(self, row: Any, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
         """Draw an order of a row, and a direction in its lobe."""
         drawn = self.lookup.draw(row, sample1)
         wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
         spread = mi.warp.square_to_std_normal(minimum(sample2, BELOW_ONE)) * wide
-        centre = mi.Vector2f(drawn.order * wavelength * (1e-3 / self.period), 0.0)
+        centre = self.centre(drawn.order, wavelength)
         return Draw(centre + mi.Vector2f(spread), drawn.below, drawn.valid)
 
 
-class SpectralLobes(_Window):
+def nearest(position: Float, overlap: bool) -> list[Float]:
+    """Return the nearest order along an axis, and the next one where lobes overlap."""
+    order = dr.round(position)
+    if not overlap:
+        return [order]
+    return [order, order + dr.select(position < order, -1.0, 1.0)]
+
+
+class SpectralLobes(Window):
     """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
 
     wavelength : nm, of mono variants.
     """
 
-    def __init__(self, table: OrderTable, coherence_width: float, wavelength: float) -> None:
-        super().__init__(table, coherence_width)
+    def __init__(self, window: Window, wavelength: float) -> None:
+        self._window, self.lookup = window, window.lookup
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -163,17 +183,17 @@ class SpectralLobes(_Window):
         wavelengths = self._wavelengths(si)
         for wavelength in wavelengths:
             row = self.lookup.row(pair.incident, pair.cos_i, wavelength)
-            position = pair.uv * (1e3 * self.period * dr.rcp(wavelength))
+            position = self._window.position(pair.uv, wavelength)
             light, chance, near = mi.Float(0.0), mi.Float(0.0), mi.Mask(False)
             terms = []
-            for order in self.orders(position.x):
-                lobe = self.lobe(position, order)
+            for order in self._window.orders(position):
+                lobe = self._window.lobe(position, order)
                 share = self.lookup.order(row, order, lobe > 0.0, below)
                 near |= lobe > 0.0
                 light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
                 terms.append((order, lobe, share.efficiency))
-            peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self.sigma) * pair.cos_o
+            peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self._window.sigma) * pair.cos_o
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(maximum(self.lookup.total(row, near), _MIN_SUM))
         mean = density * (1.0 / len(wavelengths))
@@ -195,7 +215,7 @@ class SpectralLobes(_Window):
         for n, other in enumerate(wavelengths[1:], 1):
             wavelength = dr.select(number == float(n), other, wavelength)
         row = self.lookup.row(incident, cos_i, wavelength)
-        return self.drawn(row, wavelength, sample1 * count - number, sample2)
+        return self._window.drawn(row, wavelength, sample1 * count - number, sample2)
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
         """See `Lobes.albedo`."""
@@ -206,13 +226,14 @@ class SpectralLobes(_Window):
         return list(si.wavelengths) if mi.is_spectral else [self._fixed]
 
 
-class DaylightLobes(_Window):
+class DaylightLobes(Window):
     """Lobes of RGB variants, summed over daylight (`tables.orders.daylight`)."""
 
-    def __init__(self, table: OrderTable, coherence_width: float) -> None:
-        super().__init__(table, coherence_width)
+    def __init__(self, window: Window) -> None:
+        self._window, self.lookup = window, window.lookup
+        self.sigma, self.period = window.sigma, window.period
         weights = daylight_weights(self.sigma, self.period)
-        self._waves, self._variances = weights.waves, weights.variances
+        self.waves, self._variances = weights.waves, weights.variances
         rows = weights.smoothed.astype("float32")
         self._counts = rows.shape[0] - 1, rows.shape[1] - 1
         corners = [rows[a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)]
@@ -228,7 +249,7 @@ class DaylightLobes(_Window):
         radius = dr.squared_norm(pair.uv)
         light = Incidence(pair.incident, pair.cos_i)
         total = self._zeroth(light, below, radius)
-        others = self._others(light, below, pair.uv, radius)
+        others = self.others(light, below, pair.uv, radius)
         total = [a + b for a, b in zip(total, others, strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
         return Reflected(mi.Color3f(*colours), dr.detach(density))
@@ -244,15 +265,15 @@ class DaylightLobes(_Window):
         place = index_between(dr.floor(fine), 0.0, 63.0)
         wavelength = dr.fma(mi.Float(bin_) + (place + 0.5) * (1.0 / 64.0), step, ENDS[0])
         row = self.lookup.row(incident, cos_i, wavelength)
-        return self.drawn(row, wavelength, fine - place, sample2)
+        return self._window.drawn(row, wavelength, fine - place, sample2)
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
         """See `Lobes.albedo`; of the wavelength that is a channel's mean."""
         rows = [self.lookup.row(incident, cos_i, mi.Float(lam)) for lam in RGB_WAVELENGTHS]
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 
-    def _shares(
-        self, light: Incidence, below: Below, wavelength: Float, order: Float
+    def shares(
+        self, light: Incidence, below: Below, wavelength: Float, order: Any
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
         row = self.lookup.row(light.incident, light.cos_i, wavelength)
@@ -262,19 +283,19 @@ class DaylightLobes(_Window):
     def _zeroth(self, light: Incidence, below: Below, radius: Float) -> list[Float]:
         """Sum order 0 over wavelengths, for red, green, blue and the density."""
         longest = dr.square(2e3 * math.pi * self.sigma / ENDS[1])
-        count = dr.select(radius * longest < _REACH, mi.UInt32(self._wavelengths), mi.UInt32(0))
+        count = dr.select(radius * longest < REACH, mi.UInt32(self._wavelengths), mi.UInt32(0))
 
         def add(n: Index, inputs: tuple[Incidence, Float], sums: list[Float]) -> list[Float]:
             light, radius = inputs
             node = read_record(self._order_0, n, 8)
             peak = lobe_peak(2e3 * math.pi * dr.rcp(node[CHANNELS]), self.sigma)
-            value, share = self._shares(light, below, node[CHANNELS], mi.Float(0.0))
+            value, share = self.shares(light, below, node[CHANNELS], self._window.mirrored())
             lobe = peak * dr.exp(-math.pi * radius * peak)
-            return _added(sums, node, lobe, value, share)
+            return added(sums, node, lobe, value, share)
 
         return sum_of(count, add, (light, radius), [mi.Float(0.0)] * CHANNELS)
 
-    def _others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
+    def others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
         """Sum all other orders, for red, green, blue and the density."""
         u, v = uv.x, uv.y
         unit = 2.0 * math.pi / self.period
@@ -282,38 +303,42 @@ class DaylightLobes(_Window):
         # k_m = m · step, of the sign of u
         step = wavenumber_step(u, v, self.period)
         aside = lobe_falloff(u, v, self.sigma, self.period)
-        first = maximum(dr.ceil(self._waves[0] * dr.rcp(step)), 1.0)
+        first = maximum(dr.ceil(self.waves[0] * dr.rcp(step)), 1.0)
         last = minimum(
-            dr.floor(self._waves[1] * dr.rcp(step)),
-            dr.sqrt(_REACH * dr.rcp(maximum(aside, 1e-8))),
+            dr.floor(self.waves[1] * dr.rcp(step)),
+            dr.sqrt(REACH * dr.rcp(maximum(aside, 1e-8))),
         )
-        most = int(2.0 * self.lookup.index * self._waves[1] / unit) + 1
-        lit = (last >= first) & (radius * (self._waves[1] / unit) ** 2 > 0.25)
+        most = int(2.0 * self.lookup.index * self.waves[1] / unit) + 1
+        lit = (last >= first) & (radius * (self.waves[1] / unit) ** 2 > 0.25)
         count = dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, float(most))), 0)
-        variance = dr.rcp(square) * (0.5 / self.sigma**2)
-        place = (variance - self._variances[0]) * (
-            self._counts[0] / (self._variances[1] - self._variances[0])
-        )
-        lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
-        upper_share = clip(place - lower, 0.0, 1.0)
-        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
+        row, upper_share, scale = self.smoothing(square)
 
         def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
             light, (step, aside, upper_share, scale) = inputs
             m = first + mi.Float(n)
             k = m * step
-            weights = self._weights(k, index_of(lower), upper_share)
+            weights = self.weights(k, row, upper_share)
             wavelength = 2e3 * math.pi * dr.rcp(k)
-            value, share = self._shares(light, below, wavelength, dr.mulsign(m, u))
+            value, share = self.shares(light, below, wavelength, dr.mulsign(m, u))
             lobe = scale * dr.exp(-aside * dr.square(m))
-            return _added(sums, weights, lobe, value, share)
+            return added(sums, weights, lobe, value, share)
 
         inputs = light, [step, aside, upper_share, scale]
         return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
 
-    def _weights(self, k: Float, row: Index, share: Float) -> list[Float]:
+    def smoothing(self, square: Float) -> tuple[Index, Float, Float]:
+        """Return the row of `weights`, place in it, and scale of lobes, for u² + v²."""
+        variance = dr.rcp(square) * (0.5 / self.sigma**2)
+        place = (variance - self._variances[0]) * (
+            self._counts[0] / (self._variances[1] - self._variances[0])
+        )
+        lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
+        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
+        return index_of(lower), clip(place - lower, 0.0, 1.0), scale
+
+    def weights(self, k: Float, row: Index, share: Float) -> list[Float]:
         """Interpolate the smoothed weights of a wavenumber."""
-        place = (k - self._waves[0]) * (self._counts[1] / (self._waves[1] - self._waves[0]))
+        place = (k - self.waves[0]) * (self._counts[1] / (self.waves[1] - self.waves[0]))
         lower = index_between(dr.floor(place), 0.0, self._counts[1] - 1.0)
         t = clip(place - lower, 0.0, 1.0)
         values = read_record(self._smoothed, row * self._counts[1] + index_of(lower), 4 * CHANNELS)
@@ -327,7 +352,7 @@ class DaylightLobes(_Window):
         ]
 
 
-def _added(
+def added(
     sums: list[Float], weights: list[Float], lobe: Float, value: Float, share: Float
 ) -> list[Float]:
     """Add a term to red, green, blue (by its efficiency) and the density (by its probability)."""

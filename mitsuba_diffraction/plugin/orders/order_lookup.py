@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -28,7 +28,7 @@ _MIN_DIVISOR = 1e-7
 #: Distance of a coordinate from its ends, 0 and 1, from which on it has derivatives.
 _LEAST_T = 1e-6
 #: Half floats round: sums are raised so that no order is left out where one is drawn.
-_RAISED = 1.0 + 2.0**-10
+RAISED = 1.0 + 2.0**-10
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Share(NamedTuple):
 class Drawn(NamedTuple):
     """Order that is drawn; whether it leaves below a sheet; and whether there is any."""
 
-    order: Float
+    order: Any
     below: Mask
     valid: Mask
 
@@ -184,7 +184,7 @@ class OrderLookup:
         value = self._between(row, row.channels * self._sides, self._parts - 1, active)
         if self.coated:
             value = self._outside(row, value, row.face)
-        return value * _RAISED
+        return value * RAISED
 
     def draw(self, row: Row, sample: Float) -> Drawn:
         """Return an order drawn by its efficiency over `total`."""

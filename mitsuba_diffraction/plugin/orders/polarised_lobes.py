@@ -81,7 +81,6 @@ class PolarisedLookup(OrderLookup):
 class PolarisedLobes(SpectralLobes):
     """Lobes with the Mueller matrices of a polarised table."""
 
-    lookup_kind = PolarisedLookup
     lookup: PolarisedLookup
 
     def spectrum(self, pair: Pair, ctx: Context, lit: list[Lit]) -> Spectrum:

@@ -34,6 +34,7 @@ SHADER = Consumer(
     GLSL.shows - {Feature.MIX, Feature.VARYING_LENGTH},
     "export the surface without, or render it with Mitsuba",
     {Feature.MIX: "export its surfaces one by one",
+     Feature.CROSSED: "render it with Mitsuba",
      Feature.VARYING_LENGTH: "export one with a number for each period"},
 )  # fmt: skip
 

@@ -34,9 +34,10 @@ GLSL = Consumer(
     "the realtime renderer",
     frozenset(Feature) - {
         Feature.TRANSMISSION, Feature.FILM, Feature.STACK, Feature.PLACED,
-        Feature.VARYING_HEIGHT,
+        Feature.VARYING_HEIGHT, Feature.CROSSED,
     },
     "leave it out, or render the scene with Mitsuba",
+    {Feature.CROSSED: "render the scene with Mitsuba"},
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ Contents
 --------
 OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
 Band        efficiencies of the directions with the same number of propagating orders
+crossed     `CrossedTable`: efficiencies of a crossed grating
 cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
 lookup      interpolation in NumPy
 blocks      light on both sides of a block's face, whose channels differ in number
@@ -15,11 +16,12 @@ file        tables as NetCDF files
 
 from __future__ import annotations
 
-from .file import load_orders, save_orders
+from .crossed import CrossedTable
+from .file import load_any_orders, load_orders, save_orders
 from .lookup import efficiency, groove_efficiency, mueller, polarised_efficiency
 from .table import Band, OrderTable
 
-__all__ = ["Band", "OrderTable"]
+__all__ = ["Band", "CrossedTable", "OrderTable", "load_any_orders"]
 
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency

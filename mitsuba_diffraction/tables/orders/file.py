@@ -28,6 +28,7 @@ from scipy.io import netcdf_file
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from .crossed import CROSSED_ATTRIBUTE, CrossedTable, crossed_of
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever the meaning of the numbers changes; files of another version are refused.
@@ -97,6 +98,21 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     """Read a file that `save_orders` wrote.
 
+    Raises a DiffractionError if the file is missing, no table of orders, damaged, of another
+    version, or of a crossed grating.
+    """
+    table = load_any_orders(path)
+    if isinstance(table, CrossedTable):
+        raise DiffractionError(
+            f"'{path}' is a table of a crossed grating, which is shown by Mitsuba alone, read by "
+            "CrossedTable.load, and listed by the command 'orders'; give a table of grooves here"
+        )
+    return table
+
+
+def load_any_orders(path: str | os.PathLike[str]) -> OrderTable | CrossedTable:
+    """Read a file that `save_orders` or `CrossedTable.save` wrote.
+
     Raises a DiffractionError if the file is missing, no table of orders, damaged, or of another
     version.
     """
@@ -110,7 +126,7 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
                 raise DiffractionError(
                     f"its format version is {version}, this program reads {FORMAT_VERSION}"
                 )
-            return _table(file)
+            return crossed_of(file) if hasattr(file, CROSSED_ATTRIBUTE) else _table(file)
     except DiffractionError as error:
         raise DiffractionError(f"'{path}' is not a table of orders: {error}; {_AGAIN}") from error
     except Exception as error:  # whatever SciPy makes of damaged bytes

@@ -184,8 +184,12 @@ class OrderTable:
     @property
     def reach(self) -> tuple[float, float]:
         """Wavelengths between which light has efficiencies, nm; see `MARGIN`."""
-        low, high = self.wavelengths
-        return low * 2.0**-MARGIN, high * 2.0**MARGIN
+        return reach_of(self.wavelengths)
+
+    @property
+    def layout(self) -> str:
+        """Size of the grid, for people."""
+        return f"{len(self.bands)} bands"
 
     @property
     def sides(self) -> int:
@@ -277,6 +281,12 @@ class OrderTable:
             f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
             f"{self.nbytes / 1e6:.1f} MB)"
         )
+
+
+def reach_of(wavelengths: tuple[float, float]) -> tuple[float, float]:
+    """Return the wavelengths between which light of a table has efficiencies; see `MARGIN`."""
+    low, high = wavelengths
+    return low * 2.0**-MARGIN, high * 2.0**MARGIN
 
 
 def check_outline(

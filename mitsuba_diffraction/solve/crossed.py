@@ -1,0 +1,232 @@
+"""`solve_crossed`: orders of a crossed grating by coupled waves in two dimensions (ikarus-rcwa).
+
+Moharam et al. 1995 (JOSA A 12, 1068), Li 1997 (JOSA A 14, 2758). Heights are cut into slices.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+from collections.abc import Iterator
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError, warn
+from ..extras import optional
+from ..heights.field import HeightField
+from ..progress import Progress, silent
+from ..tables.orders import CrossedTable
+from ..tables.orders.crossed import most_orders
+from .efficiencies import Efficiencies
+from .materials import Material, material_of
+from .measured_crossed import crossed_table
+from .stations import Real
+
+#: Lights at which the table and the solver are checked.
+_CHECKED = 24
+#: k above which a material absorbs, and the formulations of coupled waves disagree.
+_ABSORBING = 1e-3
+_LAST_THETA = 85.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A period of heights, its material, and the resolution of the solver.
+
+    Attributes
+    ----------
+    field : heights of one period in x and y.
+    material : below the heights.
+    harmonics : largest order of the expansion along x and along y.
+    slices : number of layers that the heights are cut into.
+    """
+
+    field: HeightField
+    material: Material
+    harmonics: tuple[int, int]
+    slices: int
+
+
+def solve_crossed(
+    field: HeightField,
+    material: str | float | complex | Material = 1.5,
+    *,
+    wavelengths: tuple[float, float] = (380.0, 780.0),
+    step: float = 20.0,
+    theta_step: float = 10.0,
+    phi_step: float = 15.0,
+    harmonics: int = 0,
+    slices: int = 8,
+    executor: Executor | None = None,
+    progress: Progress = silent,
+) -> CrossedTable:
+    """Return the table of the orders that a crossed grating reflects, in air.
+
+    The header has the error of the table, `error_mean`, at lights between its own, and the change
+    of these lights with one more harmonic and twice the slices, `solver_error`. Mirror planes of
+    the heights save half the directions each.
+
+    Raises a DiffractionError if the material is unknown, or the periods are above four times the
+    shortest wavelength, or ikarus-rcwa is not installed.
+
+    Parameters
+    ----------
+    field : heights of one period in x and y.
+    material : as of `solve_orders`; a material that absorbs has a warning.
+    wavelengths, step : of the table, nm.
+    theta_step, phi_step : between directions of the light, degrees.
+    harmonics : largest order of the expansion; 0 is one more than the largest order of
+        the light, 3 at least.
+    slices : number of layers that the heights are cut into.
+    executor : processes (`jobs.processes`); None solves here.
+    progress : called as progress(done, total, text).
+    """
+    optional("ikarus")
+    periods = field.extent
+    last = most_orders(periods, wavelengths)
+    medium = material_of(material, wavelengths)
+    lam = np.linspace(*wavelengths, max(round((wavelengths[1] - wavelengths[0]) / step), 1) + 1)
+    index = medium.index(lam)
+    if index is None:
+        raise DiffractionError("crossed gratings of perfect conductors are not solved; give Al")
+    if (np.abs(index.imag) > _ABSORBING).any():
+        warn(
+            f"{medium.name} absorbs: formulations of coupled waves differ by some 4 % of the light "
+            "on crossed gratings of metal"
+        )
+    cell = Cell(
+        field, medium, (harmonics or max(last[0] + 1, 3), harmonics or max(last[1] + 1, 3)), slices
+    )
+    theta = np.append(np.arange(0.0, _LAST_THETA, theta_step), _LAST_THETA)
+    phi = np.arange(0.0, 360.0 - 1e-9, phi_step)
+    lights = {(t, p) for t in theta.tolist() for p in (phi.tolist() if t else [0.0])}
+    mirrors = _mirrors(field)
+    wanted = {_reduced(light, mirrors)[0] for light in lights}
+    solved = dict(_solve_all(cell, sorted(wanted), lam, last, executor, progress))
+    values = np.empty((len(lam), len(theta), len(phi), (2 * last[0] + 1) * (2 * last[1] + 1), 2))
+    for a, t in enumerate(theta.tolist()):
+        for b, p in enumerate(phi.tolist()):
+            light, flipped = _reduced((t, p if t else 0.0), mirrors)
+            powers = solved[light][:, :: flipped[1], :: flipped[0]]
+            values[:, a, b] = powers.reshape(len(lam), -1, 1)
+    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    pairs = np.column_stack([m_x.ravel(), m_y.ravel()])
+    header: dict[str, Any] = {
+        "solver": f"ikarus-rcwa, {2 * cell.harmonics[0] + 1} x {2 * cell.harmonics[1] + 1} "
+        f"harmonics, {slices} slices",
+        "solver_version": importlib.metadata.version("ikarus-rcwa"),
+        "material": medium.name,
+        "profile": f"crossed, {np.ptp(field.heights):.3g} µm deep",
+    }
+    grid = Efficiencies(lam, theta, phi, pairs, values)
+    table = crossed_table(grid, (periods[0], periods[1]), "the solution", header)
+    header |= _checked(table, cell, last)
+    return table
+
+
+def _solve_all(
+    cell: Cell, lights: list[tuple[float, float]], lam: Real, last: tuple[int, int],
+    executor: Executor | None, progress: Progress,
+) -> Iterator[tuple[tuple[float, float], Real]]:  # fmt: skip
+    """Yield each light with its efficiencies (λ, m_y, m_x)."""
+    task = functools.partial(reflected, cell, lam=lam, last=last)
+    progress(0, len(lights), "solving directions")
+    if executor is None:
+        for done, light in enumerate(lights, 1):
+            yield light, task(light)
+            progress(done, len(lights), "solving directions")
+        return
+    futures = {executor.submit(task, light): light for light in lights}
+    try:
+        for done, future in enumerate(as_completed(futures), 1):
+            yield futures[future], future.result()
+            progress(done, len(lights), "solving directions")
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def reflected(cell: Cell, light: tuple[float, float], lam: Real, last: tuple[int, int]) -> Real:
+    """Return the efficiencies (λ, m_y, m_x) of unpolarised light from (θ, φ), degrees."""
+    ikarus = optional("ikarus")
+
+    heights = cell.field.heights - cell.field.heights.min()
+    depth = float(heights.max())
+    levels = depth * (1.0 - (np.arange(cell.slices) + 0.5) / cell.slices)
+    indices = cell.material.index(lam)
+    assert indices is not None
+    powers = np.empty((len(lam), 2 * last[1] + 1, 2 * last[0] + 1))
+    for n, (wavelength, index) in enumerate(zip(lam, indices, strict=True)):
+        shape = heights.shape[::-1]
+        solver = ikarus.RCWA(*(1e-6 * d for d in cell.field.extent), resolution=shape,
+                             n_orders=cell.harmonics)  # fmt: skip
+        solver.add_uniform_layer(np.inf, 1.0)
+        for level in levels if depth else ():
+            ridges = (heights > level).astype(int).T
+            solver.add_layer(1e-6 * depth / cell.slices, ridges, [1.0, complex(index)])
+        solver.add_uniform_layer(np.inf, complex(index))
+        both = []
+        for turn in (0.0, 90.0):
+            # its azimuth is that in which the light travels, and its orders count the other way
+            solver.set_source(wavelength=1e-9 * wavelength, theta=light[0], phi=light[1] + 180.0,
+                              polarization="linear", linear_pol_angle=turn)  # fmt: skip
+            result = solver.simulate()[2]
+            both.append(np.array(result.R_orders, float))
+        mean = 0.5 * (both[0] + both[1])
+        for a in range(-last[1], last[1] + 1):
+            for b in range(-last[0], last[0] + 1):
+                powers[n, a + last[1], b + last[0]] = mean[result.order_index(-b, -a)]
+    return np.maximum(np.nan_to_num(powers), 0.0)
+
+
+def _mirrors(field: HeightField) -> tuple[bool, bool]:
+    """Whether the periodic heights equal their mirror images along x and along y."""
+    found = []
+    for axis in (1, 0):
+        image = np.flip(field.heights, axis)
+        shifts = (np.roll(image, n, axis) for n in range(image.shape[axis]))
+        found.append(any(np.allclose(field.heights, shifted, atol=1e-9) for shifted in shifts))
+    return found[0], found[1]
+
+
+def _reduced(
+    light: tuple[float, float], mirrors: tuple[bool, bool]
+) -> tuple[tuple[float, float], tuple[int, int]]:
+    """Return the light that mirror planes make of a light, and the steps along its orders."""
+    theta, phi = light[0], light[1] % 360.0
+    steps = [1, 1]
+    if mirrors[1] and phi > 180.0:
+        phi, steps[1] = 360.0 - phi, -1
+    if mirrors[0] and 90.0 < phi < 270.0:
+        phi, steps[0] = (180.0 - phi) % 360.0, -1
+    return (theta, round(phi, 9)), (steps[0], steps[1])
+
+
+def _checked(table: CrossedTable, cell: Cell, last: tuple[int, int]) -> dict[str, float]:
+    """Return the errors of table and solver at random lights, as shares of the orders but 0."""
+    rng = np.random.default_rng(0)
+    finer = Cell(
+        cell.field, cell.material, (cell.harmonics[0] + 1, cell.harmonics[1] + 1), 2 * cell.slices
+    )
+    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    others = (m_x != 0) | (m_y != 0)
+    sums = []
+    for _ in range(_CHECKED):
+        theta, phi = 70.0 * np.sqrt(rng.random()), 360.0 * rng.random()
+        lam = np.array([rng.uniform(*table.wavelengths)])
+        truth, other = (reflected(c, (theta, phi), lam, last)[0] for c in (cell, finer))
+        sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+        found = table.efficiency(-sine * np.cos(turn), -sine * np.sin(turn), lam, m_x, m_y)
+        parts = np.abs(found - truth), np.abs(other - truth), truth
+        sums.append([part[others].sum() for part in parts])
+    missed, moved, light = np.array(sums).T
+    whole = max(float(light.sum()), 1e-12)
+    floor = max(0.05 * whole / _CHECKED, 1e-12)
+    return {
+        "error_mean": float(missed.sum()) / whole,
+        "error_worst": float(np.quantile(missed / np.maximum(light, floor), 0.95)),
+        "solver_error": float(moved.sum()) / whole,
+    }

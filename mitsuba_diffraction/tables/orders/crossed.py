@@ -1,0 +1,278 @@
+"""Table of the orders of a crossed grating, which repeats along x and along y."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import itertools
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.io import netcdf_file
+
+from ...atomic import atomic_path
+from ...errors import DiffractionError
+from ...files import ORDERS_ATTRIBUTE
+from ...optics.orders import crossed_square, wavelength_coordinate
+from .cells import Array
+from .table import LARGEST_SUM, MOST_NUMBERS, PERIODS, WAVELENGTHS, reach_of
+
+#: Nodes along each axis of the directions, and along wavelengths at most.
+NODES, MOST_WAVELENGTHS = 25, 64
+#: Attribute that tells these tables from those of grooves.
+CROSSED_ATTRIBUTE = "crossed"
+_STEP = 1.0 / 30_000.0  # of packed efficiencies, as in `file`
+
+
+class Records(NamedTuple):
+    """Efficiencies at the corners of cells, for one gather of 8 numbers.
+
+    Attributes
+    ----------
+    cells : numbers of cells along wavelength, y and x.
+    values : (cells × (orders + 1), 8) float16: the orders of a cell, m_y outermost, then their sum.
+    """
+
+    cells: tuple[int, ...]
+    values: NDArray[np.float16]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossedTable:
+    """Efficiencies of a crossed grating's orders for unpolarised light, on an even grid.
+
+    Between nodes they are interpolated linearly, along wavelength and along the tangential
+    components x and y of the mirror direction of the incident light. Order (m_x, m_y) leaves at
+    x + m_x λ/d_x, y + m_y λ/d_y.
+
+    Raises a DiffractionError if the shape does not fit, or numbers are no efficiencies: negative,
+    not finite, or of a sum over orders above 1.001.
+
+    Attributes
+    ----------
+    periods : d_x and d_y, µm.
+    wavelengths : shortest and longest, in vacuum, nm; light beyond them as in `OrderTable`.
+    values : (λ, y, x, m_y, m_x) float32, at wavelengths even between `wavelengths`, two at least,
+        and x and y even from −1 to 1; of orders from −`most_orders` to `most_orders`. Nodes have
+        efficiencies of orders that do not propagate there, from nearby light, for interpolation.
+    header : as of `OrderTable`.
+    """
+
+    periods: tuple[float, float]
+    wavelengths: tuple[float, float]
+    values: NDArray[np.float32]
+    header: Mapping[str, Any] = field(default_factory=dict)
+
+    # what an OrderTable may have, and these tables have not
+    superstrate: ClassVar[float] = 1.0
+    thin: ClassVar[bool] = False
+    block: ClassVar[float | None] = None
+    sides: ClassVar[int] = 1
+    polarised: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        m_x, m_y = most_orders(self.periods, self.wavelengths)
+        shape = self.values.shape
+        expected = (NODES, NODES, 2 * m_y + 1, 2 * m_x + 1)
+        if len(shape) != 5 or not 2 <= shape[0] <= MOST_WAVELENGTHS or shape[1:] != expected:
+            raise DiffractionError(
+                f"efficiencies of shape {shape}; expected 2 to {MOST_WAVELENGTHS} wavelengths, "
+                f"then {expected}"
+            )
+        if not np.isfinite(self.values).all() or self.values.min() < 0.0:
+            raise DiffractionError("efficiencies must be finite and at least 0")
+        if (largest := float(self.values.sum(axis=(3, 4)).max())) > LARGEST_SUM:
+            raise DiffractionError(f"efficiencies sum to {largest:.4g}, above {LARGEST_SUM}")
+
+    @property
+    def period(self) -> float:
+        """The longer period, µm."""
+        return max(self.periods)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Wavelengths between which light has efficiencies, nm."""
+        return reach_of(self.wavelengths)
+
+    @property
+    def last_orders(self) -> tuple[int, int]:
+        """Largest order along x and along y."""
+        return most_orders(self.periods, self.wavelengths)
+
+    @property
+    def layout(self) -> str:
+        """Size of the grid, for people."""
+        m_x, m_y = self.last_orders
+        return (
+            f"{NODES} x {NODES} directions, {len(self.values)} wavelengths, orders to "
+            f"({m_x}, {m_y})"
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the numbers in memory."""
+        return self.values.nbytes
+
+    def efficiency(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        wavelength: ArrayLike,
+        order_x: ArrayLike,
+        order_y: ArrayLike,
+    ) -> Array:
+        """Return the efficiency of orders, of any shape; 0 where an order does not propagate.
+
+        x, y : direction cosines of the mirror direction of the incident light, −(ωi)_x, −(ωi)_y.
+        wavelength : in vacuum, nm; light beyond `reach` has none.
+        """
+        x, y, lam, m, n = np.broadcast_arrays(
+            *(np.asarray(part, np.float64) for part in (x, y, wavelength, order_x, order_y))
+        )
+        count, low, high = len(self.values) - 1, *self.wavelengths
+        places = [
+            _place(wavelength_coordinate(lam, low, high, 1e-3), count),
+            *(_place(np.clip(0.5 * (part + 1.0), 0.0, 1.0), NODES - 1) for part in (y, x)),
+        ]
+        m_x, m_y = self.last_orders
+        lit = (lam >= self.reach[0]) & (lam <= self.reach[1]) & (np.abs(m) <= m_x)
+        lit &= (np.abs(n) <= m_y) & propagates(x, y, lam, m, n, self.periods)
+        orders = np.where(lit, n, 0).astype(int) + m_y, np.where(lit, m, 0).astype(int) + m_x
+        total = np.zeros(x.shape)
+        for corner in itertools.product((0, 1), repeat=3):
+            nodes = tuple(lower + c for (lower, _), c in zip(places, corner, strict=True))
+            shares = [s if c else 1.0 - s for (_, s), c in zip(places, corner, strict=True)]
+            total += self.values[nodes + orders] * np.prod(shares, axis=0)
+        return np.where(lit, total, 0.0)
+
+    def records(self) -> Records:
+        """Return the table as a kernel reads it."""
+        values = self.values.reshape(*self.values.shape[:3], -1)
+        whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+        cells = tuple(count - 1 for count in whole.shape[:3])
+        corners = [
+            whole[tuple(slice(c, c + count) for c, count in zip(corner, cells, strict=True))]
+            for corner in itertools.product((0, 1), repeat=3)
+        ]
+        return Records(cells, np.stack(corners, axis=-1).astype(np.float16).reshape(-1, 8))
+
+    def digest(self) -> str:
+        """SHA-256 of all that look-ups depend on; not of the header."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
+        outline = json.dumps([self.periods, self.wavelengths, self.values.shape])
+        content = hashlib.sha256(outline.encode())
+        content.update(np.ascontiguousarray(self.values).data)
+        return content.hexdigest()
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers and strings for people and for JSON."""
+        return {
+            "periods_um": list(self.periods),
+            "wavelength_range_nm": list(self.wavelengths),
+            "grid": self.layout,
+            "memory_mb": round(self.nbytes / 1e6, 2),
+            **self.header,
+        }
+
+    def __repr__(self) -> str:
+        (d_x, d_y), (low, high) = self.periods, self.wavelengths
+        size = f"{self.nbytes / 1e6:.1f} MB"
+        return f"CrossedTable({d_x:g} x {d_y:g} µm, {low:g}–{high:g} nm, {size})"
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a NetCDF file; efficiencies are rounded to 1/30000 of the incident light.
+
+        Raises a DiffractionError if it cannot be written; no half-written file is left.
+        """
+        if Path(path).suffix.lower() != ".nc":
+            raise DiffractionError(
+                f"cannot write '{path}': the file name of a table of orders must end with .nc"
+            )
+        content = io.BytesIO()
+        with netcdf_file(content, "w") as file:
+            file.title = "Efficiencies of the orders of a crossed grating"
+            setattr(file, ORDERS_ATTRIBUTE, np.int32(1))
+            setattr(file, CROSSED_ATTRIBUTE, np.int32(1))
+            file.periods, file.periods_units = np.array(self.periods), "um"
+            file.wavelengths, file.wavelengths_units = np.array(self.wavelengths), "nm"
+            file.header = json.dumps(dict(self.header), sort_keys=True)
+            axes = ("wavelength", "y", "x", "order_y", "order_x")
+            for name, size in zip(axes, self.values.shape, strict=True):
+                file.createDimension(name, size)
+            numbers = np.rint(self.values / _STEP).astype(">i2")
+            variable = file.createVariable("efficiency", ">i2", axes)
+            variable[:] = numbers
+            variable.scale_factor, variable.units = np.float64(_STEP), "1"
+            file.sha256 = _checksum(file, numbers)
+            file.flush()
+            data = content.getvalue()
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(data)
+
+
+def crossed_of(file: Any) -> CrossedTable:
+    """Return the table of an open NetCDF file; any exception means that it is damaged."""
+    variable = file.variables["efficiency"]
+    if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+        raise ValueError(f"it claims {variable.shape} numbers")
+    if file.sha256 != _checksum(file, variable[:]).encode():
+        raise ValueError("its checksum is of another one")
+    values = (variable[:] * variable.scale_factor).astype(np.float32)
+    (d_x, d_y), (low, high) = map(float, file.periods), map(float, file.wavelengths)
+    return CrossedTable((d_x, d_y), (low, high), values, json.loads(file.header))
+
+
+def _checksum(file: Any, numbers: NDArray[Any]) -> str:
+    header = file.header.encode() if isinstance(file.header, str) else file.header
+    content = hashlib.sha256(header)
+    for part in (file.periods, file.wavelengths):
+        content.update(np.asarray(part, ">f8").tobytes())
+    content.update(np.ascontiguousarray(numbers, ">i2").data)
+    return content.hexdigest()
+
+
+def most_orders(periods: tuple[float, float], wavelengths: tuple[float, float]) -> tuple[int, int]:
+    """Return the largest order along x and along y that propagates from any direction.
+
+    Raises a DiffractionError for periods or wavelengths out of range.
+    """
+    low, high = wavelengths
+    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
+        raise DiffractionError(
+            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
+            f"{WAVELENGTHS[1]:g} nm"
+        )
+    # a record of all orders, at all nodes, has to fit
+    longest = min(PERIODS[1], 4e-3 * low)
+    if not all(PERIODS[0] <= period <= longest for period in periods):  # also refuses NaN
+        raise DiffractionError(
+            f"periods={periods[0]:g}, {periods[1]:g} µm must be {PERIODS[0]:g} to {longest:.3g} "
+            f"µm, four times the shortest wavelength, {low:g} nm"
+        )
+    return int(2e3 * periods[0] / low), int(2e3 * periods[1] / low)
+
+
+def propagates(
+    x: Array, y: Array, wavelength: Array, order_x: Array, order_y: Array,
+    periods: tuple[float, float],
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Whether orders propagate, by the grating equation; arguments as of `efficiency`."""
+    steps = (1e-3 * np.asarray(wavelength) / period for period in periods)
+    shift_x, shift_y = (m * step for m, step in zip((order_x, order_y), steps, strict=True))
+    return np.asarray(crossed_square(x, y, shift_x, shift_y) > 0.0)
+
+
+def _place(coordinate: Array, cells: int) -> tuple[NDArray[np.int64], Array]:
+    """Return the cell of a coordinate from 0 to 1, and the place in it."""
+    lower = np.minimum(np.floor(coordinate * cells), cells - 1)
+    return lower.astype(np.int64), coordinate * cells - lower
