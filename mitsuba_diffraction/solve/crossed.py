@@ -123,7 +123,7 @@ def solve_crossed(
     }
     grid = Efficiencies(lam, theta, phi, pairs, values)
     table = crossed_table(grid, (periods[0], periods[1]), "the solution", header)
-    header |= _checked(table, cell, last)
+    header |= _checked(table, cell, last, executor)
     return table
 
 
@@ -155,7 +155,9 @@ def reflected(cell: Cell, light: tuple[float, float], lam: Real, last: tuple[int
 
     heights = cell.field.heights - cell.field.heights.min()
     depth = float(heights.max())
-    levels = depth * (1.0 - (np.arange(cell.slices) + 0.5) / cell.slices)
+    # rounded, so that mirror images have the same slices
+    shares = np.round(heights / max(depth, 1e-12), 9)
+    levels = np.round(1.0 - (np.arange(cell.slices) + 0.5) / cell.slices, 9)
     indices = cell.material.index(lam)
     assert indices is not None
     powers = np.empty((len(lam), 2 * last[1] + 1, 2 * last[0] + 1))
@@ -165,7 +167,7 @@ def reflected(cell: Cell, light: tuple[float, float], lam: Real, last: tuple[int
                              n_orders=cell.harmonics)  # fmt: skip
         solver.add_uniform_layer(np.inf, 1.0)
         for level in levels if depth else ():
-            ridges = (heights > level).astype(int).T
+            ridges = (shares > level).astype(int).T
             solver.add_layer(1e-6 * depth / cell.slices, ridges, [1.0, complex(index)])
         solver.add_uniform_layer(np.inf, complex(index))
         both = []
@@ -205,7 +207,9 @@ def _reduced(
     return (theta, round(phi, 9)), (steps[0], steps[1])
 
 
-def _checked(table: CrossedTable, cell: Cell, last: tuple[int, int]) -> dict[str, float]:
+def _checked(
+    table: CrossedTable, cell: Cell, last: tuple[int, int], executor: Executor | None
+) -> dict[str, float]:
     """Return the errors of table and solver at random lights, as shares of the orders but 0."""
     rng = np.random.default_rng(0)
     finer = Cell(
@@ -213,16 +217,20 @@ def _checked(table: CrossedTable, cell: Cell, last: tuple[int, int]) -> dict[str
     )
     m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
     others = (m_x != 0) | (m_y != 0)
-    sums = []
-    for _ in range(_CHECKED):
-        theta, phi = 70.0 * np.sqrt(rng.random()), 360.0 * rng.random()
-        lam = np.array([rng.uniform(*table.wavelengths)])
-        truth, other = (reflected(c, (theta, phi), lam, last)[0] for c in (cell, finer))
-        sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-        found = table.efficiency(-sine * np.cos(turn), -sine * np.sin(turn), lam, m_x, m_y)
-        parts = np.abs(found - truth), np.abs(other - truth), truth
-        sums.append([part[others].sum() for part in parts])
-    missed, moved, light = np.array(sums).T
+    polar, azimuth = 70.0 * np.sqrt(rng.random(_CHECKED)), 360.0 * rng.random(_CHECKED)
+    lam = rng.uniform(*table.wavelengths, _CHECKED)
+    every = map if executor is None else executor.map
+    lights, waves = list(zip(polar, azimuth, strict=True)), list(lam[:, None])
+    truth, other = (
+        np.concatenate(list(every(functools.partial(reflected, c, last=last), lights, waves)))
+        for c in (cell, finer)
+    )
+    sine, turn = np.sin(np.radians(polar)), np.radians(azimuth)
+    x, y = -sine * np.cos(turn), -sine * np.sin(turn)
+    x, y, lam = (part[:, None, None] for part in (x, y, lam))
+    found = table.efficiency(x, y, lam, m_x, m_y)
+    parts = np.abs(found - truth), np.abs(other - truth), truth
+    missed, moved, light = (part[:, others].sum(axis=-1) for part in parts)
     whole = max(float(light.sum()), 1e-12)
     floor = max(0.05 * whole / _CHECKED, 1e-12)
     return {

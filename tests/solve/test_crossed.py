@@ -1,0 +1,101 @@
+"""Solutions of crossed gratings, beside solvers of grooves and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError, HeightField
+from mitsuba_diffraction.solve.crossed import Cell, _mirrors, _reduced, reflected
+from mitsuba_diffraction.solve.integral import IntegralSolver
+from mitsuba_diffraction.solve.jobs import processes
+from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.profiles import Profile
+from mitsuba_diffraction.solve.stations import Grating
+from mitsuba_diffraction.tables.orders import cells
+
+PERIOD, LAM, LIMITS, PIXELS = 0.6, 550.0, (500.0, 700.0), 24
+GLASS = material_of(1.5, LIMITS)
+Y, X = np.mgrid[:PIXELS, :PIXELS] / PIXELS
+
+
+def steps(t):
+    """Two steps to one side: blazed, so that signs of orders and angles show."""
+    return np.where(t < 1 / 3, 0.2, np.where(t < 2 / 3, 0.1, 0.0))
+
+
+def of_grooves(theta, phi):
+    """Unpolarised efficiencies of `steps` by the boundary integral method, by order."""
+    x, z = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6]), np.repeat([0.2, 0.1, 0.0], 2)
+    grating = Grating(Profile(x, z, PERIOD), GLASS, 1.0, LIMITS)
+    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    cell = cells.to_cell(-sine * np.cos(turn), sine * np.sin(turn), LAM, PERIOD)
+    w = float(cells.w_of(cell.k_continuous, LAM, LIMITS, PERIOD))
+    place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
+    solver = IntegralSolver(grating.profile, 60)
+    j = int(cell.channel)
+    powers = np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2
+    return {j - q: float(power) for q, power in enumerate(powers.sum(axis=-1).mean(axis=0))}
+
+
+@pytest.mark.parametrize("phi", [0.0, 20.0])
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_grooves_have_the_light_of_the_integral_method(along, phi):
+    heights, turn = (steps(X), 0.0) if along == "x" else (steps(Y), 90.0)
+    cell = Cell(HeightField(heights, PERIOD / PIXELS), GLASS, (8, 1) if turn == 0.0 else (1, 8), 2)
+    found = reflected(cell, (30.0, phi + turn), np.array([LAM]), (1, 1))[0]
+    across = found[1] if along == "x" else found[:, 1]
+    for order, truth in of_grooves(30.0, phi).items():
+        assert across[1 + order] == pytest.approx(truth, rel=0.01)  # 0.5 % with 17 harmonics
+    assert found.sum() == pytest.approx(across.sum(), rel=1e-9)
+
+
+@pytest.mark.parametrize("theta", [0.0, 50.0])
+def test_a_flat_cell_reflects_as_fresnel_has_it(theta):
+    cell = Cell(HeightField(np.zeros((4, 4)), 0.1), GLASS, (1, 1), 2)
+    inside = np.sqrt(1.5**2 - np.sin(np.radians(theta)) ** 2)
+    c = np.cos(np.radians(theta))
+    truth = 0.5 * ((c - inside) / (c + inside)) ** 2
+    truth += 0.5 * ((2.25 * c - inside) / (2.25 * c + inside)) ** 2
+    found = reflected(cell, (theta, 30.0), np.array([LAM]), (0, 0))
+    assert found[0, 0, 0] == pytest.approx(truth, rel=1e-6)
+
+
+def test_mirror_planes_give_the_light_of_mirrored_directions():
+    blazed_along_y = HeightField(0.05 * np.cos(2 * np.pi * X) + steps(Y), PERIOD / PIXELS)
+    assert _mirrors(blazed_along_y) == (True, False)
+    cell = Cell(blazed_along_y, GLASS, (2, 2), 2)
+    for phi in (130.0, 200.0, 290.0):
+        light, flips = _reduced((40.0, phi), (True, False))
+        direct = reflected(cell, (40.0, phi), np.array([LAM]), (1, 1))
+        mirrored = reflected(cell, light, np.array([LAM]), (1, 1))[:, :: flips[1], :: flips[0]]
+        assert mirrored == pytest.approx(direct, rel=1e-4, abs=1e-9)
+
+
+@pytest.mark.thorough
+def test_a_table_of_bumps_says_its_errors():
+    heights = 0.021 * (np.cos(2 * np.pi * X) + np.cos(2 * np.pi * Y))
+    with processes(2) as executor:
+        table = md.solve_crossed(
+            HeightField(heights, 0.55 / PIXELS), 1.5, wavelengths=(500.0, 540.0), step=20.0,
+            theta_step=30.0, phi_step=45.0, harmonics=2, slices=2, executor=executor,
+        )  # fmt: skip
+    assert table.last_orders == (2, 2)
+    assert 0.0 < table.header["error_mean"] < 0.3  # coarse steps
+    assert table.header["solver_error"] < 0.2
+    normal = table.efficiency(0.0, 0.0, 520.0, [1, 0, -1, 0], [0, 1, 0, -1])
+    assert normal == pytest.approx(normal[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("field", "material", "message"),
+    [
+        (HeightField(np.zeros((4, 4)), 2.0), 1.5, "four times the shortest wavelength"),
+        (HeightField(np.zeros((4, 4)), 0.1), "none", "perfect conductors are not solved"),
+        (HeightField(np.zeros((4, 4)), 0.1), "glas", "material"),
+    ],
+)
+def test_what_is_not_solved_is_refused(field, material, message):
+    with pytest.raises(DiffractionError, match=message):
+        md.solve_crossed(field, material)

@@ -1,0 +1,55 @@
+"""A crossed grating in closed form: a mirror with shallow sine waves along x and along y."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import jv
+
+from mitsuba_diffraction import CrossedTable
+from mitsuba_diffraction.solve.efficiencies import Efficiencies
+from mitsuba_diffraction.solve.measured_crossed import crossed_table
+from mitsuba_diffraction.tables.orders.crossed import most_orders, propagates
+
+PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
+#: Reflectance; and amplitudes of the sine waves along x and y, µm.
+REFLECTANCE, DEPTHS = 0.8, (0.03, 0.015)
+
+
+def efficiency(x, y, wavelength, m, n):
+    """Scalar theory (Goodman 2005, section 4.4.4), phases from both cosines: it is reciprocal."""
+    out = x + m * wavelength / (1e3 * PERIODS[0]), y + n * wavelength / (1e3 * PERIODS[1])
+    cosines = [np.sqrt(np.maximum(1.0 - a * a - b * b, 0.0)) for a, b in ((x, y), out)]
+    phase = 2e3 * np.pi / wavelength * sum(cosines)
+    powers = jv(m, DEPTHS[0] * phase) ** 2 * jv(n, DEPTHS[1] * phase) ** 2
+    return np.where(propagates(x, y, wavelength, m, n, PERIODS), REFLECTANCE * powers, np.nan)
+
+
+def listed(theta, phi, wavelengths):
+    """Efficiencies on a grid, as a file has them."""
+    m_x, m_y = most_orders(PERIODS, (wavelengths[0], wavelengths[-1]))
+    pairs = np.mgrid[-m_x : m_x + 1, -m_y : m_y + 1].reshape(2, -1)
+    lam, polar, azimuth, m = np.meshgrid(
+        wavelengths, theta, phi, np.arange(pairs.shape[1]), indexing="ij"
+    )
+    sine, turn = np.sin(np.radians(polar)), np.radians(azimuth)
+    values = efficiency(-sine * np.cos(turn), -sine * np.sin(turn), lam, *pairs[:, m])
+    values = np.repeat(values[..., None], 2, axis=-1)
+    return Efficiencies(np.asarray(wavelengths), theta, phi, pairs.T, values)
+
+
+def table() -> CrossedTable:
+    """Its table."""
+    grid = listed(np.arange(0.0, 86.0, 5.0), np.arange(0.0, 360.0, 15.0), np.arange(450, 651, 20.0))
+    header = {"solver": "closed form", "material": "mirror", "profile": "sine waves"}
+    return crossed_table(grid, PERIODS, "the closed form", header)
+
+
+def save_csv(grid: Efficiencies, path) -> None:
+    """Write a grid as the long CSV that `read_orders` reads."""
+    lines = ["wavelength_nm,theta_deg,phi_deg,order_x,order_y,R_s,R_p"]
+    for place in np.argwhere(~np.isnan(grid.values[..., 0])):
+        a, b, c, k = place
+        light = grid.wavelengths[a], grid.theta[b], grid.phi[c]
+        values = (*light, *grid.orders[k], *grid.values[tuple(place)])
+        lines.append(",".join(f"{value:.9g}" for value in values))
+    path.write_text("\n".join(lines) + "\n")
