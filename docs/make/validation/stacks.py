@@ -1,4 +1,4 @@
-"""Films, layers beneath a profile and blocks, beside closed forms and other solvers."""
+"""Films, layers beneath a profile, blocks and crossed gratings, beside closed forms and other solvers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.solve.block import solve_block
+from mitsuba_diffraction.solve.crossed import Cell, reflected
 from mitsuba_diffraction.solve.films import structure_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.jobs import AUTO, problem_of, solver_of
@@ -17,6 +19,8 @@ from mitsuba_diffraction.solve.orders import Settings
 from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import cells
+
+from . import crossed
 
 # Wavelengths of the structures, nm
 _RANGE = (500.0, 600.0)
@@ -109,6 +113,7 @@ def compared(quick: bool = False) -> Iterator[Compared]:
         yield from _transfer_matrices()
         yield from _ridges()
         yield from _sine()
+        yield from _crossed()
 
 
 def _closed_forms() -> Iterator[Compared]:
@@ -199,3 +204,21 @@ def _sine() -> Iterator[Compared]:
             case = f"table of a block's sinusoidal face, order {order:d} {side_of_order}"
             case = case.replace("-", "−")
             yield Compared(case, light, float(found), float(powers[j, q]), "gratinglab")
+
+
+def _crossed() -> Iterator[Compared]:
+    pixels, lam, theta, phi = 48, 450.0, 30.0, 25.0
+    y, x = 2.0 * np.pi * np.mgrid[:pixels, :pixels] / pixels
+    lumps = 0.25 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)) + 0.2 * np.sin(x)
+    # without mirror planes, so that every sign shows
+    field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
+    cell = Cell(field, material_of("1.5", _RANGE), (6, 6), 16)
+    found = reflected(cell, (theta, phi), np.array([lam]), (2, 2))[0]
+    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(np.radians(theta))])
+    solved = crossed.solve(field, 1.5, lam, wi, 121, 16)
+    for (m, n), wo, jones in zip(solved.order.tolist(), solved.wo, solved.jones, strict=True):
+        truth = 0.5 * float((np.abs(jones) ** 2).sum()) * wo[2] / wi[2]
+        case = f"lumps of glass, 0.5 µm apart in x and y, order ({m}, {n})"
+        light = f"{theta:g}°, azimuth {phi:g}°, {lam:g} nm"
+        yield Compared(case, light, float(found[n + 2, m + 2]), truth, "grcwa")

@@ -67,7 +67,7 @@ printed digits, or the error of the printed method.
 
 {_published(measured.published)}
 
-## Films, layers and blocks
+## Films, layers, blocks and crossed gratings
 
 {_stacks(measured)}
 
