@@ -10,6 +10,9 @@ weight_NAME : float or texture ∂ [what the others leave of 1]
     Of the surface of that name, at least 0: a number, a bitmap (raw) or another texture or mesh
     attribute of one channel. One surface may have none. All must not be 0 at one point; where mesh
     attributes are, it is black.
+depth : float or texture ∂
+    In place of all weights, for surfaces of type `diffraction_orders` that are one profile at
+    several depths: µm, between theirs. The light is interpolated between the two nearest.
 
     <bsdf type="diffraction_mix">
         <bsdf type="diffraction" name="back"> ... </bsdf>
@@ -33,6 +36,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .depth_weights import DEPTH, DepthWeights
 from .description import Mix
 from .lifecycle import ALL_COMPONENTS, PluginBSDF, ask
 from .memory import index_between
@@ -70,13 +74,18 @@ class DiffractionMix(PluginBSDF):
         super().__init__(props)
         objects = dict(props.objects())
         self.bsdfs = {name: bsdf for name, bsdf in objects.items() if isinstance(bsdf, mi.BSDF)}
-        self.weights = _weights(props, list(self.bsdfs), objects)
+        self.depths = _depths(props, self.bsdfs)
+        self.weights = {} if self.depths else _weights(props, list(self.bsdfs), objects)
         self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
-        self.parameters = [
-            weight if isinstance(weight, Bounded) else ObjectValues(_PREFIX + name, weight)
-            for name, weight in self.weights.items()
-            if weight is not None
-        ]
+        self.parameters = (
+            self.depths.parameters
+            if self.depths
+            else [
+                weight if isinstance(weight, Bounded) else ObjectValues(_PREFIX + name, weight)
+                for name, weight in self.weights.items()
+                if weight is not None
+            ]
+        )
         self.ready()
         for surface in self._held:
             if hasattr(surface, "mix"):
@@ -159,26 +168,31 @@ class DiffractionMix(PluginBSDF):
         for name, weight in self.weights.items():
             if weight is not None and not isinstance(weight, Bounded):
                 yield _texture_refusal(_PREFIX + name, weight)
-        yield self._sum_refusal()
+        yield self.depths.refusal() if self.depths else self._sum_refusal()
 
     def derive(self) -> None:
         """Collect what `dr.freeze` must know."""
-        self.freeze(self.weights.values())
+        self.freeze([self.depths.depth] if self.depths else self.weights.values())
 
     def describe(self) -> Mix:
         """Return the description of the surfaces and weights (`description.describe`)."""
-        textures = [weight for weight in self.weights.values() if isinstance(weight, mi.Texture)]
+        varying = [weight for weight in self.weights.values() if isinstance(weight, mi.Texture)]
+        textures = self.depths.textures if self.depths else varying
         return Mix(self.bsdfs, textures, lambda si: self.weights_at(si, mi.Mask(True)))
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
         weights = {_PREFIX + name: _text(weight) for name, weight in self.weights.items()}
-        return {**self.bsdfs, **weights}
+        return {**self.bsdfs, **({DEPTH: self.depths} if self.depths else weights)}
 
     # ------------------------------------------------------------------ the weights
 
     def weights_at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
+        if self.depths:
+            return [
+                dr.select(active, weight, 0.0) for weight in self.depths.at(si, mi.Mask(active))
+            ]
         explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
         rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
         weights = [rest if weight is None else weight for weight in explicit]
@@ -261,6 +275,18 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
     return dr.if_stmt((), on, lambda: typed(ask(on)), lambda: typed(otherwise))
 
 
+def _depths(props: Properties, bsdfs: dict[str, BSDF]) -> DepthWeights | None:
+    """Return the weights by depth; None without this parameter."""
+    if DEPTH not in props or DEPTH in bsdfs:
+        return None
+    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
+        if name not in (*bsdfs, DEPTH, "id"):
+            raise DiffractionError(
+                f"{name}: diffraction_mix takes no weights beside {DEPTH}; leave one out"
+            )
+    return DepthWeights(props, bsdfs)
+
+
 def _weights(
     props: Properties, names: list[str], objects: dict[str, Any]
 ) -> dict[str, Bounded | Texture | None]:
@@ -276,7 +302,7 @@ def _weights(
         if name not in (*known, *names, "id"):
             raise DiffractionError(
                 f"unknown parameter '{name}' of diffraction_mix; its surfaces are "
-                f"{', '.join(names)}, and their weights {', '.join(known)}"
+                f"{', '.join(names)}, and their weights {', '.join(known)}, or {DEPTH}"
             )
     if len(weighted) < len(names) - 1:
         missing = ", ".join(name for name in known if name not in weighted)

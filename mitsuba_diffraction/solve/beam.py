@@ -97,6 +97,7 @@ def solve_beam(
         "solver": solver_of(chosen.problem).name,
         "material": material_text(grating),
         "profile": profile.name,
+        "depth": profile.depth,
         "solver_error": chosen.error,
         "tolerance": how.tolerance,
         "directions": [[float(t), float(p)] for t in polar for p in azimuth],

@@ -85,6 +85,7 @@ def solve_block(
         "solver": solver_of(problem).name,
         "material": substance.name,
         "profile": profile.name,
+        "depth": profile.depth,
         "solver_error": chosen.error,
         "tolerance": how.tolerance,
     }

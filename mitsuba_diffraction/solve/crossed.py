@@ -120,6 +120,7 @@ def solve_crossed(
         "solver_version": importlib.metadata.version("ikarus-rcwa"),
         "material": medium.name,
         "profile": f"crossed, {np.ptp(field.heights):.3g} µm deep",
+        "depth": float(np.ptp(field.heights)),
     }
     grid = Efficiencies(lam, theta, phi, pairs, values)
     table = crossed_table(grid, (periods[0], periods[1]), "the solution", header)

@@ -163,6 +163,7 @@ def solve_orders(
     header: dict[str, Any] = {
         "material": material_text(grating),
         "profile": profile.name,
+        "depth": profile.depth,
         "solver_error": chosen.error,
         "tolerance": how.tolerance,
     }

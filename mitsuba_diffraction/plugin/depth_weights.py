@@ -1,0 +1,130 @@
+"""Weights of gratings of one profile at several depths, by a depth that varies (Dr.Jit)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+from ..tables.table import DiffractionTable
+from .arithmetic import clip
+from .description import Surface, describe
+from .parameter_changes import Bounded, Changeable, ObjectValues
+from .textures import range_of, require_raw
+from .types import BSDF, Float, Interaction, Mask, Properties, Texture
+
+#: Parameter of `diffraction_mix`, and header of a table.
+DEPTH = "depth"
+
+
+class DepthWeights:
+    """Weights that interpolate linearly over depth between surfaces of solved orders.
+
+    Raises a DiffractionError if a surface has no solved orders, its table does not say its depth,
+    two are as deep, their periods differ, or the depth lies outside of theirs.
+
+    Attributes
+    ----------
+    depth : µm, a number or a texture.
+    """
+
+    def __init__(self, props: Properties, bsdfs: Mapping[str, BSDF]) -> None:
+        self._depths = {name: _depth_of(name, bsdf) for name, bsdf in bsdfs.items()}
+        ordered = sorted(self._depths, key=lambda name: self._depths[name])
+        for one, other in itertools.pairwise(ordered):
+            if self._depths[one] == self._depths[other]:
+                raise DiffractionError(
+                    f"{DEPTH}: {one} and {other} are both {self._depths[one]:g} µm deep; leave one "
+                    "out"
+                )
+        self._ordered = ordered
+        self.ends = self._depths[ordered[0]], self._depths[ordered[-1]]
+        value = props.get(DEPTH)
+        self.depth: Bounded | Texture
+        if isinstance(value, mi.Texture):
+            require_raw(value, DEPTH, "depths, µm")
+            self.depth = value
+        else:
+            self.depth = self._bounded(value)
+
+    @property
+    def parameters(self) -> list[Changeable]:
+        """The depth, for `mi.traverse`."""
+        bounded = isinstance(self.depth, Bounded)
+        return [self.depth if bounded else ObjectValues(DEPTH, self.depth)]
+
+    @property
+    def textures(self) -> list[Texture]:
+        """The depth, if it varies."""
+        return [] if isinstance(self.depth, Bounded) else [self.depth]
+
+    def at(self, si: Interaction, active: Mask) -> list[Float]:
+        """Return the weights, in the order of the surfaces."""
+        low, high = self.ends
+        if isinstance(self.depth, Bounded):
+            depth = clip(self.depth.value, low, high)
+        else:
+            depth = clip(self.depth.eval_1(si, active), low, high)
+        steps = [
+            clip((depth - self._depths[a]) * (1.0 / (self._depths[b] - self._depths[a])), 0.0, 1.0)
+            for a, b in itertools.pairwise(self._ordered)
+        ]
+        # each step hands on from one surface to the next
+        shares = [mi.Float(1.0), *steps, mi.Float(0.0)]
+        weights = dict(
+            zip(self._ordered, (a - b for a, b in itertools.pairwise(shares)), strict=True)
+        )
+        return [weights[name] for name in self._depths]
+
+    def refusal(self) -> str | None:
+        """Reason to refuse a texture's numbers, or None."""
+        if isinstance(self.depth, Bounded) or (known := range_of(self.depth)) is None:
+            return None
+        wrong = [value for value in known if not self._holds(value)]
+        return self._message(wrong[0]) if wrong else None
+
+    def _holds(self, value: float) -> bool:
+        low, high = (float(np.float32(end)) for end in self.ends)
+        return low <= value <= high
+
+    def _message(self, value: float) -> str:
+        low, high = self.ends
+        return f"{DEPTH}={value:g} µm must be {low:g} to {high:g} µm, the depths of the surfaces"
+
+    def _bounded(self, value: Any) -> Bounded:
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = np.nan
+        if not self.ends[0] <= number <= self.ends[1]:
+            raise DiffractionError(self._message(number))
+        # bounds are of single precision, and so are values but in scalar variants
+        return Bounded(DEPTH, float(np.float32(number)), *self.ends, self._message)
+
+    def __str__(self) -> str:
+        if isinstance(self.depth, Bounded):
+            return f"{dr.slice(self.depth.value):g} µm"
+        return " ".join(str(self.depth).split())
+
+
+def _depth_of(name: str, bsdf: BSDF) -> float:
+    """Return the depth of a surface's profile, µm."""
+    described = describe(bsdf)
+    table = described.table if isinstance(described, Surface) else None
+    if table is None or isinstance(table, DiffractionTable):
+        raise DiffractionError(
+            f"{DEPTH}: {name} has no solved orders; a depth blends surfaces of type "
+            "'diffraction_orders', and weights blend any others"
+        )
+    depth = table.header.get(DEPTH)
+    if not isinstance(depth, int | float):
+        raise DiffractionError(
+            f"{DEPTH}: the table of {name} does not say how deep its profile is; solve it again, "
+            f"or set {DEPTH!r} in its header, µm"
+        )
+    return float(depth)
