@@ -6,11 +6,11 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 OrderTable         solved efficiencies of a grating's orders
-CrossedTable       those of a crossed grating, imported
+CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
-solve_crossed      those of a crossed grating
+solve_crossed      orders of a crossed grating
 read_orders        orders from a file of efficiencies
 profiles           one period of a grating's grooves
 tradeoff           accuracy against speed and memory, setting by setting

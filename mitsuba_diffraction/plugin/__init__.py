@@ -7,6 +7,7 @@ transmission    the plugin `diffraction_dielectric`, which lets light through as
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, a table with factors, orientation and power
 description     record of a surface that shaders, OSL, maps and plans read
+depth_weights   weights by the depth of solved gratings
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
 lifecycle       `PluginBSDF`, the base of all: answers, parameters and their changes, text
 nesting         `NestingBSDF`, a BSDF over a nested one

@@ -54,7 +54,7 @@ def crossed_table(
 
 
 def warn_of_gaps(table: CrossedTable, grid: Efficiencies, shown: str) -> None:
-    """Warn of azimuths that a file lacks, and of light that is not reciprocal.
+    """Warn of azimuths that a file lacks, and of light without reciprocity.
 
     Arguments as of `crossed_table`.
     """
@@ -149,7 +149,7 @@ def _filled(
     """Give orders that do not propagate the light of the nearest direction where they do.
 
     Interpolation between the two sides of a Rayleigh anomaly would halve the light on one side.
-    What is added may bring the sum of a direction to 1, no further.
+    These additions may bring the sum of a direction to 1, no further.
     """
     apart = np.linalg.norm(mirror[:, None] - mirror, axis=-1)
     lit = _open(wavelengths, mirror, _orders(last), periods)
@@ -182,7 +182,8 @@ def _nodes(filled: Real, wavelengths: Real, mirror: Real, last: tuple[int, int])
     points, first = np.unique(np.round(mirror, 9), axis=0, return_index=True)
     values = interpolated(points, along[:, first].swapaxes(0, 1), places)
     shape = (NODES, NODES, len(along), 2 * last[1] + 1, 2 * last[0] + 1)
-    return np.moveaxis(values.reshape(shape), 2, 0).astype(np.float32)
+    # weights of a triangle round to below 0 at its sides
+    return np.moveaxis(np.maximum(values.reshape(shape), 0.0), 2, 0).astype(np.float32)
 
 
 def _errors(table: CrossedTable, powers: Real, wavelengths: Real, mirror: Real) -> dict[str, float]:

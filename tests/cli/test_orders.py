@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
+
+from tests.support import crossed
 from tests.support.orders import thin_grating
 
 
@@ -73,3 +76,34 @@ def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypat
     for other in (("--superstrate", 1.3), ("--thin",), ("--layer", "1.46:0.1"), ("--theta", 10)):
         assert "not allowed with" in run("solve", "lamellar", *grating, "--block", *other).err
     assert "--import" in run("solve", "a.csv", "--import", "--period", 1, "--block").err
+
+
+def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    crossed.table().save("crossed.nc")
+    data = json.loads(run("info", "crossed.nc", "--json").out)
+    assert data["periods_um"] == list(crossed.PERIODS)
+    light = ("--theta", "0:80:20", "--phi", "0:315:45", "--step", 100)
+    listed = run("orders", "crossed.nc", *light)
+    assert "orders (-3, -4) to (3, 4)" in listed.out
+    periods = ("--period", 0.8, "--period-y", 1.1)
+    assert run("solve", "crossed.csv", "--import", *periods, "-o", "back.nc").code == 0
+    assert "does not propagate" in run("solve", "crossed.csv", "--import", "--period", 0.5).err
+    assert "polarised" in run("orders", "crossed.nc", "--polarised").err
+    maps = ("--resolution", 16, "--samples", 1, "--wavelength", 550)
+    assert run("brdf-map", "back.nc", *maps).code == 0
+    assert run("spectrum", "back.nc", "--step", 100, "--relative", "none").code == 0
+    for command in ("export-shader", "export-osl"):
+        assert "crossed grating" in run(command, "back.nc").err
+
+
+def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("flat.npy", np.zeros((4, 4)))
+    flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500,500", "--resolution", 4)
+    solved = run("solve", "flat.npy", *flags, "-o", "flat.nc")
+    assert "orders to (0, 0)" in solved.out
+    assert run("solve", "flat.npy", "--crossed").err.count("--period") > 0
+    assert "not allowed with --crossed" in run("solve", "flat.npy", *flags, "--polarised").err
+    assert "not square" in run("solve", "flat.npy", *flags, "--period-y", 0.3).err
+    assert "one-dimensional" in run("solve", "flat.npy", "--period", 0.2).err

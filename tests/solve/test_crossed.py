@@ -9,7 +9,6 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.solve.crossed import Cell, _mirrors, _reduced, reflected
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.jobs import processes
 from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import Profile
 from mitsuba_diffraction.solve.stations import Grating
@@ -71,21 +70,6 @@ def test_mirror_planes_give_the_light_of_mirrored_directions():
         direct = reflected(cell, (40.0, phi), np.array([LAM]), (1, 1))
         mirrored = reflected(cell, light, np.array([LAM]), (1, 1))[:, :: flips[1], :: flips[0]]
         assert mirrored == pytest.approx(direct, rel=1e-4, abs=1e-9)
-
-
-@pytest.mark.thorough
-def test_a_table_of_bumps_says_its_errors():
-    heights = 0.021 * (np.cos(2 * np.pi * X) + np.cos(2 * np.pi * Y))
-    with processes(2) as executor:
-        table = md.solve_crossed(
-            HeightField(heights, 0.55 / PIXELS), 1.5, wavelengths=(500.0, 540.0), step=20.0,
-            theta_step=30.0, phi_step=45.0, harmonics=2, slices=2, executor=executor,
-        )  # fmt: skip
-    assert table.last_orders == (2, 2)
-    assert 0.0 < table.header["error_mean"] < 0.3  # coarse steps
-    assert table.header["solver_error"] < 0.2
-    normal = table.efficiency(0.0, 0.0, 520.0, [1, 0, -1, 0], [0, 1, 0, -1])
-    assert normal == pytest.approx(normal[0], rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Films, layers beneath a profile, blocks and crossed gratings, beside closed forms and other solvers."""
+"""Films, layers beneath, blocks and crossed gratings, beside closed forms and other solvers."""
 
 from __future__ import annotations
 

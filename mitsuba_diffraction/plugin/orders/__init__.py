@@ -8,6 +8,7 @@ orders_block        `OrdersBlock`: a block's face, in light from both sides; and
 grating_parameters  parameters of the plugin, read from Mitsuba's Properties and checked
 order_lookup        a table of orders inside a kernel
 block_lookup        a block's table inside a kernel
+crossed_lobes       the same of crossed gratings, with their look-up
 polarised_lobes     Mueller matrices in polarised variants
 lobes               light of all orders in a variant's channels, and directions drawn by it
 """

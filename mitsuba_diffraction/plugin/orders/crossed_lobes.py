@@ -179,7 +179,7 @@ class CrossedDaylightLobes(DaylightLobes):
         self._periods = window.periods
 
     def others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
-        """See `DaylightLobes.others`: order by order, each at the wavelength of its largest value.
+        """See `DaylightLobes.others`: order by order, each where it is largest.
 
         With q_m = 2π (m_x/d_x, m_y/d_y): k_m = q_m·(u, v)/ρ², and the lobe is smaller by
         exp(−σ² (q_m × (u, v))²/ρ²).

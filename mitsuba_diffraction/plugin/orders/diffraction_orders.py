@@ -6,12 +6,12 @@ For steep grooves, most of all of metal: a CD, a blazed grating, an embossed hol
 The grating
 -----------
 table : string
-    File of `mitsuba-diffraction solve`, or of `OrderTable.save`.
-data : OrderTable
+    File of `mitsuba-diffraction solve`, or of `save` of a table.
+data : OrderTable or CrossedTable
     Instead: a table, in dictionaries only, by `md.bsdf_dict`.
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm, over which light is coherent, at least 2 periods. It
-    sets the width of the orders' lobes. `auto` is 65 (sunlight).
+    4σ of the Gaussian amplitude window, µm, over which light is coherent, at least 2 periods (the
+    longer ones). It sets the width of the orders' lobes. `auto` is 65 (sunlight).
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the direction in which the profile repeats, as of
     `diffraction`.
@@ -24,6 +24,8 @@ wavelength : float [550]
 The model is a sum of lobes, one for each order m, of the efficiency η_m of the table:
 
     f = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²),   q = k (u, v),   q_m = (2πm/d, 0)
+
+with q_m = 2π (m_x/d_x, m_y/d_y) of crossed gratings.
 
 The table's clear layer (superstrate) is a coat with a flat face: a mirror of the same coherence
 width. Light that the face sends back to the grating is summed over all orders and reflections, in

@@ -26,7 +26,7 @@ from .table import LARGEST_SUM, MOST_NUMBERS, PERIODS, WAVELENGTHS, reach_of
 
 #: Nodes along each axis of the directions, and along wavelengths at most.
 NODES, MOST_WAVELENGTHS = 25, 64
-#: Attribute that tells these tables from those of grooves.
+#: Attribute that tells these tables from tables of grooves.
 CROSSED_ATTRIBUTE = "crossed"
 _STEP = 1.0 / 30_000.0  # of packed efficiencies, as in `file`
 
@@ -70,7 +70,7 @@ class CrossedTable:
     values: NDArray[np.float32]
     header: Mapping[str, Any] = field(default_factory=dict)
 
-    # what an OrderTable may have, and these tables have not
+    # features of an OrderTable that these tables lack
     superstrate: ClassVar[float] = 1.0
     thin: ClassVar[bool] = False
     block: ClassVar[float | None] = None
