@@ -88,7 +88,8 @@ def solve_crossed(
     periods = field.extent
     last = most_orders(periods, wavelengths)
     medium = material_of(material, wavelengths)
-    lam = np.linspace(*wavelengths, max(round((wavelengths[1] - wavelengths[0]) / step), 1) + 1)
+    spread = wavelengths[1] - wavelengths[0]
+    lam = np.linspace(*wavelengths, max(round(spread / step), 1) + 1 if spread else 1)
     index = medium.index(lam)
     if index is None:
         raise DiffractionError("crossed gratings of perfect conductors are not solved; give Al")

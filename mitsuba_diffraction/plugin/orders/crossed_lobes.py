@@ -92,7 +92,7 @@ class CrossedLookup:
     def total(self, row: CrossedRow, active: Mask = True) -> Float:
         """Return the sum of all orders in the table, of some that do not propagate as well.
 
-        They may be drawn, and are no valid direction then.
+        Where one of these is drawn, the sample is invalid.
         """
         return self._between(row, mi.UInt32(self.count), active) * RAISED
 

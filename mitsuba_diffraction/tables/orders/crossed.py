@@ -52,8 +52,8 @@ class CrossedTable:
     components x and y of the mirror direction of the incident light. Order (m_x, m_y) leaves at
     x + m_x λ/d_x, y + m_y λ/d_y.
 
-    Raises a DiffractionError if the shape does not fit, or numbers are no efficiencies: negative,
-    not finite, or of a sum over orders above 1.001.
+    Raises a DiffractionError if the shape does not fit, or numbers are negative, not finite, or sum
+    over orders to above 1.001.
 
     Attributes
     ----------
