@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..tables.energy.conservation import Energy, Surface
-from ..tables.energy.materials import Dielectric, Reflector
+from ..tables.energy.conserved import Dielectric, Reflector
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.

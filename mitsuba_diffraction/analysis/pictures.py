@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..heights.field import HeightField
 from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
 from ..tables.energy.conservation import Conservation, Surface
-from ..tables.energy.materials import Reflector
+from ..tables.energy.conserved import Reflector
 from ..tables.table import DiffractionTable
 
 RED, GREEN, BLUE = 650.0, 550.0, 450.0  # nm

@@ -22,7 +22,7 @@ stack           a stack of layers on the structure: its file and its table
 support         features that go together, declared by each choice of a scene
 meshes          arrays of Mitsuba's meshes, of 3.9 and 3.10
 properties      words, flags and numbers from them, refused by name; what elements are called
-materials       material, coat and film
+layer_parameters  material, coat and film
 pigment         pigment beneath a structure, of a colour or a measured spectrum
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         table of a scene's heights, recipe or file, built once

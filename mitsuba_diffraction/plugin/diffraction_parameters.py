@@ -15,8 +15,8 @@ from . import support
 from .boundary import Boundary, boundary_of
 from .directions import SHADOWINGS
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
+from .layer_parameters import coat_of, film_of, material_of, stack_of, warn_of_film
 from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
-from .materials import coat_of, film_of, material_of, stack_of, warn_of_film
 from .properties import choice, class_of, number
 from .second_order import SecondOrder, ratios_of_second_order
 from .sources import TableProvider

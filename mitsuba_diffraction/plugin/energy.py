@@ -21,7 +21,7 @@ from ..optics.mean_second_order import limited
 from ..optics.stack import Stacked
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy.conservation import Conservation, Energy
-from ..tables.energy.materials import Reflector
+from ..tables.energy.conserved import Reflector
 from ..tables.film import exponents_at, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary

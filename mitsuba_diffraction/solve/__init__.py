@@ -12,7 +12,7 @@ measured_crossed  the same of crossed gratings
 efficiencies  files of efficiencies, CSV and NetCDF, and their conventions
 listing     `list_orders`: a table's efficiencies as such a file
 profiles    one period of the grooves as a polygon; generators and a reader
-materials   refractive index over wavelength, by name or number
+grating_index  refractive index over wavelength, by name or number
 structure   films on a profile, slices beneath it, and the substrate
 films       their reader and checks
 stations    sets of directions with one system matrix

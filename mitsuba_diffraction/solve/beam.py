@@ -20,8 +20,8 @@ from ..tables.orders.polarised import mueller_of
 from ..tables.orders.table import check_outline
 from .efficiencies import Efficiencies, check_light
 from .films import Layers, Substance, material_text, structure_of
+from .grating_index import Material, material_of
 from .jobs import Jobs, problem_of, solver_of
-from .materials import Material, material_of
 from .measured import table_of
 from .nodes import Place
 from .orders import MOST_EXCESS, Estimate, Settings, announce_stage, silent

@@ -17,8 +17,8 @@ from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.blocks import even_nodes, factors
 from ..tables.orders.table import Counts, check_outline
 from .accuracy import SAMPLES, Measured, diffuse_light, powers
+from .grating_index import Material, material_of
 from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
-from .materials import Material, material_of
 from .nodes import Place
 from .orders import REFINEMENTS, Estimate, Settings, announce_stage, refuse_or_warn, silent
 from .profiles import Profile

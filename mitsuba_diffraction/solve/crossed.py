@@ -21,7 +21,7 @@ from ..progress import Progress, silent
 from ..tables.orders import CrossedTable
 from ..tables.orders.crossed import most_orders
 from .efficiencies import Efficiencies
-from .materials import Material, material_of
+from .grating_index import Material, material_of
 from .measured_crossed import crossed_table
 from .stations import Real
 

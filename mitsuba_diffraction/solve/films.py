@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import count_between, number_between
-from .materials import Material, material_of
+from .grating_index import Material, material_of
 from .profiles import Profile
 from .stations import Grating
 from .structure import Film, Part, Slice, Structure

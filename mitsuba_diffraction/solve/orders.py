@@ -17,8 +17,8 @@ from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import MOST_NODES, Counts, check_outline
 from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
 from .films import Layers, Substance, material_text, structure_of
+from .grating_index import Material, material_of
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
-from .materials import Material, material_of
 from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
 from .profiles import Profile
 from .resolution import (

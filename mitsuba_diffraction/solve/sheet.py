@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..optics import fresnel
-from .materials import Material
+from .grating_index import Material
 from .stations import Complex, Real, Station
 
 #: Least index of a thin sheet: orders of light that goes through depend on n − 1.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..tables.orders import cells
-from .materials import Material
+from .grating_index import Material
 from .profiles import Profile
 from .structure import Structure
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .materials import Material
+from .grating_index import Material
 
 
 class Film(NamedTuple):

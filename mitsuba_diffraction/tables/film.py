@@ -11,7 +11,7 @@ from ..optics.blend import RoughnessTable
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
 from .directional import FINE, DirectionalTable, DirectionGrid, Real
-from .energy.materials import PROBES, Index, Reflector, rounded
+from .energy.conserved import PROBES, Index, Reflector, rounded
 from .energy.scaling import parallel
 from .energy.settings import energy_settings
 from .store import DirectionalTables, cached_directions

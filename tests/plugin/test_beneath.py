@@ -10,7 +10,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Energy
-from mitsuba_diffraction.tables.energy.materials import Reflector
+from mitsuba_diffraction.tables.energy.conserved import Reflector
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import evaluated, interaction, lanes, spectra, vectors

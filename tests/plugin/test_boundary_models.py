@@ -10,8 +10,8 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics import boundary, through
 from mitsuba_diffraction.optics.blend import RoughnessTable
 from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.energy.conserved import Dielectric
 from mitsuba_diffraction.tables.energy.gain import Gain
-from mitsuba_diffraction.tables.energy.materials import Dielectric
 from tests.support.directions import polar
 
 FLAT = md.HeightField(np.zeros((4, 4)), 0.2)

@@ -28,14 +28,14 @@ from mitsuba_diffraction.plugin.description import (
 )
 from mitsuba_diffraction.realtime.glsl.export import SHADER
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
-from mitsuba_diffraction.realtime.glsl.materials import (
+from mitsuba_diffraction.realtime.glsl.methods import CONSUMERS
+from mitsuba_diffraction.realtime.glsl.shader_materials import (
     GLSL,
     pack_conservation,
     pack_surface,
     packed_by,
 )
-from mitsuba_diffraction.realtime.glsl.materials import Material as Drawn
-from mitsuba_diffraction.realtime.glsl.methods import CONSUMERS
+from mitsuba_diffraction.realtime.glsl.shader_materials import Material as Drawn
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH

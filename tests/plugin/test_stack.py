@@ -13,7 +13,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.stack import amplitudes, mean_powers
 from mitsuba_diffraction.plugin.description import Feature, describe
 from mitsuba_diffraction.plugin.stack import read_layers
-from mitsuba_diffraction.realtime.glsl.materials import GLSL
+from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL
 from tests.support.variants import obstacle
 
 pytestmark = pytest.mark.thorough

@@ -11,7 +11,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.beam import solve_beam
-from mitsuba_diffraction.solve.materials import material_of
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.orders import Settings
 from mitsuba_diffraction.solve.profiles import lamellar, sinusoidal
 

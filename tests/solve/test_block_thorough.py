@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.solve.block import solve_block
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings
 from mitsuba_diffraction.solve.profiles import sinusoidal
 from mitsuba_diffraction.solve.stations import Grating

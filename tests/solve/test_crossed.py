@@ -8,8 +8,8 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.solve.crossed import Cell, _mirrors, _reduced, reflected
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import Profile
 from mitsuba_diffraction.solve.stations import Grating
 from mitsuba_diffraction.tables.orders import cells

@@ -11,8 +11,8 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.solve.chandezon import Chandezon
 from mitsuba_diffraction.solve.coupled import CoupledWaves
 from mitsuba_diffraction.solve.films import structure_of
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.jobs import problem_of
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating, reversed_light
 

@@ -11,8 +11,8 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.solve import orders
 from mitsuba_diffraction.solve.accuracy import measured_error
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.jobs import Jobs, problem_of
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.nodes import count_for
 from mitsuba_diffraction.solve.orders import Settings, solve_orders
 from mitsuba_diffraction.solve.profiles import Profile, lamellar, polygon, read_profile, sinusoidal

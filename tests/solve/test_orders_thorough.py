@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.jobs import Jobs, problem_of, processes, solve_place
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.nodes import Place
 from mitsuba_diffraction.solve.orders import Settings, solve_orders
 from mitsuba_diffraction.solve.profiles import sinusoidal

@@ -11,8 +11,8 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.reference.through import flat_transmittances
 from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings, solve_orders
 from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.solve.sheet import sheet_efficiencies

@@ -8,8 +8,8 @@ import pytest
 from mitsuba_diffraction.reference.boundary import turn
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating, reversed_light
 from mitsuba_diffraction.tables.orders import cells

@@ -15,8 +15,8 @@ import numpy as np
 
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import Profile, sinusoidal
 from mitsuba_diffraction.solve.sheet import sheet_efficiencies
 from mitsuba_diffraction.solve.stations import Grating

@@ -13,8 +13,8 @@ from docs.make.validation.published import light_of
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.solve.chandezon import Chandezon
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.profiles import Profile
 from mitsuba_diffraction.solve.stations import Solver, Station
 

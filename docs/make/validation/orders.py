@@ -20,8 +20,8 @@ from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.solve.chandezon import Chandezon
 from mitsuba_diffraction.solve.coupled import CoupledWaves
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.solve.stations import Grating, Solver, Station
 from mitsuba_diffraction.tables.orders import cells

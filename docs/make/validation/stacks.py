@@ -12,9 +12,9 @@ from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.solve.block import solve_block
 from mitsuba_diffraction.solve.crossed import Cell, reflected
 from mitsuba_diffraction.solve.films import structure_of
+from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.jobs import AUTO, problem_of, solver_of
-from mitsuba_diffraction.solve.materials import material_of
 from mitsuba_diffraction.solve.orders import Settings
 from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
 from mitsuba_diffraction.solve.stations import Grating

@@ -11,7 +11,7 @@ from ...optics import through
 from ...settings import SURFACE
 from ..boundary import Boundary, boundary_of
 from ..fresnel import Dielectric
-from ..materials import AIR, KERATIN
+from ..layer_parameters import AIR, KERATIN
 from ..properties import choice, class_of, flag
 from ..sources import TableProvider
 from ..support import TRANSMISSION, check_combination

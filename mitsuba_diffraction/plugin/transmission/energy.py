@@ -9,8 +9,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ...errors import DiffractionError
-from ...tables.energy import materials
 from ...tables.energy.conservation import Energy
+from ...tables.energy.conserved import Dielectric as ConservedDielectric
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, at_horizon, scales_of
 from ..directions import PatchFrame
@@ -62,7 +62,7 @@ class DielectricEnergy:
     def update(self, factors: ScaleRange) -> None:
         """Look up, or compute, c and s at other factors or another index: `EnergyModel.update`."""
         index = float(rounded_index(plain(self._material.eta), INDEX_STEP))
-        dielectric = materials.Dielectric(index, self._model, self._thin)
+        dielectric = ConservedDielectric(index, self._model, self._thin)
         wavelengths = factors.wavelengths(self._range)
         energy = Energy(self._table, dielectric, wavelengths, factors.least)
         nodes = factors.nodes(energy)

@@ -5,7 +5,7 @@ Contents
 Renderer       draw a Mitsuba scene by shaders, without a window (in `renderer`)
 export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
-materials      BSDFs, and the gloss of plain ones
+shader_materials  BSDFs, and the gloss of plain ones
 modelled       surfaces of `diffraction`: constants, energy conservation, tables
 solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
 lobes          directions drawn from lobes, and their densities

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from .lights import Light
+from .lights import Lamp
 
 Array = NDArray[np.float64]
 
@@ -177,7 +177,7 @@ class Orbit:
         return moved
 
 
-def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
+def dragged(light: Lamp, orbit: Orbit, right: float, up: float) -> Lamp:
     """Turn a light around the orbit's centre by angles in rad, as seen from the camera."""
     rotation = rotation_about(orbit.to_world[:3, 1], right)
     rotation = rotation_about(-orbit.to_world[:3, 0], -up) @ rotation

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.properties import name_of
 from .lights import (
-    Light,
+    Lamp,
     area_of,
     sampled_directions,
     sampled_positions,
@@ -84,7 +84,7 @@ class Emitters:
         # (n,) probability of each emitter with light
         self.probabilities = (1.0 - _EVEN) * shares + _EVEN / len(shares)
 
-    def lights(self) -> Iterator[Light]:
+    def lights(self) -> Iterator[Lamp]:
         """Yield lights without end; their mean converges to all direct light of the scene."""
         below = np.cumsum(self.probabilities)
         drawn = [0] * len(self._sequences)
@@ -109,7 +109,7 @@ class Emitters:
         shares = [s.looked_up() if s.draws_from(emitter) else 0.0 for s in self._sequences]
         return float(self.probabilities @ np.array(shares))
 
-    def _features(self, light: Light) -> Array:
+    def _features(self, light: Lamp) -> Array:
         """Return the light's irradiance in the middle by colour and spherical harmonics, (27,)."""
         direction = light.place[:3] - light.place[3] * self._middle
         x, y, z = direction / max(float(np.linalg.norm(direction)), 1e-12)
@@ -135,7 +135,7 @@ class _LightSequence:
     def __init__(self, emitter: Any, middle: Array, environment: Environment | None) -> None:
         self._emitter, self._middle, self._environment = emitter, middle, environment
         self._fixed = without_extent(emitter, middle)
-        self._blocks: dict[int, list[Light]] = {}
+        self._blocks: dict[int, list[Lamp]] = {}
         self.kind = "fixed" if self._fixed is not None else _emitter_kind(emitter)
 
     def draws_from(self, emitter: Any) -> bool:
@@ -146,7 +146,7 @@ class _LightSequence:
         """Return the share of lights that lobes look up, too."""
         return float(np.mean([self.light(number).density != 0.0 for number in range(_BLOCK)]))
 
-    def light(self, number: int) -> Light:
+    def light(self, number: int) -> Lamp:
         """Return a light of the sequence by its number."""
         if self._fixed is not None:
             return self._fixed
@@ -165,7 +165,7 @@ class _LightSequence:
             irradiances.append(max(float(light.colour.sum()), 0.0) / square)
         return float(np.mean(irradiances))
 
-    def _block(self, start: int) -> list[Light]:
+    def _block(self, start: int) -> list[Lamp]:
         """Draw a block of lights from number `start` on."""
         name = name_of(self._emitter)
         if self.kind == "area":
@@ -179,7 +179,7 @@ class _LightSequence:
             points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
             address = 0
         return [
-            Light(
+            Lamp(
                 name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
                 density=float(density), shape=address,
             )
@@ -238,7 +238,7 @@ def _emitter_kind(emitter: Any) -> str:
     return "environment" if emitter.is_environment() else ""
 
 
-def _colour_at(light: Light, middle: Array) -> Array:
+def _colour_at(light: Lamp, middle: Array) -> Array:
     """Return the irradiance of a light in the middle, linear sRGB (3,)."""
     if light.place[3] == 0.0:
         return light.colour
@@ -247,7 +247,7 @@ def _colour_at(light: Light, middle: Array) -> Array:
     return np.asarray(light.colour * (emission(light, away / square**0.5) / square))
 
 
-def emission(light: Light, direction: Array) -> float:
+def emission(light: Lamp, direction: Array) -> float:
     """Return the share of its intensity that a light sends along a unit vector."""
     if not light.axis.any():
         return 1.0

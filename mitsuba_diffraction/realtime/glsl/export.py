@@ -18,10 +18,17 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Surface
 from .maps import Map
-from .materials import GLSL, Diffracting, Material, pack_conservation, pack_surface, packed_by
 from .methods import CONSUMERS
 from .packing import pack_responses
 from .rewriting import global_names, pruned, renamed, resolved, shader_file
+from .shader_materials import (
+    GLSL,
+    Diffracting,
+    Material,
+    pack_conservation,
+    pack_surface,
+    packed_by,
+)
 from .source import method_files, part
 from .texels import PAGE, Packed, Texture, plain
 

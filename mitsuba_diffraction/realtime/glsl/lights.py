@@ -21,7 +21,7 @@ _SUN_COSINE = float(np.cos(np.radians(0.6)))  # the sun's disc has a radius of 0
 
 
 @dataclass(frozen=True)
-class Light:
+class Lamp:
     """Light without extent: a direction, a point, a spot, or a point on an area light."""
 
     name: str  # name in messages
@@ -50,7 +50,7 @@ class Light:
 class Lighting:
     """All light of a scene, and the emitters that are simplified or left out."""
 
-    lights: list[Light] = field(default_factory=list)  # without extent
+    lights: list[Lamp] = field(default_factory=list)  # without extent
     # (4, 3) linear sRGB: a plane of normal n gets the irradiance π (sky[0] + Σᵢ nᵢ sky[1 + i])
     sky: Array = field(default_factory=lambda: np.zeros((4, 3)))
     omissions: list[str] = field(default_factory=list)  # in a few words each
@@ -112,7 +112,7 @@ def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
         mean = _mean_sample(emitter, middle, _SAMPLES)
         place = np.append(middle + mean.direction * mean.distance, 1.0)
         intensity = mean.spectrum * mean.distance**2
-        lighting.lights.append(Light(name, place, mean.wavelengths, intensity))
+        lighting.lights.append(Lamp(name, place, mean.wavelengths, intensity))
         lighting.omissions.append(f"the extent of {name} (area light, shown as a point)")
     elif kind == "ConstantBackgroundEmitter":
         lighting.sky = lighting.sky + _sky(emitter, middle)
@@ -121,7 +121,7 @@ def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
         mean = _mean_sample(emitter, middle, 4 * _SAMPLES, sun)
         if mean.spectrum.any():
             place = np.append(sun, 0.0)
-            lighting.lights.append(Light(f"sun of {name}", place, mean.wavelengths, mean.spectrum))
+            lighting.lights.append(Lamp(f"sun of {name}", place, mean.wavelengths, mean.spectrum))
         lighting.sky = lighting.sky + _sky(emitter, middle, sun)
         lighting.omissions.append(
             f"the sun's disc and the sky of {name} (a direction, and a smooth sky)"
@@ -133,18 +133,18 @@ def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
         lighting.omissions.append(f"{name} ({kind})")
 
 
-def without_extent(emitter: Any, middle: Array) -> Light | None:
+def without_extent(emitter: Any, middle: Array) -> Lamp | None:
     """Return a directional, point or spot emitter as a light; None for other kinds."""
     import mitsuba as mi
 
     kind, parameters, name = emitter.class_name(), mi.traverse(emitter), name_of(emitter)
     if kind == "DirectionalEmitter":
         mean = _mean_sample(emitter, middle, 1)
-        return Light(name, np.append(mean.direction, 0.0), mean.wavelengths, mean.spectrum)
+        return Lamp(name, np.append(mean.direction, 0.0), mean.wavelengths, mean.spectrum)
     if kind == "PointLight":
         position = np.array(parameters["position"], float).ravel()
         mean = _mean_sample(emitter, position + np.array([0.0, 0.0, 1.0]), 1)
-        return Light(name, np.append(position, 1.0), mean.wavelengths, mean.spectrum)
+        return Lamp(name, np.append(position, 1.0), mean.wavelengths, mean.spectrum)
     if kind == "SpotLight":
         to_world = np.array(parameters["to_world"].matrix, float).reshape(4, 4)
         position, axis = to_world[:3, 3], to_world[:3, 2] / np.linalg.norm(to_world[:3, 2])
@@ -152,7 +152,7 @@ def without_extent(emitter: Any, middle: Array) -> Light | None:
         angles = (float(np.array(parameters[n]).ravel()[0]) for n in ("cutoff_angle", "beam_width"))
         cutoff, beam = (float(np.radians(angle)) for angle in angles)
         place = np.append(position, 1.0)
-        return Light(name, place, mean.wavelengths, mean.spectrum, axis, (cutoff, beam))
+        return Lamp(name, place, mean.wavelengths, mean.spectrum, axis, (cutoff, beam))
     return None
 
 
@@ -342,7 +342,7 @@ class _Lanes:
         return relative[:, :, None], self._waves
 
 
-def _irradiance(light: Light, point: Array) -> float:
+def _irradiance(light: Lamp, point: Array) -> float:
     """Return the irradiance of a light at a point, summed over the colours."""
     distance = float(np.linalg.norm(light.place[:3] - point)) if light.place[3] else 1.0
     return float(light.colour.sum()) / distance**2

@@ -18,9 +18,9 @@ from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method
 from .context import Bindings, compile_program
-from .materials import GLSL, Diffracting
 from .packing import area_factor
 from .scene import VERTEX, RealtimeScene
+from .shader_materials import GLSL, Diffracting
 from .source import METHODS, THESIS_METHODS
 from .texels import Packed, Uniform, as_half, listed, texels
 

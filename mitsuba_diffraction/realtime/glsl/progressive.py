@@ -23,7 +23,7 @@ from .bounces import pack_bounces
 from .camera import Camera
 from .context import Bindings, Target, compile_plain, set_uniforms
 from .emitters import Emitters
-from .lights import Light, light_definitions
+from .lights import Lamp, light_definitions
 from .methods import vertex_array
 from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
@@ -38,8 +38,8 @@ Array = NDArray[np.float64]
 # ratio, (1 + √5)/2, are the most even, which matters most for lobes
 _STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5, 19.0**0.5]) % 1.0
 
-#: Light of frames that look up the surroundings: spectra of daylight, to be multiplied by colours.
-_WHITE = Light("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
+#: Lamp of frames that look up the surroundings: spectra of daylight, to be multiplied by colours.
+_WHITE = Lamp("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
 
 
 class Drawing(Protocol):
@@ -207,7 +207,7 @@ class ProgressiveLight:
 
     def __init__(
         self, renderer: Drawing, method: str, camera: Camera, stage: Stage, *,
-        lights: Sequence[Light] = (), shadow_size: int = SIZE, bounces: bool = False,
+        lights: Sequence[Lamp] = (), shadow_size: int = SIZE, bounces: bool = False,
     ) -> None:  # fmt: skip
         self._renderer, self._method, self._camera = renderer, method, camera
         self._stage = stage
@@ -222,7 +222,7 @@ class ProgressiveLight:
         self._frame = renderer.target(width, height)
         self._sums = [renderer.target(width, height) for _ in range(2)]  # one per kind of frame
         self._counts = [0, 0]
-        self._lights: Iterator[Light] = iter(())
+        self._lights: Iterator[Lamp] = iter(())
         self.restart(camera)
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
@@ -270,7 +270,7 @@ class ProgressiveLight:
             self._accumulate(self._sums[kind])
             self._counts[kind] += 1
 
-    def _light(self, light: Light, camera: Camera, shift: Array) -> None:
+    def _light(self, light: Lamp, camera: Camera, shift: Array) -> None:
         """Draw one light with its shadows."""
         if not len(self._visible.places):
             return

@@ -21,12 +21,12 @@ from .context import (
     headless_context,
     set_uniforms,
 )
-from .lights import Light, light_definitions
-from .materials import pack_conservation, pack_emission, pack_relief, pack_surface
+from .lights import Lamp, light_definitions
 from .methods import Prepared, window
 from .packing import pack_energy, pack_responses
 from .progressive import Extra, ProgressiveLight, Stage
 from .scene import RealtimeScene, load, read_scene
+from .shader_materials import pack_conservation, pack_emission, pack_relief, pack_surface
 from .shadows import SIZE
 from .source import LIGHTS
 from .texels import Uniform
@@ -64,7 +64,7 @@ class Renderer:
         self._warn([o for o in self.scene.omissions if o not in self.scene.of_light])
         self._of_light = list(self.scene.of_light)
         self.camera = self.scene.camera
-        self.lights: list[Light] = list(self.scene.lighting.lights)
+        self.lights: list[Lamp] = list(self.scene.lighting.lights)
         self.sky = self.scene.lighting.sky
         self._own_context = context is None
         self.context = headless_context() if context is None else context
@@ -181,7 +181,7 @@ class Renderer:
         *,
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,
-        lights: Sequence[Light] = (),
+        lights: Sequence[Lamp] = (),
         shadow_size: int = SIZE,
         bounces: bool = False,
     ) -> ProgressiveLight:
@@ -217,7 +217,7 @@ class Renderer:
         frame: Any,
         method: str,
         camera: Camera,
-        lights: Sequence[Light],
+        lights: Sequence[Lamp],
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
         extras: Sequence[Extra] | None = None,
@@ -311,7 +311,7 @@ class Renderer:
             )
         return self._methods[method]
 
-    def use_responses(self, program: Any, unit: int, lights: Sequence[Light] | None = None) -> None:
+    def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:
         """Bind the lights' spectra, and upload them if the lights have changed."""
         if "responses" not in program:
             return

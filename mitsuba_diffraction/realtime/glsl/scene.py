@@ -19,7 +19,7 @@ from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .materials import Diffracting, Material, diffracts, read_materials
+from .shader_materials import Diffracting, Material, diffracts, read_materials
 from .source import LIGHTS
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...extras import optional
 from .camera import Camera, box_corners
 from .context import Target, compile_plain, set_uniforms
-from .lights import Light
+from .lights import Lamp
 from .methods import vertex_array
 from .scene import Surface
 from .texels import Uniform
@@ -81,7 +81,7 @@ class Solid:
         """Return whether a point lies in the surface's box."""
         return bool(np.all((place >= self.low) & (place <= self.high)))
 
-    def hides_nothing(self, light: Light) -> bool:
+    def hides_nothing(self, light: Lamp) -> bool:
         """Return whether the scene and the light lie on one side of the surface."""
         return self.plane is not None and float(self.plane @ light.place) > 0.0
 
@@ -127,7 +127,7 @@ class Casters:
         for array in self._arrays:
             array.render(moderngl.TRIANGLES)
 
-    def draw_map(self, matrix: Array, light: Light, visible: Visible) -> list[float]:
+    def draw_map(self, matrix: Array, light: Lamp, visible: Visible) -> list[float]:
         """Draw a shadow map into the current framebuffer.
 
         Returns the depth bias of each surface in texels.
@@ -183,7 +183,7 @@ def outline(places: Array) -> Array:
         return np.unique(places, axis=0)
 
 
-def _needed(solid: Solid, light: Light, from_outside: bool) -> str:
+def _needed(solid: Solid, light: Lamp, from_outside: bool) -> str:
     """Return the triangles that a map needs: "all", those facing "away" from the light, "none"."""
     if solid.hides_nothing(light):
         return "none"
@@ -247,7 +247,7 @@ class ShadowMap:
         self._frame = context.framebuffer(depth_attachment=self.texture)
 
     def draw(
-        self, light: Light, visible: Visible, shift: tuple[float, float]
+        self, light: Lamp, visible: Visible, shift: tuple[float, float]
     ) -> tuple[dict[str, Uniform], list[dict[str, Uniform]]]:
         """Draw the map of a light, and return uniforms of shaders/shadow.glsl.
 

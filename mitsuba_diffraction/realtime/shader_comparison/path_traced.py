@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...optics.colour import daylight
 from ...plugin.memory import upload
 from ..glsl.camera import Camera
-from ..glsl.lights import Light
+from ..glsl.lights import Lamp
 from .measures import Visibility
 
 _RAYS = 4  # rays along either side of a pixel in `visibility`
@@ -39,7 +39,7 @@ def direct_light(scene: Any, camera: Camera) -> Any:
     return mi.load_dict(parts)
 
 
-def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
+def with_lights(scene: Any, camera: Camera, lights: Sequence[Lamp]) -> Any:
     """Return the scene's shapes under these lights alone, whose light is reflected once.
 
     Shapes that emit light are left out: their light is among `lights`. The result has one sensor,
@@ -90,7 +90,7 @@ def box_sensor(camera: Camera) -> Any:
     )  # fmt: skip
 
 
-def _emitter(light: Light) -> dict[str, Any]:
+def _emitter(light: Lamp) -> dict[str, Any]:
     """Return the Mitsuba emitter of a light."""
     place = np.asarray(light.place, float)
     if place[3] == 0.0:
@@ -100,7 +100,7 @@ def _emitter(light: Light) -> dict[str, Any]:
     return {"type": "point", "position": position, "intensity": _spectrum(light)}
 
 
-def _spectrum(light: Light) -> dict[str, Any]:
+def _spectrum(light: Lamp) -> dict[str, Any]:
     """Return the Mitsuba spectrum of a light, in the current variant."""
     import mitsuba as mi
 
@@ -114,7 +114,7 @@ def _spectrum(light: Light) -> dict[str, Any]:
     }
 
 
-def visibility(scene: Any, lights: Sequence[Light]) -> Visibility:
+def visibility(scene: Any, lights: Sequence[Lamp]) -> Visibility:
     """Trace a grid of rays in each pixel of a scene of `with_lights`."""
     import drjit as dr
     import mitsuba as mi
@@ -147,7 +147,7 @@ def visibility(scene: Any, lights: Sequence[Light]) -> Visibility:
     return Visibility(np.where(same, first, -2), lit)
 
 
-def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
+def _lit(scene: Any, si: Any, lights: Sequence[Lamp]) -> NDArray[np.bool_]:
     """Return whether every light above the surface reaches it, and at least one is above it."""
     import mitsuba as mi
 
@@ -173,7 +173,7 @@ class PathTracing:
     spp : samples per pixel in all passes.
     """
 
-    def __init__(self, scene: Any, camera: Camera, lights: Sequence[Light], spp: int = 64) -> None:
+    def __init__(self, scene: Any, camera: Camera, lights: Sequence[Lamp], spp: int = 64) -> None:
         self._scene = with_lights(scene, camera, lights)
         self.spp, self.done = spp, 0
         self._sum: NDArray[np.float64] = np.zeros((camera.size[1], camera.size[0], 3))

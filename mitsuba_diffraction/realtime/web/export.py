@@ -21,7 +21,9 @@ from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
 from ...progress import Progress, silent
 from ..glsl.emitters import Emitters
-from ..glsl.materials import (
+from ..glsl.methods import CONSUMERS
+from ..glsl.scene import RealtimeScene, Surface, load, read_scene
+from ..glsl.shader_materials import (
     Diffracting,
     Material,
     pack_conservation,
@@ -29,13 +31,11 @@ from ..glsl.materials import (
     pack_relief,
     pack_surface,
 )
-from ..glsl.methods import CONSUMERS
-from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
 from ..glsl.texels import Packed
 from .header import Header, SurfaceEntry
 from .light import packed_light, packed_surroundings
-from .materials import changeable, named_definitions, packed_materials
+from .material_choices import changeable, named_definitions, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..glsl.rewriting import shader_file
 from ..glsl.source import plain_source, vertex_source
-from .materials import MaterialEntry
+from .material_choices import MaterialEntry
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ...optics.colour import linear_srgb, response
 from ..glsl.bounces import pack_bounces
 from ..glsl.emitters import Emitters
-from ..glsl.lights import Light
-from ..glsl.materials import Diffracting
+from ..glsl.lights import Lamp
 from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.progressive import pack_solid, pack_surroundings
 from ..glsl.scene import RealtimeScene
+from ..glsl.shader_materials import Diffracting
 from ..glsl.source import plain_source, vertex_source
 from ..glsl.surroundings import flat_shapes
 from ..glsl.texels import Packed, shortened
@@ -66,7 +66,7 @@ def packed_light(
     }
 
 
-def _described(light: Light, spectrum: int) -> dict[str, Any]:
+def _described(light: Lamp, spectrum: int) -> dict[str, Any]:
     """Return a light as JSON types; `spectrum` is the number of its spectrum."""
     return {
         "name": light.name, "spectrum": spectrum, "cone": list(light.cone or (0.0, 0.0)),
@@ -74,7 +74,7 @@ def _described(light: Light, spectrum: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _equal(lights: Sequence[Light]) -> bool:
+def _equal(lights: Sequence[Lamp]) -> bool:
     """Return whether all lights are equal."""
     first = lights[0]
     return all(
@@ -83,7 +83,7 @@ def _equal(lights: Sequence[Light]) -> bool:
     )
 
 
-def _owner(light: Light, lights: Sequence[Light]) -> int:
+def _owner(light: Lamp, lights: Sequence[Lamp]) -> int:
     """Return the number of the light in `own` with which a light moves, or −1."""
     for number, other in enumerate(lights):
         if not other.name.endswith(light.name) or light.place[3] != other.place[3]:

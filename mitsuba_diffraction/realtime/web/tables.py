@@ -20,8 +20,8 @@ from ...tables.orders.table import Counts
 from ...tables.powers import power_series
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
-from ..glsl.materials import Diffracting
 from ..glsl.packing import pack_colours, pack_powers
+from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import MOST_WITHIN, cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array, packed_series

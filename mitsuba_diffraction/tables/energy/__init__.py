@@ -3,7 +3,7 @@
 Contents
 --------
 conservation   scales by which no more light is sent on than comes in, computed and cached
-materials      reflectors, and dielectrics that let light through: the paths of their light
+conserved      reflectors, and dielectrics that let light through: the paths of their light
 transport      sums over the orders for directions of incidence
 gain           factor of |a_j|² in the power of an order, by path, model and material
 scaling        the scale of a symmetric kernel with given sums

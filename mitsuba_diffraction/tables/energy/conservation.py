@@ -24,8 +24,8 @@ from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
+from .conserved import Dielectric, Reflector
 from .gain import thick
-from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled, weighted
 from .settings import VERSION, energy_settings
 from .transport import Orders, ScatteredLight, Transport

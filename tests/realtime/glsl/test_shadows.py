@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.realtime.glsl.lights import Light
+from mitsuba_diffraction.realtime.glsl.lights import Lamp
 from mitsuba_diffraction.realtime.glsl.scene import triangles_of
 from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
 
@@ -20,8 +20,8 @@ def solid_of(**shape: Any) -> Solid:
     return Solid.analyse(triangles, normals, np.concatenate([around, triangles.reshape(-1, 3)]))
 
 
-def light(*place: float) -> Light:
-    return Light("light", np.array(place), np.array([360.0, 830.0]), np.ones(2))
+def light(*place: float) -> Lamp:
+    return Lamp("light", np.array(place), np.array([360.0, 830.0]), np.ones(2))
 
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])

@@ -15,9 +15,9 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.realtime.glsl.context import Bindings
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
-from mitsuba_diffraction.realtime.glsl.materials import packed_by
 from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_responses
+from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.orders import OrderTable

@@ -13,7 +13,7 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.realtime.glsl.camera import Camera, Orbit, dragged, rotation_about
-from mitsuba_diffraction.realtime.glsl.lights import Light
+from mitsuba_diffraction.realtime.glsl.lights import Lamp
 
 mi = pytest.importorskip("mitsuba")
 
@@ -55,10 +55,10 @@ def test_moving_and_zooming_keep_the_direction(some_variant: str) -> None:
 def test_a_dragged_light_keeps_its_distance(some_variant: str) -> None:
     orbit = Orbit.start(camera(), np.array([0.0, 0.0, 0.0]))
     spectrum = (np.array([360.0, 830.0]), np.ones(2))
-    sun = dragged(Light("sun", np.array([0.0, 0.6, 0.8, 0.0]), *spectrum), orbit, 0.4, 0.1)
+    sun = dragged(Lamp("sun", np.array([0.0, 0.6, 0.8, 0.0]), *spectrum), orbit, 0.4, 0.1)
     assert np.linalg.norm(sun.place[:3]) == pytest.approx(1.0)
     assert sun.place[3] == 0.0
-    lamp = dragged(Light("lamp", np.array([3.0, 0.0, 4.0, 1.0]), *spectrum), orbit, 0.4, 0.1)
+    lamp = dragged(Lamp("lamp", np.array([3.0, 0.0, 4.0, 1.0]), *spectrum), orbit, 0.4, 0.1)
     assert np.linalg.norm(lamp.place[:3] - orbit.target) == pytest.approx(5.0)
 
 

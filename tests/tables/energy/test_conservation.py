@@ -10,8 +10,8 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
+from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.gain import Gain
-from mitsuba_diffraction.tables.energy.materials import Reflector
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar

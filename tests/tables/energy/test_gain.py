@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.energy.conserved import Dielectric
 from mitsuba_diffraction.tables.energy.gain import Gain
-from mitsuba_diffraction.tables.energy.materials import Dielectric
 from tests.support.directions import rough_patch
 
 PATHS = [

@@ -8,7 +8,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, Surface
-from mitsuba_diffraction.tables.energy.materials import Reflector
+from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.store import VARIABLE
 

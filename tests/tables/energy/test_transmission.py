@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
-from mitsuba_diffraction.tables.energy.materials import Dielectric
+from mitsuba_diffraction.tables.energy.conserved import Dielectric
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import rough_patch
 

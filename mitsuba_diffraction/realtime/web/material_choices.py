@@ -10,8 +10,8 @@ import numpy as np
 
 from ...optics.materials import METALS, TISSUES
 from ...plugin.conductors import tabulated_index
-from ..glsl.materials import Diffracting
 from ..glsl.packing import pack_conductor
+from ..glsl.shader_materials import Diffracting
 from ..glsl.texels import Packed, Texture, as_half
 from .sections import Section, Sections, as_columns, packed_array, packed_parts
 
