@@ -165,7 +165,7 @@ def run(args: argparse.Namespace) -> int:
         )
     elif args.crossed:
         check_outputs([output], [source], "table")
-        table = _solve_crossed(source, args)
+        table = _solve_crossed(source, output, args)
     else:
         recipe = recipe_of(args)
         output = recipe.output
@@ -199,7 +199,7 @@ _GROOVES_ONLY = (
 )  # fmt: skip
 
 
-def _solve_crossed(source: Path, args: argparse.Namespace) -> CrossedTable:
+def _solve_crossed(source: Path, output: Path, args: argparse.Namespace) -> CrossedTable:
     """Solve a crossed grating."""
     from ..heights.read import LoadOptions, read_heights
     from ..solve.crossed import solve_crossed
@@ -222,16 +222,21 @@ def _solve_crossed(source: Path, args: argparse.Namespace) -> CrossedTable:
             "over these periods"
         )
     limits = args.wavelength_range or (380.0, 780.0)
+    folder = output.with_name(f".{output.stem}.solving")
+    say(f"results are kept in '{folder}'")
     with _executor(args) as (executor, _), Bar(args, " directions") as bar:
-        return solve_crossed(
+        table = solve_crossed(
             replace(cell, pixel_size=sizes[0]),
             1.5 if args.material is None else args.material,
             wavelengths=limits,
             step=args.step or 20.0,
             harmonics=args.resolution or 0,
             executor=executor,
+            folder=folder,
             progress=bar,
         )
+    shutil.rmtree(folder, ignore_errors=True)
+    return table
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:

@@ -6,14 +6,17 @@ Moharam et al. 1995 (JOSA A 12, 1068), Li 1997 (JOSA A 14, 2758). Heights are cu
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib.metadata
 from collections.abc import Iterator
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..atomic import atomic_path
 from ..errors import DiffractionError, warn
 from ..extras import optional
 from ..heights.field import HeightField
@@ -22,6 +25,7 @@ from ..tables.orders import CrossedTable
 from ..tables.orders.crossed import most_orders
 from .efficiencies import Efficiencies
 from .grating_index import Material, material_of
+from .jobs import make_folder
 from .measured_crossed import crossed_table
 from .stations import Real
 
@@ -61,6 +65,7 @@ def solve_crossed(
     harmonics: int = 0,
     slices: int = 8,
     executor: Executor | None = None,
+    folder: Path | None = None,
     progress: Progress = silent,
 ) -> CrossedTable:
     """Return the table of the orders that a crossed grating reflects, in air.
@@ -82,6 +87,7 @@ def solve_crossed(
         the light, 3 at least.
     slices : number of layers that the heights are cut into.
     executor : processes (`jobs.processes`); None solves here.
+    folder : of results, which another run finds again, made when needed; None stores nothing.
     progress : called as progress(done, total, text).
     """
     optional("ikarus")
@@ -106,7 +112,8 @@ def solve_crossed(
     lights = {(t, p) for t in theta.tolist() for p in (phi.tolist() if t else [0.0])}
     mirrors = _mirrors(field)
     wanted = {_reduced(light, mirrors)[0] for light in lights}
-    solved = dict(_solve_all(cell, sorted(wanted), lam, last, executor, progress))
+    store = _Store(folder, cell, lam)
+    solved = dict(_solve_all(cell, sorted(wanted), lam, last, executor, store, progress))
     values = np.empty((len(lam), len(theta), len(phi), (2 * last[0] + 1) * (2 * last[1] + 1), 2))
     for a, t in enumerate(theta.tolist()):
         for b, p in enumerate(phi.tolist()):
@@ -131,24 +138,67 @@ def solve_crossed(
 
 def _solve_all(
     cell: Cell, lights: list[tuple[float, float]], lam: Real, last: tuple[int, int],
-    executor: Executor | None, progress: Progress,
+    executor: Executor | None, store: _Store, progress: Progress,
 ) -> Iterator[tuple[tuple[float, float], Real]]:  # fmt: skip
-    """Yield each light with its efficiencies (λ, m_y, m_x)."""
+    """Yield each light with its efficiencies (λ, m_y, m_x), stored ones first."""
     task = functools.partial(reflected, cell, lam=lam, last=last)
-    progress(0, len(lights), "solving directions")
-    if executor is None:
-        for done, light in enumerate(lights, 1):
-            yield light, task(light)
-            progress(done, len(lights), "solving directions")
-        return
-    futures = {executor.submit(task, light): light for light in lights}
+    known = {light: powers for light in lights if (powers := store.read(light)) is not None}
+    yield from known.items()
+    missing = [light for light in lights if light not in known]
+    progress(len(known), len(lights), "solving directions")
+    futures = {executor.submit(task, light): light for light in missing} if executor else {}
+    results = (
+        ((futures[future], future.result()) for future in as_completed(futures))
+        if executor
+        else ((light, task(light)) for light in missing)
+    )
     try:
-        for done, future in enumerate(as_completed(futures), 1):
-            yield futures[future], future.result()
+        for done, (light, powers) in enumerate(results, len(known) + 1):
+            store.write(light, powers)
+            yield light, powers
             progress(done, len(lights), "solving directions")
     finally:
         for future in futures:
             future.cancel()
+
+
+class _Store:
+    """Results of lights in a folder, of a cell and its wavelengths; None stores nothing."""
+
+    def __init__(self, folder: Path | None, cell: Cell, lam: Real) -> None:
+        self._folder = folder
+        indices = cell.material.index(lam)
+        outline = repr((cell.field.extent, cell.harmonics, cell.slices))
+        self._content = hashlib.sha256(outline.encode())
+        for array in (cell.field.heights, lam, indices):
+            assert array is not None
+            self._content.update(np.ascontiguousarray(array).tobytes())
+
+    def read(self, light: tuple[float, float]) -> Real | None:
+        """Return the efficiencies of a light, or None."""
+        if (file := self._file(light)) is None or not file.is_file():
+            return None
+        try:
+            return np.asarray(np.load(file), np.float64)
+        except (OSError, ValueError, EOFError):
+            return None  # solved again
+
+    def write(self, light: tuple[float, float], powers: Real) -> None:
+        """Store the efficiencies of a light.
+
+        Raises a DiffractionError if the folder cannot be written.
+        """
+        if (file := self._file(light)) is not None:
+            make_folder(file.parent)
+            with atomic_path(file) as temporary, temporary.open("wb") as stream:
+                np.save(stream, powers)
+
+    def _file(self, light: tuple[float, float]) -> Path | None:
+        if self._folder is None:
+            return None
+        content = self._content.copy()
+        content.update(repr(light).encode())
+        return self._folder / f"{content.hexdigest()[:24]}.npy"
 
 
 def reflected(cell: Cell, light: tuple[float, float], lam: Real, last: tuple[int, int]) -> Real:

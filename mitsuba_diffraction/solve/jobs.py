@@ -201,7 +201,7 @@ class Jobs:
         known = {place: solved for place, solved in results.items() if solved is not None}
         missing = [place for place in files if place not in known]
         if self.folder is not None and missing:
-            _make(self.folder)
+            make_folder(self.folder)
         done = len(known)
         self.progress(done, len(files), text)
         for place, solved in self._solved(problem, missing):
@@ -297,7 +297,11 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _make(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make a folder of results.
+
+    Raises a DiffractionError if it cannot be written.
+    """
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

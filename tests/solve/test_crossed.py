@@ -83,3 +83,28 @@ def test_mirror_planes_give_the_light_of_mirrored_directions():
 def test_what_is_not_solved_is_refused(field, material, message):
     with pytest.raises(DiffractionError, match=message):
         md.solve_crossed(field, material)
+
+
+def test_an_interrupted_solution_goes_on(tmp_path, monkeypatch):
+    flat = HeightField(np.zeros((4, 4)), 0.05)
+    coarse = {"wavelengths": (500.0, 500.0), "theta_step": 40.0, "phi_step": 90.0, "harmonics": 1}
+    folder = tmp_path / "stored"
+
+    def interrupt(done, total, text):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        md.solve_crossed(flat, 1.5, **coarse, folder=folder, progress=interrupt)
+    assert len(list(folder.iterdir())) == 2
+    started = []
+    table = md.solve_crossed(
+        flat, 1.5, **coarse, folder=folder, progress=lambda *told: started.append(told)
+    )
+    assert started[0][0] == 2
+    assert table.efficiency(0.0, 0.0, 500.0, 0, 0) == pytest.approx(0.04, rel=1e-3)
+    # another material has results of its own
+    md.solve_crossed(
+        flat, 1.6, **coarse, folder=folder, progress=lambda *told: started.append(told)
+    )
+    assert (0, started[0][1]) in {told[:2] for told in started}
