@@ -197,8 +197,8 @@ N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckm
 Denoisers that ask for an albedo get the reflectance at normal incidence, nested BSDF included.
 
 Derivatives pass through renderings backward and forward, for all parameters marked ∂. Functions
-of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`: a plain number would be recorded. On CUDA
-Dr.Jit 1.5 cannot record `sample` of a bitmap.
+of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`: a plain number would be recorded. On
+CUDA Dr.Jit 1.5 cannot record `sample` of a bitmap.
 
 XML and the same in Python:
 
