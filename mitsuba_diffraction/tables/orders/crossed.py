@@ -7,7 +7,7 @@ import io
 import itertools
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -76,6 +76,8 @@ class CrossedTable:
     block: ClassVar[float | None] = None
     sides: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
+
+    load: ClassVar[Callable[..., CrossedTable]]  #: from a file: `file.load_crossed`
 
     def __post_init__(self) -> None:
         m_x, m_y = most_orders(self.periods, self.wavelengths)

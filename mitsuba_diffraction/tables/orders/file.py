@@ -110,6 +110,17 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     return table
 
 
+def load_crossed(path: str | os.PathLike[str]) -> CrossedTable:
+    """Read a file that `CrossedTable.save` wrote.
+
+    Raises a DiffractionError as `load_orders` does, and for a table of grooves.
+    """
+    table = load_any_orders(path)
+    if isinstance(table, CrossedTable):
+        return table
+    raise DiffractionError(f"'{path}' is a table of grooves; read it by OrderTable.load")
+
+
 def load_any_orders(path: str | os.PathLike[str]) -> OrderTable | CrossedTable:
     """Read a file that `save_orders` or `CrossedTable.save` wrote.
 

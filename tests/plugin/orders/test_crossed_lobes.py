@@ -136,6 +136,27 @@ def test_rgb_has_the_colours_of_the_spectrum(table):
     assert np.abs(rgb - total).sum() < 0.03 * np.abs(total).sum()
 
 
+@pytest.mark.parametrize("name", ["llvm_ad_spectral", "llvm_ad_rgb"])
+def test_the_orientation_has_a_derivative(name, table):
+    mi.set_variant(name)
+    wi, wo, _ = near_orders(200, seed=5)
+    si = interaction(wi, np.full((len(wi), 4), LAM))
+
+    def light(degrees):
+        bsdf = load(table, orientation=degrees)
+        parameters = mi.traverse(bsdf)
+        dr.enable_grad(parameters["orientation"])
+        parameters.update()
+        value = dr.sum(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T)), axis=None)
+        dr.forward(parameters["orientation"])
+        return float(np.ravel(value)[0]), float(np.ravel(dr.grad(value))[0])
+
+    (low, _), (_, slope), (high, _) = (light(TURN + step) for step in (-0.05, 0.0, 0.05))
+    mi.set_variant("llvm_ad_spectral")
+    # single precision, and half floats of a table that is linear between its nodes
+    assert slope == pytest.approx((high - low) / 0.1, rel=0.03)
+
+
 def test_shaders_refuse_it(variant, table):
     from mitsuba_diffraction.osl.export import OSL
     from mitsuba_diffraction.realtime.glsl.export import SHADER

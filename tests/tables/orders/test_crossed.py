@@ -49,8 +49,7 @@ def test_light_beyond_its_wavelengths_is_not_reflected(table):
 
 def test_a_file_keeps_it(table, tmp_path):
     table.save(tmp_path / "crossed.nc")
-    kept = load_any_orders(tmp_path / "crossed.nc")
-    assert isinstance(kept, CrossedTable)
+    kept = CrossedTable.load(tmp_path / "crossed.nc")
     assert kept.periods == table.periods
     assert dict(kept.header) == dict(table.header)
     assert np.abs(kept.values - table.values).max() <= 1.001 / 60_000.0
@@ -72,6 +71,9 @@ def test_readers_of_grooves_refuse_it(table, tmp_path):
     table.save(tmp_path / "crossed.nc")
     with pytest.raises(DiffractionError, match="crossed grating"):
         md.OrderTable.load(tmp_path / "crossed.nc")
+    md.OrderTable.mirror(0.5).save(tmp_path / "grooves.nc")
+    with pytest.raises(DiffractionError, match=r"OrderTable\.load"):
+        CrossedTable.load(tmp_path / "grooves.nc")
 
 
 @pytest.mark.parametrize(
