@@ -1,8 +1,9 @@
 """The commands that docs and notebooks show run, in their order, on small patches and pictures.
 
 What is not run here: the gallery's, whose scenes test_scenes_thorough.py renders; `make`, `pip` and
-`apt`, which set up what runs these tests; `view`, which opens a window; `tradeoff`, `compare` and
-`plan`, which take long at their smallest, and are run smaller still by their own tests.
+`apt`, which set up what runs these tests; `view`, which opens a window; `tradeoff`, `compare`,
+`plan` and `solve --crossed`, which take long at their smallest, and are run smaller still by their
+own tests.
 `render --denoise` runs without it. test_docs.py checks what these would be given.
 """
 

@@ -17,12 +17,13 @@ from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.plugin.dictionary import ORDERS
 from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
+from tests.support import crossed
 from tests.support.clone import small_clone
 from tests.support.instruments import nanoscope
 from tests.support.logos import drawn, write_board
 from tests.support.pages import blocks, spans, typed
 
-NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
+NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan", "--crossed"}
 # one wavelength stands for all, and few points do
 _PERFECT = ["--material", "none"]
 _NARROW = ["--wavelength-range", "590,610"]
@@ -167,7 +168,8 @@ def small_tree(folder: Path) -> Path:
         for program in blocks("docs/orders.md", "python"):
             if "import csv" in program or "netcdf_file" in program:
                 exec(program, {})
-    # what `plan` writes, which is not run here
+    # what `plan` and `solve --crossed` write, which are not run here
+    crossed.table().save(folder / "lumps.nc")
     shutil.copy(folder / "precompute" / "elaphe_like.toml", folder / "snake.toml")
     return folder
 
