@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 from .arithmetic import clip
 from .description import Surface, describe
@@ -34,7 +35,15 @@ class DepthWeights:
     """
 
     def __init__(self, props: Properties, bsdfs: Mapping[str, BSDF]) -> None:
-        self._depths = {name: _depth_of(name, bsdf) for name, bsdf in bsdfs.items()}
+        tables = {name: _table_of(name, bsdf) for name, bsdf in bsdfs.items()}
+        self._depths = {name: _depth_of(name, table) for name, table in tables.items()}
+        first = next(iter(tables))
+        for name, table in tables.items():
+            if _periods(table) != _periods(tables[first]):
+                raise DiffractionError(
+                    f"{DEPTH}: the periods of {first} and {name} differ, so their orders leave in "
+                    "other directions; give one profile at several depths"
+                )
         ordered = sorted(self._depths, key=lambda name: self._depths[name])
         for one, other in itertools.pairwise(ordered):
             if self._depths[one] == self._depths[other]:
@@ -112,8 +121,8 @@ class DepthWeights:
         return " ".join(str(self.depth).split())
 
 
-def _depth_of(name: str, bsdf: BSDF) -> float:
-    """Return the depth of a surface's profile, µm."""
+def _table_of(name: str, bsdf: BSDF) -> OrderTable | CrossedTable:
+    """Return the solved orders of a surface."""
     described = describe(bsdf)
     table = described.table if isinstance(described, Surface) else None
     if table is None or isinstance(table, DiffractionTable):
@@ -121,6 +130,15 @@ def _depth_of(name: str, bsdf: BSDF) -> float:
             f"{DEPTH}: {name} has no solved orders; a depth blends surfaces of type "
             "'diffraction_orders', and weights blend any others"
         )
+    return table
+
+
+def _periods(table: OrderTable | CrossedTable) -> tuple[float, ...]:
+    return table.periods if isinstance(table, CrossedTable) else (table.period,)
+
+
+def _depth_of(name: str, table: OrderTable | CrossedTable) -> float:
+    """Return the depth of a surface's profile, µm."""
     depth = table.header.get(DEPTH)
     if not isinstance(depth, int | float):
         raise DiffractionError(

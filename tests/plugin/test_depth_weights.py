@@ -17,8 +17,8 @@ DEPTHS = {"middle": (0.2, 0.8), "shallow": (0.1, 0.2), "deep": (0.4, 0.5)}
 WIDTH = 8.0
 
 
-def grating(depth, reflectance, **more):
-    table = md.OrderTable.mirror(0.9, reflectance)
+def grating(depth, reflectance, period=0.9, **more):
+    table = md.OrderTable.mirror(period, reflectance)
     table = dataclasses.replace(table, header=table.header | {"depth": depth})
     return md.bsdf_dict(table, coherence_width=WIDTH, **more)
 
@@ -110,6 +110,7 @@ def named(**change):
             {"deep": md.bsdf_dict(md.OrderTable.mirror(0.9), coherence_width=WIDTH)},
             "solve it again",
         ),
+        ({"deep": grating(0.4, 0.5, period=0.8)}, "periods of middle and deep differ"),
         ({"deep": {"type": "diffuse"}}, "deep has no solved orders"),
     ],
 )
