@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import CrossedTable
@@ -151,13 +152,13 @@ def _filled(
     Interpolation between the two sides of a Rayleigh anomaly would halve the light on one side.
     These additions may bring the sum of a direction to 1, no further.
     """
-    apart = np.linalg.norm(mirror[:, None] - mirror, axis=-1)
     lit = _open(wavelengths, mirror, _orders(last), periods)
     filled = powers.copy()
     for n, order in np.argwhere(lit.any(axis=1) & ~lit.all(axis=1)):
         here = np.flatnonzero(lit[n, :, order])
         dark = np.flatnonzero(~lit[n, :, order])
-        filled[n, dark, order] = powers[n, here[apart[np.ix_(dark, here)].argmin(axis=1)], order]
+        nearest = KDTree(mirror[here]).query(mirror[dark])[1]
+        filled[n, dark, order] = powers[n, here[nearest], order]
     known = powers.sum(axis=-1, keepdims=True)
     added = filled - powers
     room = np.maximum(1.0 - known, 0.0) / np.maximum(added.sum(axis=-1, keepdims=True), 1e-12)
