@@ -22,7 +22,7 @@ from ..extras import optional
 from ..heights.field import HeightField
 from ..progress import Progress, silent
 from ..tables.orders import CrossedTable
-from ..tables.orders.crossed import most_orders
+from ..tables.orders.crossed import all_orders, most_orders
 from .efficiencies import Efficiencies
 from .grating_index import Material, material_of
 from .jobs import make_folder
@@ -37,7 +37,7 @@ _LAST_THETA = 85.0
 
 
 @dataclass(frozen=True)
-class Cell:
+class UnitCell:
     """A period of heights, its material, and the resolution of the solver.
 
     Attributes
@@ -104,7 +104,7 @@ def solve_crossed(
             f"{medium.name} absorbs: formulations of coupled waves differ by some 4 % of the light "
             "on crossed gratings of metal"
         )
-    cell = Cell(
+    cell = UnitCell(
         field, medium, (harmonics or max(last[0] + 1, 3), harmonics or max(last[1] + 1, 3)), slices
     )
     theta = np.append(np.arange(0.0, _LAST_THETA, theta_step), _LAST_THETA)
@@ -120,7 +120,7 @@ def solve_crossed(
             light, flipped = _reduced((t, p if t else 0.0), mirrors)
             powers = solved[light][:, :: flipped[1], :: flipped[0]]
             values[:, a, b] = powers.reshape(len(lam), -1, 1)
-    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    m_x, m_y = all_orders(last)
     pairs = np.column_stack([m_x.ravel(), m_y.ravel()])
     header: dict[str, Any] = {
         "solver": f"ikarus-rcwa, {2 * cell.harmonics[0] + 1} x {2 * cell.harmonics[1] + 1} "
@@ -137,7 +137,7 @@ def solve_crossed(
 
 
 def _solve_all(
-    cell: Cell, lights: list[tuple[float, float]], lam: Real, last: tuple[int, int],
+    cell: UnitCell, lights: list[tuple[float, float]], lam: Real, last: tuple[int, int],
     executor: Executor | None, store: _Store, progress: Progress,
 ) -> Iterator[tuple[tuple[float, float], Real]]:  # fmt: skip
     """Yield each light with its efficiencies (λ, m_y, m_x), stored ones first."""
@@ -165,7 +165,7 @@ def _solve_all(
 class _Store:
     """Results of lights in a folder, of a cell and its wavelengths; None stores nothing."""
 
-    def __init__(self, folder: Path | None, cell: Cell, lam: Real) -> None:
+    def __init__(self, folder: Path | None, cell: UnitCell, lam: Real) -> None:
         self._folder = folder
         indices = cell.material.index(lam)
         outline = repr((cell.field.extent, cell.harmonics, cell.slices))
@@ -201,7 +201,7 @@ class _Store:
         return self._folder / f"{content.hexdigest()[:24]}.npy"
 
 
-def reflected(cell: Cell, light: tuple[float, float], lam: Real, last: tuple[int, int]) -> Real:
+def reflected(cell: UnitCell, light: tuple[float, float], lam: Real, last: tuple[int, int]) -> Real:
     """Return the efficiencies (λ, m_y, m_x) of unpolarised light from (θ, φ), degrees."""
     ikarus = optional("ikarus")
 
@@ -260,14 +260,14 @@ def _reduced(
 
 
 def _checked(
-    table: CrossedTable, cell: Cell, last: tuple[int, int], executor: Executor | None
+    table: CrossedTable, cell: UnitCell, last: tuple[int, int], executor: Executor | None
 ) -> dict[str, float]:
     """Return the errors of table and solver at random lights, as shares of the orders but 0."""
     rng = np.random.default_rng(0)
-    finer = Cell(
+    finer = UnitCell(
         cell.field, cell.material, (cell.harmonics[0] + 1, cell.harmonics[1] + 1), 2 * cell.slices
     )
-    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    m_x, m_y = all_orders(last)
     others = (m_x != 0) | (m_y != 0)
     polar, azimuth = 70.0 * np.sqrt(rng.random(_CHECKED)), 360.0 * rng.random(_CHECKED)
     lam = rng.uniform(*table.wavelengths, _CHECKED)

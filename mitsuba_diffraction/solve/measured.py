@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, CrossedTable, OrderTable, cells
 from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
-from .efficiencies import ROUNDING, Efficiencies, read_efficiencies
+from .efficiencies import ROUNDING, Efficiencies, read_efficiencies, warn_of_one_way
 from .measured_crossed import crossed_table, warn_of_gaps
 from .scattered import interpolated
 from .stations import Real
@@ -27,10 +27,6 @@ _MISSED = 1e-3
 _EDGE = 1e-6
 #: Decimals of s that tell directions apart.
 _DIGITS = 9
-#: Difference between light and reversed light, as a share of the orders but 0, above which a file
-#: hardly holds powers: grids of 5 to 10° have 0.05 to 0.14, efficiencies without the ratio of
-#: cosines 0.6 to 0.8.
-_ONE_WAY = 0.2
 
 
 class _Samples(NamedTuple):
@@ -145,12 +141,8 @@ def table_of(
     bands = tuple(_band(k, of_band, samples) for k, of_band in enumerate(counts))
     table = OrderTable(period, wavelengths, bands, superstrate, header, thin, S_AND_P)
     header |= _errors(table, samples)
-    if not incomplete and header["reciprocity_error"] > _ONE_WAY:
-        warn(
-            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
-            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
-            "of cosines; check that, and the signs of the orders and of phi"
-        )
+    if not incomplete:
+        warn_of_one_way(header["reciprocity_error"], shown)
     return table
 
 

@@ -10,16 +10,18 @@ from scipy.spatial import KDTree
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import CrossedTable
-from ..tables.orders.crossed import MOST_WAVELENGTHS, NODES, most_orders, propagates
+from ..tables.orders.crossed import (
+    MOST_WAVELENGTHS,
+    NODES,
+    all_orders,
+    most_orders,
+    propagates,
+)
 from ..tables.orders.table import LARGEST_SUM
-from .efficiencies import ROUNDING, Efficiencies
+from .efficiencies import ROUNDING, Efficiencies, warn_of_one_way
 from .scattered import interpolated
 from .stations import Real
 
-#: Difference between light and reversed light, as a share of the orders but 0, above which a file
-#: hardly holds powers: grids of 10 to 45° have 0.02 to 0.14, efficiencies without the ratio of
-#: cosines 0.4 to 0.8.
-_ONE_WAY = 0.2
 #: Widest gap between azimuths, degrees, that needs no warning.
 _WIDEST_GAP = 90.0
 
@@ -66,12 +68,7 @@ def warn_of_gaps(table: CrossedTable, grid: Efficiencies, shown: str) -> None:
             f"{shown} has no light from some azimuths, which get the efficiencies of the nearest "
             "direction in it; list phi from 0 to 345 in steps of 15"
         )
-    if (error := table.header["reciprocity_error"]) > _ONE_WAY:
-        warn(
-            f"light and reversed light differ by {error:.0%} in {shown}, "
-            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
-            "of cosines; check that, and the signs of the orders and of phi"
-        )
+    warn_of_one_way(table.header["reciprocity_error"], shown)
 
 
 def _mirror(grid: Efficiencies) -> Real:
@@ -80,14 +77,17 @@ def _mirror(grid: Efficiencies) -> Real:
     return np.asarray(-(np.sin(theta) * [np.cos(phi), np.sin(phi)]).reshape(2, -1).T)
 
 
-def _orders(last: tuple[int, int]) -> tuple[Real, Real]:
+def _orders(last: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return m_x and m_y of all orders of a table, (orders,) each."""
-    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    m_x, m_y = all_orders(last)
     return m_x.ravel(), m_y.ravel()
 
 
 def _open(
-    wavelengths: Real, mirror: Real, orders: tuple[Real, Real], periods: tuple[float, float]
+    wavelengths: Real,
+    mirror: Real,
+    orders: tuple[NDArray[Any], NDArray[Any]],
+    periods: tuple[float, float],
 ) -> NDArray[np.bool_]:
     """Whether orders propagate, (λ, direction, order)."""
     x, y = mirror.T[:, None, :, None]
@@ -202,7 +202,7 @@ def _errors(table: CrossedTable, powers: Real, wavelengths: Real, mirror: Real) 
     d_x, d_y = table.periods
     out_x = x + light[1] * light[0] / (1e3 * d_x)
     out_y = y + light[2] * light[0] / (1e3 * d_y)
-    # beyond the file's last angle there is no reversed light to compare with
+    # the file has light to compare with up to its last angle
     known = np.hypot(out_x, out_y) <= np.hypot(x, y).max()
     back = np.where(known, table.efficiency(-out_x, -out_y, *light), got)
     missed, total = np.abs(got - truth).sum(axis=-1), truth.sum(axis=-1)

@@ -7,7 +7,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, HeightField
-from mitsuba_diffraction.solve.crossed import Cell, _mirrors, _reduced, reflected
+from mitsuba_diffraction.solve.crossed import UnitCell, _mirrors, _reduced, reflected
 from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
 from mitsuba_diffraction.solve.profiles import Profile
@@ -42,7 +42,9 @@ def of_grooves(theta, phi):
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_grooves_have_the_light_of_the_integral_method(along, phi):
     heights, turn = (steps(X), 0.0) if along == "x" else (steps(Y), 90.0)
-    cell = Cell(HeightField(heights, PERIOD / PIXELS), GLASS, (8, 1) if turn == 0.0 else (1, 8), 2)
+    cell = UnitCell(
+        HeightField(heights, PERIOD / PIXELS), GLASS, (8, 1) if turn == 0.0 else (1, 8), 2
+    )
     found = reflected(cell, (30.0, phi + turn), np.array([LAM]), (1, 1))[0]
     across = found[1] if along == "x" else found[:, 1]
     for order, truth in of_grooves(30.0, phi).items():
@@ -52,7 +54,7 @@ def test_grooves_have_the_light_of_the_integral_method(along, phi):
 
 @pytest.mark.parametrize("theta", [0.0, 50.0])
 def test_a_flat_cell_reflects_as_fresnel_has_it(theta):
-    cell = Cell(HeightField(np.zeros((4, 4)), 0.1), GLASS, (1, 1), 2)
+    cell = UnitCell(HeightField(np.zeros((4, 4)), 0.1), GLASS, (1, 1), 2)
     inside = np.sqrt(1.5**2 - np.sin(np.radians(theta)) ** 2)
     c = np.cos(np.radians(theta))
     truth = 0.5 * ((c - inside) / (c + inside)) ** 2
@@ -64,7 +66,7 @@ def test_a_flat_cell_reflects_as_fresnel_has_it(theta):
 def test_mirror_planes_give_the_light_of_mirrored_directions():
     blazed_along_y = HeightField(0.05 * np.cos(2 * np.pi * X) + steps(Y), PERIOD / PIXELS)
     assert _mirrors(blazed_along_y) == (True, False)
-    cell = Cell(blazed_along_y, GLASS, (2, 2), 2)
+    cell = UnitCell(blazed_along_y, GLASS, (2, 2), 2)
     for phi in (130.0, 200.0, 290.0):
         light, flips = _reduced((40.0, phi), (True, False))
         direct = reflected(cell, (40.0, phi), np.array([LAM]), (1, 1))

@@ -168,7 +168,7 @@ def small_tree(folder: Path) -> Path:
         for program in blocks("docs/orders.md", "python"):
             if "import csv" in program or "netcdf_file" in program:
                 exec(program, {})
-    # what `plan` and `solve --crossed` write, which are not run here
+    # tables and recipes of commands that are left out here
     crossed.table().save(folder / "lumps.nc")
     shutil.copy(folder / "precompute" / "elaphe_like.toml", folder / "snake.toml")
     return folder

@@ -10,7 +10,7 @@ import numpy as np
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.solve.block import solve_block
-from mitsuba_diffraction.solve.crossed import Cell, reflected
+from mitsuba_diffraction.solve.crossed import UnitCell, reflected
 from mitsuba_diffraction.solve.films import structure_of
 from mitsuba_diffraction.solve.grating_index import material_of
 from mitsuba_diffraction.solve.integral import IntegralSolver
@@ -212,7 +212,7 @@ def _crossed() -> Iterator[Compared]:
     lumps = 0.25 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)) + 0.2 * np.sin(x)
     # without mirror planes, so that every sign shows
     field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
-    cell = Cell(field, material_of("1.5", _RANGE), (6, 6), 16)
+    cell = UnitCell(field, material_of("1.5", _RANGE), (6, 6), 16)
     found = reflected(cell, (theta, phi), np.array([lam]), (2, 2))[0]
     sine, turn = np.sin(np.radians(theta)), np.radians(phi)
     wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(np.radians(theta))])

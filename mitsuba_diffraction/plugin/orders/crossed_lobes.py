@@ -14,10 +14,10 @@ from ...tables.orders import CrossedTable
 from ...tables.orders.daylight import CHANNELS
 from ..arithmetic import float_of, index_of, maximum
 from ..loops import sum_of
-from ..memory import index_between, once_a_table, read_record, upload
+from ..memory import once_a_table, upload
 from ..types import Float, Index, Mask, Vector2f
 from .lobes import REACH, Below, DaylightLobes, Incidence, Window, added, nearest
-from .order_lookup import RAISED, Drawn, Share
+from .order_lookup import RAISED, Drawn, Share, between_corners, corner_weights
 
 
 class CrossedRow(NamedTuple):
@@ -63,15 +63,7 @@ class CrossedLookup:
             0.5 * (mirror.y + 1.0),
             0.5 * (mirror.x + 1.0),
         )
-        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
-        for coordinate, count in zip(places, self._cells, strict=True):
-            position = coordinate * float(count)
-            lower = index_between(dr.floor(position), 0.0, count - 1.0)
-            share = dr.clip(position - lower, 0.0, 1.0)
-            cell = cell * count + index_of(lower)
-            weights = [
-                part for weight in weights for part in (weight - weight * share, weight * share)
-            ]
+        cell, weights = corner_weights(places, self._cells)
         lit = (wavelength >= self._reach[0]) & (wavelength <= self._reach[1])
         return CrossedRow(cell * (self.count + 1), weights, lit, mirror, wavelength)
 
@@ -121,11 +113,7 @@ class CrossedLookup:
 
     def _between(self, row: CrossedRow, place: Index, active: Mask) -> Float:
         """Interpolate an order, or the sum, between the corners of a cell."""
-        corners = read_record(self._values, row.start + place, 8, active & row.lit)
-        value = row.weights[0] * mi.Float(corners[0])
-        for weight, corner in zip(row.weights[1:], corners[1:], strict=True):
-            value = dr.fma(weight, mi.Float(corner), value)
-        return value
+        return between_corners(self._values, row.start + place, row.weights, active & row.lit)
 
 
 @once_a_table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from ...tables.orders import OrderTable
 from ...tables.orders.grids import corners
 from ..arithmetic import float_of, index_of, maximum
 from ..memory import index_between, once_a_table, read, read_record, upload
-from ..types import Float, Index, Mask, Vector2f
+from ..types import Buffer, Float, Index, Mask, Vector2f
 
 # Against division by 0, in single precision
 _MIN_DIVISOR = 1e-7
@@ -126,15 +127,7 @@ class OrderLookup:
         kind = index_of(band) * 2 + dr.select(is_a, mi.UInt32(0), mi.UInt32(1))
         channels = index_of(band) + dr.select(is_a, mi.UInt32(1), mi.UInt32(0))
         lit = (vacuum >= self._reach[0]) & (vacuum <= self._reach[1])
-        cell, weights = mi.UInt32(0), [mi.Float(1.0)]
-        for coordinate, count in zip(places, self._cells, strict=True):
-            position = coordinate * float(count)
-            lower = index_between(dr.floor(position), 0.0, count - 1.0)
-            share = position - lower
-            cell = cell * count + index_of(lower)
-            weights = [
-                part for weight in weights for part in (weight - weight * share, weight * share)
-            ]
+        cell, weights = corner_weights(places, self._cells)
         ports, port = channels * self._sides, index_of(channel)
         if self._sides == 2:
             port += dr.select(cos_i < 0.0, channels, 0)
@@ -212,11 +205,7 @@ class OrderLookup:
         part : of a record, see `tables.orders.grids.Corners`.
         """
         record = (row.start + q) * self._parts + part
-        corners = read_record(self._values, record, 8, active & row.lit)
-        value = row.weights[0] * mi.Float(corners[0])
-        for weight, corner in zip(row.weights[1:], corners[1:], strict=True):
-            value = dr.fma(weight, mi.Float(corner), value)
-        return value
+        return between_corners(self._values, record, row.weights, active & row.lit)
 
     @staticmethod
     def _outside(row: Row, within: Float, mirror: Float) -> Float:
@@ -232,6 +221,30 @@ class OrderLookup:
             return mi.Float(0.0)
         low, high = cell_wavelengths(big_k, self._period, *self._ends, self._least_c)
         return wavelength_coordinate(wavelength, low, high, 1e-3)
+
+
+def corner_weights(places: Sequence[Float], cells: Sequence[int]) -> tuple[Index, list[Float]]:
+    """Return the cell of coordinates from 0 to 1 on an even grid, and its corners' weights.
+
+    cells : numbers of cells along each coordinate, the first outermost.
+    """
+    cell, weights = mi.UInt32(0), [mi.Float(1.0)]
+    for coordinate, count in zip(places, cells, strict=True):
+        position = coordinate * float(count)
+        lower = index_between(dr.floor(position), 0.0, count - 1.0)
+        share = position - lower
+        cell = cell * count + index_of(lower)
+        weights = [part for w in weights for part in (w - w * share, w * share)]
+    return cell, weights
+
+
+def between_corners(values: Buffer, record: Index, weights: list[Float], active: Mask) -> Float:
+    """Interpolate a record of eight corners; 0 in inactive lanes."""
+    corners = read_record(values, record, 8, active)
+    value = weights[0] * mi.Float(corners[0])
+    for weight, corner in zip(weights[1:], corners[1:], strict=True):
+        value = dr.fma(weight, mi.Float(corner), value)
+    return value
 
 
 @once_a_table

@@ -17,7 +17,7 @@ file        tables as NetCDF files
 from __future__ import annotations
 
 from .crossed import CrossedTable
-from .file import load_any_orders, load_crossed, load_orders, save_orders
+from .file import load_any_orders, load_crossed, load_orders, save_crossed, save_orders
 from .lookup import efficiency, groove_efficiency, mueller, polarised_efficiency
 from .table import Band, OrderTable
 
@@ -30,4 +30,5 @@ OrderTable.groove_efficiency = groove_efficiency
 OrderTable.mueller = mueller
 OrderTable.load = staticmethod(load_orders)
 CrossedTable.load = staticmethod(load_crossed)
+CrossedTable.save = save_crossed
 OrderTable.save = save_orders

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import itertools
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.io import netcdf_file
 
-from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...files import ORDERS_ATTRIBUTE
 from ...optics.orders import crossed_square, wavelength_coordinate
 from .cells import Array
-from .table import LARGEST_SUM, MOST_NUMBERS, PERIODS, WAVELENGTHS, reach_of
+from .table import LARGEST_SUM, PERIODS, check_wavelengths, reach_of
 
 #: Nodes along each axis of the directions, and along wavelengths at most.
 NODES, MOST_WAVELENGTHS = 25, 64
-#: Attribute that tells these tables from tables of grooves.
-CROSSED_ATTRIBUTE = "crossed"
-_STEP = 1.0 / 30_000.0  # of packed efficiencies, as in `file`
 
 
 class Records(NamedTuple):
@@ -77,7 +68,9 @@ class CrossedTable:
     sides: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
 
+    # Set by the package, since files build on this class
     load: ClassVar[Callable[..., CrossedTable]]  #: from a file: `file.load_crossed`
+    save: ClassVar[Callable[..., None]]  #: to a file: `file.save_crossed`
 
     def __post_init__(self) -> None:
         m_x, m_y = most_orders(self.periods, self.wavelengths)
@@ -191,69 +184,13 @@ class CrossedTable:
         size = f"{self.nbytes / 1e6:.1f} MB"
         return f"CrossedTable({d_x:g} x {d_y:g} µm, {low:g}–{high:g} nm, {size})"
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a NetCDF file; efficiencies are rounded to 1/30000 of the incident light.
-
-        Raises a DiffractionError if it cannot be written; no half-written file is left.
-        """
-        if Path(path).suffix.lower() != ".nc":
-            raise DiffractionError(
-                f"cannot write '{path}': the file name of a table of orders must end with .nc"
-            )
-        content = io.BytesIO()
-        with netcdf_file(content, "w") as file:
-            file.title = "Efficiencies of the orders of a crossed grating"
-            setattr(file, ORDERS_ATTRIBUTE, np.int32(1))
-            setattr(file, CROSSED_ATTRIBUTE, np.int32(1))
-            file.periods, file.periods_units = np.array(self.periods), "um"
-            file.wavelengths, file.wavelengths_units = np.array(self.wavelengths), "nm"
-            file.header = json.dumps(dict(self.header), sort_keys=True)
-            axes = ("wavelength", "y", "x", "order_y", "order_x")
-            for name, size in zip(axes, self.values.shape, strict=True):
-                file.createDimension(name, size)
-            numbers = np.rint(self.values / _STEP).astype(">i2")
-            variable = file.createVariable("efficiency", ">i2", axes)
-            variable[:] = numbers
-            variable.scale_factor, variable.units = np.float64(_STEP), "1"
-            file.sha256 = _checksum(file, numbers)
-            file.flush()
-            data = content.getvalue()
-        with atomic_path(path) as temporary:
-            temporary.write_bytes(data)
-
-
-def crossed_of(file: Any) -> CrossedTable:
-    """Return the table of an open NetCDF file; any exception means that it is damaged."""
-    variable = file.variables["efficiency"]
-    if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
-        raise ValueError(f"it claims {variable.shape} numbers")
-    if file.sha256 != _checksum(file, variable[:]).encode():
-        raise ValueError("its checksum is of another one")
-    values = (variable[:] * variable.scale_factor).astype(np.float32)
-    (d_x, d_y), (low, high) = map(float, file.periods), map(float, file.wavelengths)
-    return CrossedTable((d_x, d_y), (low, high), values, json.loads(file.header))
-
-
-def _checksum(file: Any, numbers: NDArray[Any]) -> str:
-    header = file.header.encode() if isinstance(file.header, str) else file.header
-    content = hashlib.sha256(header)
-    for part in (file.periods, file.wavelengths):
-        content.update(np.asarray(part, ">f8").tobytes())
-    content.update(np.ascontiguousarray(numbers, ">i2").data)
-    return content.hexdigest()
-
 
 def most_orders(periods: tuple[float, float], wavelengths: tuple[float, float]) -> tuple[int, int]:
     """Return the largest order along x and along y that propagates from any direction.
 
     Raises a DiffractionError for periods or wavelengths out of range.
     """
-    low, high = wavelengths
-    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
-        raise DiffractionError(
-            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
-            f"{WAVELENGTHS[1]:g} nm"
-        )
+    low, _ = check_wavelengths(wavelengths)
     # a record of all orders, at all nodes, has to fit
     longest = min(PERIODS[1], 4e-3 * low)
     if not all(PERIODS[0] <= period <= longest for period in periods):  # also refuses NaN
@@ -262,6 +199,12 @@ def most_orders(periods: tuple[float, float], wavelengths: tuple[float, float]) 
             f"µm, four times the shortest wavelength, {low:g} nm"
         )
     return int(2e3 * periods[0] / low), int(2e3 * periods[1] / low)
+
+
+def all_orders(last: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return m_x and m_y of all orders of a table, (m_y, m_x) each, as `values` has them."""
+    m_y, m_x = np.mgrid[-last[1] : last[1] + 1, -last[0] : last[0] + 1]
+    return m_x, m_y
 
 
 def propagates(

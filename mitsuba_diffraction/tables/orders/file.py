@@ -28,7 +28,7 @@ from scipy.io import netcdf_file
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
-from .crossed import CROSSED_ATTRIBUTE, CrossedTable, crossed_of
+from .crossed import CrossedTable
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
 #: Raised whenever the meaning of the numbers changes; files of another version are refused.
@@ -38,6 +38,8 @@ SUFFIX = ".nc"
 _STEP = 1.0 / 30_000.0
 #: Mark of Mueller matrices among packed arrays.
 _MUELLER = " mueller"
+#: Attribute of tables of crossed gratings.
+_CROSSED = "crossed"
 _AGAIN = "solve it again with solve_orders"
 
 
@@ -46,10 +48,7 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 
     Raises a DiffractionError if it cannot be written; no half-written file is left.
     """
-    if Path(path).suffix.lower() != SUFFIX:
-        raise DiffractionError(
-            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
-        )
+    _check_suffix(path)
     packed = {
         (band.k, kind + part): np.rint(values / _STEP).astype(">i2")
         for band in table.bands
@@ -95,6 +94,41 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         temporary.write_bytes(data)
 
 
+def save_crossed(table: CrossedTable, path: str | os.PathLike[str]) -> None:
+    """Write a NetCDF file with the variable `efficiency` over wavelength, y, x, order_y, order_x.
+
+    Rounding and errors as of `save_orders`.
+    """
+    _check_suffix(path)
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        file.title = "Efficiencies of the orders of a crossed grating"
+        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
+        setattr(file, _CROSSED, np.int32(1))
+        file.periods, file.periods_units = np.array(table.periods), "um"
+        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
+        file.header = json.dumps(dict(table.header), sort_keys=True)
+        axes = ("wavelength", "y", "x", "order_y", "order_x")
+        for name, size in zip(axes, table.values.shape, strict=True):
+            file.createDimension(name, size)
+        numbers = np.rint(table.values / _STEP).astype(">i2")
+        variable = file.createVariable("efficiency", ">i2", axes)
+        variable[:] = numbers
+        variable.scale_factor, variable.units = np.float64(_STEP), "1"
+        file.sha256 = _crossed_checksum(file, numbers)
+        file.flush()
+        data = content.getvalue()
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _check_suffix(path: str | os.PathLike[str]) -> None:
+    if Path(path).suffix.lower() != SUFFIX:
+        raise DiffractionError(
+            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
+        )
+
+
 def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     """Read a file that `save_orders` wrote.
 
@@ -137,7 +171,7 @@ def load_any_orders(path: str | os.PathLike[str]) -> OrderTable | CrossedTable:
                 raise DiffractionError(
                     f"its format version is {version}, this program reads {FORMAT_VERSION}"
                 )
-            return crossed_of(file) if hasattr(file, CROSSED_ATTRIBUTE) else _table(file)
+            return _crossed(file) if hasattr(file, _CROSSED) else _table(file)
     except DiffractionError as error:
         raise DiffractionError(f"'{path}' is not a table of orders: {error}; {_AGAIN}") from error
     except Exception as error:  # whatever SciPy makes of damaged bytes
@@ -210,4 +244,25 @@ def _checksum(
     for key in sorted(packed):
         content.update(repr((key, packed[key].shape)).encode())
         content.update(np.ascontiguousarray(packed[key], ">i2").data)
+    return content.hexdigest()
+
+
+def _crossed(file: Any) -> CrossedTable:
+    """Return the table of a crossed grating of an open file."""
+    variable = file.variables["efficiency"]
+    if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+        raise ValueError(f"it claims {variable.shape} numbers")
+    if file.sha256 != _crossed_checksum(file, variable[:]).encode():
+        raise ValueError("its checksum is of another one")
+    values = (variable[:] * variable.scale_factor).astype(np.float32)
+    (d_x, d_y), (low, high) = map(float, file.periods), map(float, file.wavelengths)
+    return CrossedTable((d_x, d_y), (low, high), values, json.loads(file.header))
+
+
+def _crossed_checksum(file: Any, numbers: NDArray[Any]) -> str:
+    header = file.header.encode() if isinstance(file.header, str) else file.header
+    content = hashlib.sha256(header)
+    for part in (file.periods, file.wavelengths):
+        content.update(np.asarray(part, ">f8").tobytes())
+    content.update(np.ascontiguousarray(numbers, ">i2").data)
     return content.hexdigest()

@@ -289,6 +289,20 @@ def reach_of(wavelengths: tuple[float, float]) -> tuple[float, float]:
     return low * 2.0**-MARGIN, high * 2.0**MARGIN
 
 
+def check_wavelengths(wavelengths: Sequence[float]) -> tuple[float, float]:
+    """Return the shortest and the longest wavelength, nm.
+
+    Raises a DiffractionError with the allowed values.
+    """
+    low, high = wavelengths
+    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
+        raise DiffractionError(
+            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
+            f"{WAVELENGTHS[1]:g} nm"
+        )
+    return low, high
+
+
 def check_outline(
     period: float,
     wavelengths: Sequence[float],
@@ -302,12 +316,7 @@ def check_outline(
     """
     if not PERIODS[0] <= period <= PERIODS[1]:  # also refuses NaN
         raise DiffractionError(f"period={period:g} µm must be {PERIODS[0]:g} to {PERIODS[1]:g} µm")
-    low, high = wavelengths
-    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
-        raise DiffractionError(
-            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
-            f"{WAVELENGTHS[1]:g} nm"
-        )
+    low, high = check_wavelengths(wavelengths)
     if not 1.0 <= superstrate <= 5.0:
         raise DiffractionError(f"superstrate={superstrate:g} must be an index of 1 to 5")
     if thin and superstrate != 1.0:
