@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import functools
 import itertools
 import shutil
@@ -12,16 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..system import cores
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
 from .report import check_outputs, save_report
-from .workers import add_workers, client_of, on_workers
+from .solve_crossed import solve_crossed_cell
+from .workers import add_workers, executor_for
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from ..solve.films import Layers
     from ..solve.orders import Estimate
     from ..solve.recipes import SolvedRecipe
@@ -165,7 +162,7 @@ def run(args: argparse.Namespace) -> int:
         )
     elif args.crossed:
         check_outputs([output], [source], "table")
-        table = _solve_crossed(source, output, args)
+        table = solve_crossed_cell(source, output, args)
     else:
         recipe = recipe_of(args)
         output = recipe.output
@@ -190,53 +187,6 @@ def _check_import(args: argparse.Namespace) -> None:
         if getattr(args, name) is not None:
             option = name.replace("_", "-")
             args.parser.error(f"argument --{option}: is for a solution; --import has efficiencies")
-
-
-#: Options that crossed gratings do not have.
-_GROOVES_ONLY = (
-    "duty", "direction", "superstrate", "layers", "beneath", "substrate", "thin", "block",
-    "tolerance", "accept", "solver", "polarised", "theta", "phi", "imports",
-)  # fmt: skip
-
-
-def _solve_crossed(source: Path, output: Path, args: argparse.Namespace) -> CrossedTable:
-    """Solve a crossed grating."""
-    from ..heights.read import LoadOptions, read_heights
-    from ..solve.crossed import solve_crossed
-
-    for name in _GROOVES_ONLY:
-        if getattr(args, name):
-            option = {"layers": "layer", "imports": "import"}.get(name, name)
-            args.parser.error(f"argument --{option}: not allowed with --crossed")
-    if args.period is None:
-        args.parser.error("argument --crossed: needs --period, µm")
-    cell = read_heights(
-        source,
-        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="none"),
-    )
-    rows, columns = cell.heights.shape
-    sizes = args.period / columns, (args.period_y or args.period) / rows
-    if abs(sizes[0] / sizes[1] - 1.0) > 1e-6:
-        args.parser.error(
-            f"argument --period-y: '{source}' has {columns} x {rows} pixels, which are not square "
-            "over these periods"
-        )
-    limits = args.wavelength_range or (380.0, 780.0)
-    folder = output.with_name(f".{output.stem}.solving")
-    say(f"results are kept in '{folder}'")
-    with _executor(args) as (executor, _), Bar(args, " directions") as bar:
-        table = solve_crossed(
-            replace(cell, pixel_size=sizes[0]),
-            1.5 if args.material is None else args.material,
-            wavelengths=limits,
-            step=args.step or 20.0,
-            harmonics=args.resolution or 0,
-            executor=executor,
-            folder=folder,
-            progress=bar,
-        )
-    shutil.rmtree(folder, ignore_errors=True)
-    return table
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
@@ -317,7 +267,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         "in 95 % of directions"
     )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
-    with _executor(args) as (executor, processes), Bar(args, " stations") as bar:
+    with executor_for(args) as (executor, processes), Bar(args, " stations") as bar:
 
         def announce(estimate: Estimate) -> None:
             say(
@@ -358,28 +308,6 @@ def _check_block(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
                 f"argument --block: not allowed with --{name}; the block's index is relative to "
                 "the medium above"
             )
-
-
-@contextlib.contextmanager
-def _executor(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
-    """Yield the processes that solve, and their number."""
-    if on_workers(args):
-        if args.jobs is not None:
-            args.parser.error("argument --jobs: is for this machine; --workers has its own")
-        from ..cluster.workers import check_workers, executor_of
-
-        with client_of(args) as client:
-            count = len(check_workers(client, None))
-            with executor_of(client) as workers:
-                yield workers, count
-        return
-    from ..solve.jobs import processes
-
-    jobs, most = args.jobs or 1, 4 * cores()
-    if jobs > most:
-        args.parser.error(f"argument --jobs: expected 1 to {most}, 4 for each core, got {jobs}")
-    with processes(jobs) as pool:
-        yield pool, jobs
 
 
 def _report(table: OrderTable | CrossedTable, output: Path) -> Iterator[tuple[str, str]]:

@@ -15,6 +15,8 @@ from .console import say, say_warning
 from .options import whole_number
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from ..cluster.frames import Film, FrameRequest
 
 #: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
@@ -100,3 +102,25 @@ def say_report(film: Film) -> dict[str, Any]:
         f"{report['peak'] / 1e9:.2g} GB of memory at most"
     )
     return report
+
+
+@contextlib.contextmanager
+def executor_for(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
+    """Yield the processes that solve, and their number."""
+    if on_workers(args):
+        if args.jobs is not None:
+            args.parser.error("argument --jobs: is for this machine; --workers has its own")
+        from ..cluster.workers import check_workers, executor_of
+
+        with client_of(args) as client:
+            count = len(check_workers(client, None))
+            with executor_of(client) as workers:
+                yield workers, count
+        return
+    from ..solve.jobs import processes
+
+    jobs, most = args.jobs or 1, 4 * cores()
+    if jobs > most:
+        args.parser.error(f"argument --jobs: expected 1 to {most}, 4 for each core, got {jobs}")
+    with processes(jobs) as pool:
+        yield pool, jobs
