@@ -11,11 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from ...atomic import atomic_path
+from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Grid, Sample, means, polar
+from .cells import Cells, Grid, Sample, means, polar
 
 #: Default directions to the light, degrees, nodes of θ of the eye, and wavelengths, nm.
 DEFAULT = Grid(
@@ -45,19 +47,22 @@ def save_bird(
         step * np.arange(_AZIMUTHS * n),
     )  # fmt: skip
     angles = [axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")]
-    theta_i, phi_i, theta_r, phi_r = (np.radians(angle) for angle in angles)
-    wi, size = polar(theta_i, phi_i), np.radians(step)
+    size = np.radians(step)
 
-    def samples(a: float, b: float) -> Sample:
+    def sample(
+        theta_i: Float, phi_i: Float, theta_r: Float, phi_r: Float, a: Float, b: Float
+    ) -> Sample:
         tilted = theta_r + a * size
-        return Sample(wi, polar(tilted, phi_r + b * size), np.abs(np.sin(tilted)))
+        wo = polar(tilted, phi_r + b * size)
+        return Sample(polar(theta_i, phi_i), wo, dr.abs(dr.sin(tilted)))
 
-    values = means(bsdf, samples, grid.wavelengths, size, False, progress)
+    cells = Cells([np.radians(angle) for angle in angles], sample)
+    values = means(bsdf, cells, grid.wavelengths, size, False, progress)
     count = len(grid.wavelengths)
     units = ("°", "°", "°", "°", "nm", "sr^-1")
     names = ("theta_i", "phi_i", "theta_r", "phi_r", "wavelength_i", "BRDF")
     columns = [np.repeat(angle, count) for angle in angles]
-    columns += [np.tile(grid.wavelengths, len(wi)), values.ravel()]
+    columns += [np.tile(grid.wavelengths, len(values)), values.ravel()]
     now = datetime.now(UTC)
     content = {
         "metadata": {

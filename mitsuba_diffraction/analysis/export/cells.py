@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -15,7 +15,9 @@ from ...errors import DiffractionError
 from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature
 from ...plugin.llvm import require_loaded_llvm
-from ...plugin.memory import upload
+from ...plugin.loops import sum_of
+from ...plugin.memory import read_record, upload
+from ...plugin.types import Buffer, Float, Index, Spectrum, Vector3f
 from ...progress import Progress
 from ..maps.hemisphere import sub_samples
 
@@ -29,7 +31,7 @@ FILES = Consumer(
 )
 #: Values in a file at most, about a gigabyte.
 MOST = 1 << 28
-#: Directions of a kernel launch, and samples of a cell at most.
+#: Cells of a kernel launch, and samples of a cell at most.
 _LAUNCH, _MOST_SAMPLES = 1 << 18, 64
 #: Steepest light, degrees.
 STEEPEST = 89.0
@@ -75,23 +77,44 @@ class Grid(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """Directions at one place in each cell: to the light (n, 3), to the eye (n, 3).
+    """Directions at one place in each cell, arrays of Dr.Jit.
 
-    weight : (n,) solid angle of that part of the cell, in any unit.
+    Attributes
+    ----------
+    wi, wo : to the light and to the eye.
+    weight : solid angle of that part of the cell, in any unit.
     """
 
-    wi: Reals
-    wo: Reals
-    weight: Reals
+    wi: Vector3f
+    wo: Vector3f
+    weight: Float
 
 
-#: Sample of each cell at a place: distances from its node, −1 to 1 steps along both axes.
-Samples = Callable[[float, float], Sample]
+class Cells(NamedTuple):
+    """Cells of directions around nodes.
+
+    Attributes
+    ----------
+    nodes : coordinates (n,) of the nodes.
+    sample : of these coordinates, as arrays of Dr.Jit, and of a place: distances from the node, −1
+        to 1 steps along both axes.
+    """
+
+    nodes: Sequence[Reals]
+    sample: Callable[..., Sample]
+
+    def part(self, first: int, last: int) -> list[Float]:
+        """Return the coordinates of some nodes."""
+        return [upload(mi.Float, axis[first:last].astype(np.float32)) for axis in self.nodes]
+
+    def middle(self) -> Sample:
+        """Return the sample at all nodes."""
+        return self.sample(*self.part(0, len(self.nodes[0])), 0.0, 0.0)
 
 
 def means(
     bsdf: Any,
-    samples: Samples,
+    cells: Cells,
     wavelengths: Reals,
     size: float,
     cosine: bool,
@@ -118,60 +141,64 @@ def means(
     require_loaded_llvm()
     sigma = FILES.described(bsdf).sigma
     lobe = 1.0 / (math.sqrt(2.0) * sigma * float(wavenumber(wavelengths[0])))
-    pattern = sub_samples(min(max(math.ceil(0.5 * (size / lobe) ** 2), 1), _MOST_SAMPLES))
-    band = float(wavelengths[1] - wavelengths[0]) if len(wavelengths) > 1 else 0.0
-    sums: Reals | float = 0.0
-    weights: Reals | float = 0.0
-    for n, (a, b, c) in enumerate(pattern):
-        wi, wo, weight = samples(_tent(a), _tent(b))
-        lit = wo[:, 2] > 0.0
-        weights = weights + (weight if cosine else weight * lit)
-        values = np.zeros((len(wo), len(wavelengths)))
-        for first in range(0, len(wo), _LAUNCH):
-            progress(n * len(wo) + first, len(pattern) * len(wo), "evaluating")
-            part = slice(first, first + _LAUNCH)
-            shifted = wavelengths + (c - 0.5) * band
-            values[part] = _values(bsdf, wi[part], wo[part], lit[part], shifted, cosine)
-        sums = sums + values * weight[:, None]
+    x, y, band = sub_samples(min(max(math.ceil(0.5 * (size / lobe) ** 2), 1), _MOST_SAMPLES)).T
+    step = float(wavelengths[1] - wavelengths[0]) if len(wavelengths) > 1 else 0.0
+    pattern = np.stack([_tent(x), _tent(y), (band - 0.5) * step, band], axis=1)
+    places, packet = upload(mi.Float, pattern.astype(np.float32)), len(mi.UnpolarizedSpectrum())
+    count = len(cells.nodes[0])
+    result = np.empty((count, len(wavelengths)), np.float32)
+    for first in range(0, count, _LAUNCH):
+        nodes = cells.part(first, first + _LAUNCH)
+        for wave in range(0, len(wavelengths), packet):
+            done = first + (min(_LAUNCH, count - first) * wave) // len(wavelengths)
+            progress(done, count, "evaluating")
+            light = wavelengths[wave : wave + packet]
+            spectrum = mi.UnpolarizedSpectrum(np.resize(light, packet).tolist())
+            dr.make_opaque(spectrum)  # one kernel for all wavelengths
+            total = _total(bsdf, cells.sample, nodes, places, len(pattern), spectrum, cosine)
+            for column, channel in zip(range(len(light)), total, strict=False):
+                result[first : first + _LAUNCH, wave + column] = np.array(channel)
     progress(1, 1, "evaluating")
-    return np.asarray(sums / np.maximum(weights, 1e-30)[:, None], np.float32)
+    return result
 
 
-def _tent(share: float) -> float:
-    """Return a place of −1 to 1 by an even share of 0 to 1, of density 1 − |place|.
+def _total(
+    bsdf: Any,
+    sample: Callable[..., Sample],
+    nodes: list[Float],
+    places: Buffer,
+    count: int,
+    wavelengths: Spectrum,
+    cosine: bool,
+) -> Spectrum:
+    """Return the mean of f cosθo or f in cells, over so many places, in one kernel."""
+
+    def add(n: Index, _: Any, sums: tuple[Spectrum, Float]) -> tuple[Spectrum, Float]:
+        a, b, shift, _ = read_record(places, n, 4)
+        wi, wo, weight = sample(*nodes, a, b)
+        lit = wo.z > 0.0
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.n = mi.Normal3f(0.0, 0.0, 1.0)
+        si.sh_frame = mi.Frame3f(si.n)
+        si.wi, si.wavelengths = wi, wavelengths + shift
+        f = bsdf.eval(mi.BSDFContext(), si, dr.select(lit, wo, mi.Vector3f(0.0, 0.0, 1.0)))
+        if not cosine:
+            f, weight = f * dr.rcp(dr.select(lit, wo.z, 1.0)), dr.select(lit, weight, 0.0)
+        return sums[0] + dr.select(lit, f * weight, 0.0), sums[1] + weight
+
+    sums = sum_of(count, add, (), (mi.UnpolarizedSpectrum(0.0), mi.Float(0.0)))
+    return sums[0] * dr.rcp(dr.maximum(sums[1], 1e-30))
+
+
+def _tent(share: Reals) -> Reals:
+    """Return places of −1 to 1 by even shares of 0 to 1, of density 1 − |place|.
 
     Programs interpolate between nodes linearly: means of that density keep the power of any lobe.
     """
-    return float(np.sign(share - 0.5) * (1.0 - math.sqrt(1.0 - abs(2.0 * share - 1.0))))
+    return np.asarray(np.sign(share - 0.5) * (1.0 - np.sqrt(1.0 - np.abs(2.0 * share - 1.0))))
 
 
-def _values(
-    bsdf: Any, wi: Reals, wo: Reals, lit: NDArray[np.bool_], wavelengths: Reals, cosine: bool
-) -> Reals:
-    """Return f cosθo or f (n, wavelengths), 0 below the horizon."""
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.n = mi.Normal3f(0.0, 0.0, 1.0)
-    si.sh_frame = mi.Frame3f(si.n)
-    wo = np.where(lit[:, None], wo, [0.0, 0.0, 1.0])
-    si.wi, out = (
-        mi.Vector3f(*(upload(mi.Float, column) for column in each.T.astype(np.float32)))
-        for each in (wi, wo)
-    )
-    context, packet = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
-    result = np.zeros((len(wo), len(wavelengths)))
-    for first in range(0, len(wavelengths), packet):
-        index = np.minimum(np.arange(first, first + packet), len(wavelengths) - 1)
-        light = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in wavelengths[index]])
-        dr.make_opaque(light)  # one kernel for all wavelengths
-        si.wavelengths = light
-        f = bsdf.eval(context, si, out)
-        used = min(packet, len(wavelengths) - first)
-        found = np.stack([np.array(channel) for channel in f][:used], axis=1)
-        result[:, first : first + used] = found if cosine else found / wo[:, 2:]
-    return result * lit[:, None]
-
-
-def polar(theta: Reals, phi: Reals) -> Reals:
-    """Return unit vectors (..., 3) of angles in rad from the normal, and from x towards y."""
-    sine = np.sin(theta)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+def polar(theta: Float, phi: Float) -> Vector3f:
+    """Return unit vectors of angles in rad from the normal, and from x towards y."""
+    sine, cosine = dr.sincos(theta)
+    return mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine)

@@ -11,12 +11,14 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic import atomic_path
+from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Grid, Sample, means, polar
+from .cells import Cells, Grid, Sample, means, polar
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
 DEFAULT = Grid(
@@ -38,23 +40,22 @@ def save_rgl(
     grid.checked(n * n)
     theta, phi = np.radians(grid.theta), np.radians(grid.phi)
     nodes = np.linspace(0.0, 1.0, n)
-    azimuth, elevation, v, u = (
-        axis.ravel() for axis in np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
-    )
-    wi = polar(elevation, azimuth)
+    axes = np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
 
-    def samples(a: float, b: float) -> Sample:
-        place = np.minimum(np.abs(u + a / (n - 1)), 1.0)
-        theta_m, phi_m = 0.5 * np.pi * place**2, np.pi * (2.0 * (v + b / (n - 1)) - 1.0)
-        half = polar(theta_m, phi_m)
-        cosine = (wi * half).sum(axis=1)
-        solid = place * np.sin(theta_m) * np.maximum(cosine, 0.0)
-        return Sample(wi, 2.0 * cosine[:, None] * half - wi, solid)
+    def sample(azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float) -> Sample:
+        place = dr.minimum(dr.abs(u + a / (n - 1)), 1.0)
+        theta_m = 0.5 * np.pi * dr.square(place)
+        half = polar(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
+        wi = polar(elevation, azimuth)
+        cosine = dr.dot(wi, half)
+        solid = place * dr.sin(theta_m) * dr.maximum(cosine, 0.0)
+        return Sample(wi, 2.0 * cosine * half - wi, solid)
 
-    values = means(bsdf, samples, grid.wavelengths, np.pi / (n - 1), True, progress)
+    cells = Cells([axis.ravel() for axis in axes], sample)
+    values = means(bsdf, cells, grid.wavelengths, np.pi / (n - 1), True, progress)
     shape = len(phi), len(theta), n, n
     # density in u and v by which light is drawn: f cosθo times dω/(du dv), and an even share
-    density = (values.mean(axis=1) * samples(0.0, 0.0).weight).reshape(shape)
+    density = (values.mean(axis=1) * np.array(cells.middle().weight)).reshape(shape)
     density += 1e-2 * density.mean(axis=(2, 3), keepdims=True) + 1e-9
     ones = np.ones((2, 2))
     spectra = np.moveaxis(values.reshape(*shape, -1), -1, 2)

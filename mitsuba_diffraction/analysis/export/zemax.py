@@ -10,12 +10,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
+from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Grid, Reals, Sample, means, polar
+from .cells import Cells, Grid, Reals, Sample, means, polar
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
 DEFAULT = Grid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
@@ -39,28 +42,28 @@ def save_zemax(
     grid.checked(_AZIMUTHS * grid.resolution)
     azimuths, radials = np.linspace(0.0, 360.0, _AZIMUTHS), np.linspace(0, _REACH, grid.resolution)
     axes = grid.phi, grid.theta, azimuths, radials
-    rotation, theta, azimuth, radial = (
-        np.radians(axis.ravel()) for axis in np.meshgrid(*axes, indexing="ij")
-    )
+    nodes = [np.radians(axis.ravel()) for axis in np.meshgrid(*axes, indexing="ij")]
     steps = np.radians(azimuths[1]), np.radians(radials[1])
-    mirror = polar(theta, rotation)
-    wi = mirror * [-1.0, -1.0, 1.0]
-    # from the mirror direction towards the normal, and counter-clockwise from there
-    up = -polar(theta + 0.5 * np.pi, rotation)
-    left = np.cross(mirror, up)
 
-    def samples(a: float, b: float) -> Sample:
-        turned, away = azimuth + a * steps[0], np.abs(radial + b * steps[1])
-        around = np.cos(turned)[:, None] * up + np.sin(turned)[:, None] * left
-        wo = np.cos(away)[:, None] * mirror + np.sin(away)[:, None] * around
-        return Sample(wi, wo, np.sin(away))
+    def sample(
+        rotation: Float, theta: Float, azimuth: Float, radial: Float, a: Float, b: Float
+    ) -> Sample:
+        mirror = polar(theta, rotation)
+        # from the mirror direction towards the normal, and counter-clockwise from there
+        up = -polar(theta + 0.5 * np.pi, rotation)
+        turned, away = azimuth + a * steps[0], dr.abs(radial + b * steps[1])
+        around = dr.cos(turned) * up + dr.sin(turned) * dr.cross(mirror, up)
+        wo = dr.cos(away) * mirror + dr.sin(away) * around
+        return Sample(mi.Vector3f(-mirror.x, -mirror.y, mirror.z), wo, dr.sin(away))
 
-    values = means(bsdf, samples, grid.wavelengths, float(max(steps)), False, progress)[:, 0]
+    cells = Cells(nodes, sample)
+    values = means(bsdf, cells, grid.wavelengths, float(max(steps)), False, progress)[:, 0]
+    azimuth, radial = nodes[2:]
     shape = tuple(len(axis) for axis in axes)
     # TIS: ∫ f cosθ dω, linear between nodes: ∫ (1 − r/h) r dr = h²/6; azimuth 0 is there twice
     solid = np.where(radial == 0.0, steps[1] ** 2 / 6.0, steps[1] * np.sin(radial)) * steps[0]
     solid *= np.where((azimuth == 0.0) | (azimuth > 2.0 * np.pi - 1e-6), 0.5, 1.0)
-    cosines = np.maximum(samples(0.0, 0.0).wo[:, 2], 0.0)
+    cosines = np.maximum(np.array(cells.middle().wo.z), 0.0)
     tis = (values * cosines * solid).reshape(shape).sum(axis=(2, 3))
     table = values.reshape(shape)
     lines = [
