@@ -113,9 +113,10 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
         return ["--wavelength-range", "550,555"]
     small = SMALL.get(command, [])
     if "--block" in rest:  # by coupled waves
-        return [*small, "--resolution", "20"]
-    # a sheet has a material that light goes through
-    return [*_PERFECT, *small] if command == "solve" and "--thin" not in rest else small
+        return [*small, "--period", "0.3", "--resolution", "10"]
+    if "--thin" in rest:
+        return [*small, "--resolution", "40"]
+    return [*_PERFECT, *small] if command == "solve" else small  # others let light through
 
 
 def small_look(command: str, value: str) -> str:
