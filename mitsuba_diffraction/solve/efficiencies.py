@@ -352,6 +352,16 @@ def _check(grid: Efficiencies, shown: str) -> None:
         )
 
 
+def missed_shares(missed: Real, light: Real) -> tuple[float, float]:
+    """Return the missed part of all light, and the part that 95 % of the lights (n,) keep.
+
+    Directions with hardly any light are judged by a twentieth of the mean.
+    """
+    floor = max(0.05 * float(light.mean()), 1e-12)
+    worst = np.quantile(missed / np.maximum(light, floor), 0.95)
+    return float(missed.sum()) / max(float(light.sum()), 1e-12), float(worst)
+
+
 def warn_of_one_way(error: float, shown: str) -> None:
     """Warn of light without reciprocity.
 

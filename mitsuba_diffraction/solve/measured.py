@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, CrossedTable, OrderTable, cells
 from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
-from .efficiencies import ROUNDING, Efficiencies, read_efficiencies, warn_of_one_way
+from .efficiencies import (
+    ROUNDING,
+    Efficiencies,
+    missed_shares,
+    read_efficiencies,
+    warn_of_one_way,
+)
 from .measured_crossed import crossed_table, warn_of_gaps
+from .nodes import kinds_of
 from .scattered import interpolated
 from .stations import Real
 
@@ -232,12 +239,9 @@ def _errors(table: OrderTable, samples: _Samples) -> dict[str, float]:
             options = {"transmitted": True} if side else {}
             got = table.efficiency(samples.x, samples.y, samples.wavelength, order, **options)
             missed, light = missed + np.abs(got - share), light + share
-    floor = 0.05 * light.mean()
-    return {
-        "error_mean": float(missed.sum() / max(light.sum(), 1e-12)),
-        "error_worst": float(np.quantile(missed / np.maximum(light, max(floor, 1e-12)), 0.95)),
-        "reciprocity_error": _one_way(table, samples),
-    }
+    mean, worst = missed_shares(missed, light)
+    one_way = _one_way(table, samples)
+    return {"error_mean": mean, "error_worst": worst, "reciprocity_error": one_way}
 
 
 def _one_way(table: OrderTable, samples: _Samples) -> float:
@@ -266,15 +270,14 @@ def _lacks_directions(samples: _Samples, last: int) -> bool:
     return any(
         (k, kind, j) not in present
         for k in range(int(cell.band.min()), last + 1)
-        for kind in ((cells.A, cells.B) if k else (cells.A,))
+        for kind in kinds_of(k)
         for j in range(k + 1 - kind)
     )
 
 
 def _band(k: int, counts: Counts, samples: _Samples) -> Band:
     """Interpolate a band, each segment between kinks from its own samples."""
-    kinds = (cells.A, cells.B) if k else (cells.A,)
-    return Band(k, *(_kind(k, kind, counts, samples) for kind in kinds))
+    return Band(k, *(_kind(k, kind, counts, samples) for kind in kinds_of(k)))
 
 
 def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.float32]:

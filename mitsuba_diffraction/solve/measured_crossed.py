@@ -18,7 +18,7 @@ from ..tables.orders.crossed import (
     propagates,
 )
 from ..tables.orders.table import LARGEST_SUM
-from .efficiencies import ROUNDING, Efficiencies, warn_of_one_way
+from .efficiencies import ROUNDING, Efficiencies, missed_shares, warn_of_one_way
 from .scattered import interpolated
 from .stations import Real
 
@@ -205,11 +205,7 @@ def _errors(table: CrossedTable, powers: Real, wavelengths: Real, mirror: Real) 
     # the file has light to compare with up to its last angle
     known = np.hypot(out_x, out_y) <= np.hypot(x, y).max()
     back = np.where(known, table.efficiency(-out_x, -out_y, *light), got)
-    missed, total = np.abs(got - truth).sum(axis=-1), truth.sum(axis=-1)
-    floor = max(0.05 * float(total.mean()), 1e-12)
-    whole = max(float(total.sum()), 1e-12)
-    return {
-        "error_mean": float(missed.sum()) / whole,
-        "error_worst": float(np.quantile(missed / np.maximum(total, floor), 0.95)),
-        "reciprocity_error": float(np.abs(back - got).sum()) / whole,
-    }
+    total = truth.sum(axis=-1)
+    mean, worst = missed_shares(np.abs(got - truth).sum(axis=-1), total)
+    one_way = float(np.abs(back - got).sum()) / max(float(total.sum()), 1e-12)
+    return {"error_mean": mean, "error_worst": worst, "reciprocity_error": one_way}

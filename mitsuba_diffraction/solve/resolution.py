@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.orders import cells
 from .films import material_text
 from .jobs import Jobs, Problem
-from .nodes import Place
+from .nodes import Place, kinds_of
 from .stations import Real, reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
@@ -67,6 +66,13 @@ def chosen_resolution(
     )
 
 
+def resolved(problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float) -> Chosen:
+    """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
+    if problem.resolution == 0:
+        return chosen_resolution(problem, jobs, places, tolerance)
+    return Chosen(problem, resolution_error(problem, jobs, places))
+
+
 def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
     """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
@@ -110,8 +116,7 @@ def places_to_test(bands: Sequence[int]) -> list[Place]:
     return [
         Place(band, kind, tau, 0.41, (0.05, 0.95))
         for band in some
-        for kind, tau in ((cells.A, 0.5), (cells.B, 0.2))
-        if band or kind == cells.A
+        for kind, tau in zip(kinds_of(band), (0.5, 0.2), strict=False)
     ]
 
 
