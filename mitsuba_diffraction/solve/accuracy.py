@@ -8,9 +8,9 @@ import numpy as np
 
 from ..tables.orders import OrderTable
 from ..tables.orders.polarised import mueller_of
-from .efficiencies import missed_shares
 from .jobs import Jobs, Problem
 from .nodes import places_at
+from .samples import missed_shares
 from .stations import Complex, Real
 
 #: The error that 95 % of directions and wavelengths keep, in tolerances.

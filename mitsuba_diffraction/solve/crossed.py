@@ -21,10 +21,11 @@ from ..heights.field import HeightField
 from ..progress import Progress, silent
 from ..tables.orders import CrossedTable
 from ..tables.orders.crossed import all_orders, most_orders
-from .efficiencies import Efficiencies, missed_shares
+from .efficiencies import Efficiencies
 from .grating_index import Material, material_of
 from .jobs import Jobs, Solved, digest_of
 from .measured_crossed import crossed_table
+from .samples import missed_shares
 from .stations import Real
 
 #: Lights at which the table and the solver are checked.
@@ -139,7 +140,7 @@ def solve_crossed(
 
 
 def _solved(cell: UnitCell, lam: Real, last: tuple[int, int], light: tuple[float, float]) -> Solved:
-    """Return what `reflected` does, with its time."""
+    """Return the efficiencies of `reflected`, with their time."""
     start = time.thread_time()
     return Solved(reflected(cell, light, lam, last), time.thread_time() - start)
 

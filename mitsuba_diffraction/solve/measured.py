@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, CrossedTable, OrderTable, cells
-from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
-from .efficiencies import (
-    ROUNDING,
-    Efficiencies,
-    missed_shares,
-    read_efficiencies,
-    warn_of_one_way,
-)
+from ..tables.orders.table import MOST_NODES, S_AND_P, Counts, check_outline
+from .efficiencies import Efficiencies, read_efficiencies
 from .measured_crossed import crossed_table, warn_of_gaps
 from .nodes import kinds_of
-from .scattered import interpolated
+from .samples import check_orders, interpolated, missed_shares, warn_of_one_way
 from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
@@ -170,56 +164,21 @@ def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
     values = grid.values.reshape(len(lam), len(grid.orders), -1)
     # order m lies at p − m, which 0 to K hold
     step, room = lam / (1e3 * optical_period), np.sqrt(1.0 - y**2)
-    _check_orders(grid, values, (-room - x) / step, (room - x) / step, shown)
+    lowest, highest = ((side * room - x) / step for side in (-1.0, 1.0))
+
+    def propagates(orders: NDArray[np.int64], edge: float) -> NDArray[np.bool_]:
+        above = orders >= lowest[:, None] - edge * _EDGE
+        return np.asarray(above & (orders <= highest[:, None] + edge * _EDGE))
+
+    every = np.arange(int(np.floor(lowest.min())), int(np.ceil(highest.max())) + 1)
+    signs = "the period, and the signs of the orders and of theta"
+    check_orders(grid, values.reshape(*values.shape[:2], -1, 2), every, propagates, signs, shown)
     powers = np.maximum(np.nan_to_num(values), 0.0)
-    total = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2))
-    if total.max() > LARGEST_SUM:
-        brightest = int(total.max(axis=1).argmax())
-        raise DiffractionError(
-            f"{shown}, {grid.light(brightest)}: the orders sum to {total.max():.4g}, above "
-            f"{LARGEST_SUM}"
-        )
     cell = cells.to_cell(x, y, lam, optical_period)
     ends = float(lam.min()), float(lam.max())
     w = cells.w_of(cell.k_continuous, lam, ends, optical_period)
     s = np.round(x / room, _DIGITS)
     return _Samples(x, y, lam, cell, w, s, grid.orders, powers)
-
-
-def _check_orders(
-    grid: Efficiencies, values: Real, lowest: Real, highest: Real, shown: str
-) -> None:
-    """Refuse orders that do not propagate, but have light, and those that do, but are missing.
-
-    values : (n, m, 2) or (n, m, 4) of all light and orders; lowest, highest : (n,) orders between
-        which all propagate.
-    """
-    lit = np.nan_to_num(values).max(axis=-1) > ROUNDING
-    extra = np.argwhere(lit & ~_between(grid.orders, lowest, highest, _EDGE))
-    if len(extra):
-        light, place = map(int, extra[0])
-        raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {grid.orders[place]} does not propagate; check "
-            "the period, and the signs of the orders and of theta"
-        )
-    known = ~np.isnan(values).any(axis=-1) & _between(grid.orders, lowest, highest, -_EDGE)
-    first, last = np.ceil(lowest + _EDGE), np.floor(highest - _EDGE)
-    lacking = np.flatnonzero(known.sum(axis=1) < last - first + 1)
-    if len(lacking):
-        light = int(lacking[0])
-        listed = set(grid.orders[known[light]].tolist())
-        order = next(m for m in range(int(first[light]), int(last[light]) + 1) if m not in listed)
-        raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {order} propagates, and has no efficiencies; "
-            "list it, with 0 if it has no light"
-        )
-
-
-def _between(
-    orders: NDArray[np.int64], lowest: Real, highest: Real, edge: float
-) -> NDArray[np.bool_]:
-    """Whether orders (m,) lie between two ends (n,), widened by an edge: (n, m)."""
-    return (orders >= lowest[:, None] - edge) & (orders <= highest[:, None] + edge)
 
 
 def _errors(table: OrderTable, samples: _Samples) -> dict[str, float]:

@@ -17,9 +17,8 @@ from ..tables.orders.crossed import (
     most_orders,
     propagates,
 )
-from ..tables.orders.table import LARGEST_SUM
-from .efficiencies import ROUNDING, Efficiencies, missed_shares, warn_of_one_way
-from .scattered import interpolated
+from .efficiencies import Efficiencies
+from .samples import check_orders, interpolated, missed_shares, warn_of_one_way
 from .stations import Real
 
 #: Widest gap between azimuths, degrees, that needs no warning.
@@ -46,7 +45,15 @@ def crossed_table(
     mirror = _mirror(grid)
     # (λ, direction, order) of unpolarised light
     known = grid.values.mean(axis=-1).reshape(len(grid.wavelengths), len(mirror), -1)
-    _check(grid, known, mirror, periods, last, shown)
+
+    def propagates_at(orders: NDArray[np.int64], edge: float) -> NDArray[np.bool_]:
+        share = 1.0 - 1e-6 * edge
+        light = grid.wavelengths * share, mirror * share
+        return _open(*light, (orders[:, 0], orders[:, 1]), periods).reshape(-1, len(orders))
+
+    signs = "the periods, and the signs of the orders, of theta and of phi"
+    each = known.reshape(-1, known.shape[-1], 1, 1)
+    check_orders(grid, each, np.column_stack(_orders(last)), propagates_at, signs, shown)
     powers = _dense(grid, known, last)
     filled = _filled(powers, grid.wavelengths, mirror, periods, last)
     table = CrossedTable(
@@ -92,45 +99,6 @@ def _open(
     """Whether orders propagate, (λ, direction, order)."""
     x, y = mirror.T[:, None, :, None]
     return propagates(x, y, wavelengths[:, None, None], *orders, periods)
-
-
-def _check(
-    grid: Efficiencies, known: Real, mirror: Real, periods: tuple[float, float],
-    last: tuple[int, int], shown: str,
-) -> None:  # fmt: skip
-    """Refuse light in evanescent orders, missing orders, and sums above 1.001."""
-    pairs = grid.orders.T
-    lit = np.nan_to_num(known) > ROUNDING
-    # at grazing, rounding decides
-    mild = _open(
-        grid.wavelengths * (1.0 - 1e-6), mirror * (1.0 - 1e-6), (pairs[0], pairs[1]), periods
-    )
-    if (extra := np.argwhere(lit & ~mild)).size:
-        lam, direction, order = extra[0]
-        raise DiffractionError(
-            f"{shown}, {grid.light(lam * len(mirror) + direction)}: order "
-            f"{tuple(map(int, pairs[:, order]))} does not propagate; check the periods, and the "
-            "signs of the orders, of theta and of phi"
-        )
-    listed = {tuple(map(int, pair)): n for n, pair in enumerate(pairs.T)}
-    m_x, m_y = _orders(last)
-    must = _open(grid.wavelengths * (1.0 + 1e-6), mirror * (1.0 + 1e-6), (m_x, m_y), periods)
-    for n, pair in enumerate(zip(m_x.tolist(), m_y.tolist(), strict=True)):
-        absent = (
-            np.isnan(known[..., listed[pair]]) if pair in listed else np.full(must.shape[:2], True)
-        )
-        if (lacking := np.argwhere(must[..., n] & absent)).size:
-            lam, direction = lacking[0]
-            raise DiffractionError(
-                f"{shown}, {grid.light(lam * len(mirror) + direction)}: order {pair} propagates, "
-                "and has no efficiencies; list it, with 0 if it has no light"
-            )
-    sums = np.nansum(known, axis=-1)
-    if (largest := float(sums.max())) > LARGEST_SUM:
-        raise DiffractionError(
-            f"{shown}, {grid.light(int(sums.argmax()))}: the orders sum to {largest:.4g}, above "
-            f"{LARGEST_SUM}"
-        )
 
 
 def _dense(grid: Efficiencies, known: Real, last: tuple[int, int]) -> Real:

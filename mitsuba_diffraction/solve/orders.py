@@ -173,7 +173,7 @@ def solve_orders(
 
 
 def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
-    """Return what the headers of all solved tables have."""
+    """Return the entries that the headers of all solved tables have."""
     grating = chosen.problem.grating
     return {
         "solver": solver_of(chosen.problem).name,
