@@ -112,7 +112,7 @@ def _s_and_p(matrices: Real, cosine: float, sine: float) -> Real:
 
     Raises a DiffractionError if they sum to more than a coarse solution may.
 
-    cosine, sine : of the turn from the axes of the matrices to those of s and p.
+    cosine, sine : of the turn from the axes of the matrices to s and p.
     """
     row = matrices[:, 0]  # M00 … M03
     part = cosine * row[:, 1] + sine * row[:, 2]

@@ -108,8 +108,7 @@ def _band(grating: Grating, band: int, counts: Counts, solved: Mapping[Place, Co
     moved = {place: solved[place] * _to_node(grating, place) for place in places}
     kinds = []
     for kind in kinds_of(band):
-        of_kind = [place for place in places if place.kind == kind]
-        values = at_nodes(of_kind, counts, moved, 2, powers)
+        values = at_nodes(kind, places, counts, moved, 2, powers)
         kinds.append(_lossless(values.astype(np.float64)).astype(np.float32))
     return Band(band, *kinds)
 

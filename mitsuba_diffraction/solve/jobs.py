@@ -27,24 +27,17 @@ from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
-from .profiles import Profile
 from .sheet import sheet_efficiencies
 from .stations import Complex, Grating, Real, Solver, on_both_sides
-from .structure import Structure
 
 Item = TypeVar("Item", bound=Hashable)
 
-#: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
-METHODS: dict[str, Callable[[Profile, int], Solver]] = {
-    "integral": IntegralSolver,
-    "coupled": CoupledWaves,
-    "chandezon": Chandezon,
-}
-#: Solvers of layers by name: from a profile, a resolution and a structure.
-LAYERED: dict[str, Callable[[Profile, int, Structure], Solver]] = {
-    "coupled": CoupledWaves,
-    "chandezon": Chandezon,
-}
+#: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
+#: solve layers, a structure.
+METHODS: dict[str, Callable[..., Solver]] = {
+    "integral": IntegralSolver, "coupled": CoupledWaves, "chandezon": Chandezon,
+}  # fmt: skip
+LAYERED = ("coupled", "chandezon")
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
@@ -126,9 +119,8 @@ def digest_of(*parts: object) -> str:
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
     grating = problem.grating
-    if grating.structure:
-        return LAYERED[problem.method](grating.profile, problem.resolution, grating.structure)
-    return METHODS[problem.method](grating.profile, problem.resolution)
+    layers = [grating.structure] if grating.structure else []
+    return METHODS[problem.method](grating.profile, problem.resolution, *layers)
 
 
 class Solved(NamedTuple):

@@ -182,44 +182,37 @@ def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
 
 
 def _errors(table: OrderTable, samples: _Samples) -> dict[str, float]:
-    """Compare a table with the file, unpolarised, as `orders.measured_error` does with solutions.
+    """Compare a table with the file, unpolarised, as `accuracy.measured_error` does with solutions.
 
     Light at which a single order propagates is left out, unless there is no other.
+
+    Reversed light is compared in all orders but 0, reflected: η_m(ωi) = η_m(−ωo), where the file
+    has light as oblique as the reversed light. Its error is a share of the light.
     """
-    sides = (False, True) if table.thin else (False,)
-    missed, light = np.zeros(len(samples.x)), np.zeros(len(samples.x))
+    x, y, lam = samples.x, samples.y, samples.wavelength
+    missed, light, turned, sent = np.zeros(len(x)), np.zeros(len(x)), 0.0, 0.0
+    oblique = np.hypot(x, y).max()
     lone = not samples.powers[:, samples.orders != 0].any()
-    for order in samples.orders:
+    for order in samples.orders.tolist():
         if order == 0 and not lone:
             continue
-        truth = samples.of_order(int(order))
-        for side in sides:
+        truth = samples.of_order(order)
+        reflected = table.efficiency(x, y, lam, order)
+        found = [reflected]
+        if table.thin:
+            found.append(table.efficiency(x, y, lam, order, transmitted=True))
+        for side, got in enumerate(found):
             share = truth[:, 2 * side : 2 * side + 2].mean(axis=-1)
-            options = {"transmitted": True} if side else {}
-            got = table.efficiency(samples.x, samples.y, samples.wavelength, order, **options)
             missed, light = missed + np.abs(got - share), light + share
+        if order:
+            out = x + order * lam / (1e3 * table.optical_period)
+            known = np.hypot(out, y) <= oblique
+            back = table.efficiency(-out[known], y[known], lam[known], order)
+            turned += float(np.abs(back - reflected[known]).sum())
+            sent += float(reflected[known].sum())
     mean, worst = missed_shares(missed, light)
-    one_way = _one_way(table, samples)
+    one_way = turned / max(sent, 1e-12)
     return {"error_mean": mean, "error_worst": worst, "reciprocity_error": one_way}
-
-
-def _one_way(table: OrderTable, samples: _Samples) -> float:
-    """Return the mean difference between light and reversed light, over the light.
-
-    Of all orders but 0, reflected, without polarisation: η_m(ωi) = η_m(−ωo), where the file has
-    light as oblique as the reversed light.
-    """
-    missed = light = 0.0
-    oblique = np.hypot(samples.x, samples.y)
-    for order in samples.orders[samples.orders != 0]:
-        out = samples.x + order * samples.wavelength / (1e3 * table.optical_period)
-        known = np.hypot(out, samples.y) <= oblique.max()
-        places = samples.y[known], samples.wavelength[known], order
-        there = table.efficiency(samples.x[known], *places)
-        back = table.efficiency(-out[known], *places)
-        missed += float(np.abs(back - there).sum())
-        light += float(there.sum())
-    return missed / max(light, 1e-12)
 
 
 def _lacks_directions(samples: _Samples, last: int) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.spatial import KDTree
 
 from ..errors import DiffractionError, warn
@@ -135,16 +136,12 @@ def _filled(
 
 def _nodes(filled: Real, wavelengths: Real, mirror: Real, last: tuple[int, int]) -> Any:
     """Return the values of the table's even grid."""
-    least = np.diff(wavelengths).min() if len(wavelengths) > 1 else 1.0
-    count = 1 + round(float(np.ptp(wavelengths) / least)) if len(wavelengths) > 1 else 2
-    even = np.linspace(wavelengths[0], wavelengths[-1], min(max(count, 2), MOST_WAVELENGTHS))
-    upper = np.clip(np.searchsorted(wavelengths, even), 1, max(len(wavelengths) - 1, 1))
     if len(wavelengths) == 1:
         along = np.repeat(filled, 2, axis=0)
     else:
-        low, high = wavelengths[upper - 1], wavelengths[upper]
-        share = ((even - low) / (high - low))[:, None, None]
-        along = filled[upper - 1] * (1.0 - share) + filled[upper] * share
+        count = 1 + round(float(np.ptp(wavelengths) / np.diff(wavelengths).min()))
+        even = np.linspace(wavelengths[0], wavelengths[-1], min(count, MOST_WAVELENGTHS))
+        along = make_interp_spline(wavelengths, filled, k=1)(even)
     axis = np.linspace(-1.0, 1.0, NODES)
     y, x = np.meshgrid(axis, axis, indexing="ij")
     places = np.stack([x, y], axis=-1)

@@ -62,6 +62,7 @@ def places_at(
 
 
 def at_nodes(
+    kind: int,
     places: Sequence[Place],
     counts: Counts,
     solved: Mapping[Place, Complex],
@@ -70,11 +71,12 @@ def at_nodes(
 ) -> NDArray[np.float32]:
     """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …).
 
-    places : of one kind, of `places_of`.
+    places : of a band, of `places_of`.
     """
-    shape = values_of(solved[places[0]]).shape
+    of_kind = [place for place in places if place.kind == kind]
+    shape = values_of(solved[of_kind[0]]).shape
     values = np.empty((counts.tau, counts.rho, *shape), np.float32)
-    for number, place in enumerate(places):
+    for number, place in enumerate(of_kind):
         n, m = divmod(number, counts.rho)
         values[n, m] = values_of(solved[place])
         back = values_of(reversed_light(solved[place], sides))

@@ -317,14 +317,13 @@ def _band(
     band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool, sides: int
 ) -> Band:
     """Assemble the efficiencies, and Mueller matrices, of a band from its stations."""
-    kinds, matrices = [], []
+    kinds, matrices, places = [], [], places_of(band, counts)
     for kind in kinds_of(band):
-        places = [place for place in places_of(band, counts) if place.kind == kind]
-        values = at_nodes(places, counts, solved, sides, powers)
+        values = at_nodes(kind, places, counts, solved, sides, powers)
         total = values.sum(axis=-2, keepdims=True)
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
-            matrices.append(at_nodes(places, counts, solved, sides, _limited_mueller))
+            matrices.append(at_nodes(kind, places, counts, solved, sides, _limited_mueller))
     return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 

@@ -76,19 +76,13 @@ def resolved(problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: f
 def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
     """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
-    return _refined(problem, values, jobs, places).error
-
-
-class _Refined(NamedTuple):
-    problem: Problem
-    values: dict[Place, Real]
-    error: float
+    return _refined(problem, values, jobs, places)[2]
 
 
 def _refined(
     problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
-) -> _Refined:
-    """Solve at the next resolution, and compare.
+) -> tuple[Problem, dict[Place, Real], float]:
+    """Return the problem at the next resolution, its efficiencies, and the share that changes.
 
     Raises a DiffractionError if the grating reflects nothing.
     """
@@ -102,7 +96,7 @@ def _refined(
             "light; choose materials that differ from the medium above, and layers that light "
             "passes"
         )
-    return _Refined(fine, finer, missed / light)
+    return fine, finer, missed / light
 
 
 def finer_problem(problem: Problem) -> Problem:

@@ -42,7 +42,7 @@ def check_orders(
     values : (n, m, kinds, polarisations) of all lights and orders of the grid.
     every : (k,), or (k, 2) of a crossed grating, orders that some light may have.
     propagates : returns whether orders propagate, (n, orders); at grazing, where rounding decides,
-        all of them for 1 and none for -1.
+        they do for 1, and do not for -1.
     signs : numbers of the user that may be wrong.
     """
     powers = np.maximum(np.nan_to_num(values), 0.0)

@@ -15,7 +15,8 @@ import numpy as np
 
 from ...atomic import atomic_path
 from ...progress import Progress, silent
-from .cells import Grid, Sample, means, polar
+from ..maps.hemisphere import polar
+from .cells import Grid, Sample, means
 
 #: Default directions to the light, degrees, nodes of θ of the eye, and wavelengths, nm.
 DEFAULT = Grid(

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,8 @@ from ...plugin.description import VARYING, Consumer, Feature
 from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
 from ...progress import Progress
-from ..maps.hemisphere import sub_samples
+from ..maps.evaluate import opaque
+from ..maps.hemisphere import flat_interaction, sub_samples
 
 Reals = NDArray[np.float64]
 
@@ -149,29 +149,19 @@ def _values(
     bsdf: Any, wi: Reals, wo: Reals, lit: NDArray[np.bool_], wavelengths: Reals, cosine: bool
 ) -> Reals:
     """Return f cosθo or f (n, wavelengths), 0 below the horizon."""
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.n = mi.Normal3f(0.0, 0.0, 1.0)
-    si.sh_frame = mi.Frame3f(si.n)
     wo = np.where(lit[:, None], wo, [0.0, 0.0, 1.0])
-    si.wi, out = (
+    towards, out = (
         mi.Vector3f(*(upload(mi.Float, column) for column in each.T.astype(np.float32)))
         for each in (wi, wo)
     )
+    si = flat_interaction(towards, len(wo))
     context, packet = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
     result = np.zeros((len(wo), len(wavelengths)))
     for first in range(0, len(wavelengths), packet):
         index = np.minimum(np.arange(first, first + packet), len(wavelengths) - 1)
-        light = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in wavelengths[index]])
-        dr.make_opaque(light)  # one kernel for all wavelengths
-        si.wavelengths = light
+        si.wavelengths = mi.UnpolarizedSpectrum(opaque(wavelengths[index]))
         f = bsdf.eval(context, si, out)
         used = min(packet, len(wavelengths) - first)
         found = np.stack([np.array(channel) for channel in f][:used], axis=1)
         result[:, first : first + used] = found if cosine else found / wo[:, 2:]
     return result * lit[:, None]
-
-
-def polar(theta: Reals, phi: Reals) -> Reals:
-    """Return unit vectors (..., 3) of angles in rad from the normal, and from x towards y."""
-    sine = np.sin(theta)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)

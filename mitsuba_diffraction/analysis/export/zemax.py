@@ -15,7 +15,8 @@ import numpy as np
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...progress import Progress, silent
-from .cells import Grid, Reals, Sample, means, polar
+from ..maps.hemisphere import polar
+from .cells import Grid, Reals, Sample, means
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
 DEFAULT = Grid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
