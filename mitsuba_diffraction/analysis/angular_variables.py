@@ -76,17 +76,12 @@ def fitted(incident: Reals, collected: Reals, brightness: Reals, hue: Reals) -> 
     share = brightness / top
     mean = float(np.average(x, weights=share))
     width = float(np.sqrt(np.average((x - mean) ** 2, weights=share)))
-
-    def bell(p: Reals) -> Reals:
-        return np.asarray(p[0] * np.exp(-0.5 * ((x - p[1]) / p[2]) ** 2) - share)
-
-    b = least_squares(bell, [1.0, mean, max(width, 1.0)])
+    b = least_squares(
+        lambda p: p[0] * np.exp(-0.5 * ((x - p[1]) / p[2]) ** 2) - share,
+        [1.0, mean, max(width, 1.0)],
+    )
     lit = share > _DARK
-
-    def cosine(p: Reals) -> Reals:
-        return np.asarray(p[0] * np.cos(p[1] * y[lit]) - hue[lit] / hue.max())
-
-    h = least_squares(cosine, [1.0, 0.5])
+    h = least_squares(lambda p: p[0] * np.cos(p[1] * y[lit]) - hue[lit] / hue.max(), [1.0, 0.5])
     values = (
         top * b.x[0], b.x[1], abs(b.x[2]), hue.max() * h.x[0], abs(h.x[1]),
         top * np.sqrt(np.mean(b.fun**2)), hue.max() * np.sqrt(np.mean(h.fun**2)),

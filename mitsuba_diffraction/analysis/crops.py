@@ -60,14 +60,8 @@ def _squares(whole: HeightField, count: int, side: float) -> list[HeightField]:
     # the squares lie evenly between the edges
     left = np.linspace(0, whole.shape[1] - nx, columns).round().astype(int)
     low = np.linspace(0, whole.shape[0] - ny, rows).round().astype(int)
-    result = []
-    for n, cell in enumerate(cells.tolist(), 1):
-        row, column = divmod(cell, columns)
-        y, x = low[row], left[column]
-        line = f"crop {n} of {len(cells)}, {side:g} µm"
-        heights = whole.heights[y : y + ny, x : x + nx]
-        result.append(whole.changed(heights, line, cut_out=True, periodic=False))
-    return result
+    places = [(low[cell // columns], left[cell % columns]) for cell in cells.tolist()]
+    return _cut(whole, places, (ny, nx), f", {side:g} µm")
 
 
 def _parts(whole: HeightField, count: int) -> list[HeightField]:
@@ -82,10 +76,17 @@ def _parts(whole: HeightField, count: int) -> list[HeightField]:
             f"crops={count}: crops of {nx} x {ny} pixels are smaller than {FEWEST_PIXELS} a side; "
             f"{whole.name} has {whole.shape[1]} x {whole.shape[0]}, enough for {max(most, 0)}"
         )
-    result = []
-    for n in range(count):
-        row, column = divmod(n, columns)
-        heights = whole.heights[row * ny : (row + 1) * ny, column * nx : (column + 1) * nx]
-        line = f"crop {n + 1} of {count}"
-        result.append(whole.changed(heights, line, cut_out=True, periodic=False))
-    return result
+    return _cut(whole, [(n // columns * ny, n % columns * nx) for n in range(count)], (ny, nx))
+
+
+def _cut(
+    whole: HeightField, places: Sequence[tuple[int, int]], shape: tuple[int, int], note: str = ""
+) -> list[HeightField]:
+    """Cut rectangles (ny, nx) out of a field, whose lower left corners are at these pixels."""
+    return [
+        whole.changed(
+            whole.heights[y : y + shape[0], x : x + shape[1]],
+            f"crop {n} of {len(places)}{note}", cut_out=True, periodic=False,
+        )
+        for n, (y, x) in enumerate(places, 1)
+    ]  # fmt: skip

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solve.grating_index import material_of
 from ..tables.energy.conservation import Energy, Surface
 from ..tables.energy.conserved import Dielectric, Reflector
 from ..tables.table import DiffractionTable
@@ -32,21 +31,10 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     """
     materials = {
         "dielectric 1.5": Reflector("small_slope", lambda lam: np.full(len(lam), 1.5 + 0j)),
-        "aluminium": Reflector("small_slope", _aluminium),
+        "aluminium": Reflector("small_slope", material_of("Al", WAVELENGTHS[::2]).index),
         "none (R = 1)": Reflector("kirchhoff", lambda lam: None),
     }
     return {name: _material_summary(table, material) for name, material in materials.items()}
-
-
-def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Return Mitsuba's complex index of aluminium, (n,)."""
-    parts = []
-    for name in ("eta", "k"):
-        nodes, values = np.loadtxt(
-            Path(str(mi.file_resolver().resolve(f"data/ior/Al.{name}.spd")))
-        ).T
-        parts.append(np.interp(wavelengths, nodes, values))
-    return np.asarray(parts[0] + 1j * parts[1])
 
 
 def _material_summary(table: DiffractionTable, material: Reflector) -> dict[str, Any]:

@@ -40,13 +40,11 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
 def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
     """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
     known_range(material, pigment)
-    for name, limits in (
-        ("material", known_range(material)),
-        ("pigment", known_range(None, pigment)),
-    ):
+    of_each = {f"material='{material}'": known_range(material)}
+    of_each[f"pigment='{pigment}'"] = known_range(None, pigment)
+    for name, limits in of_each.items():
         if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
-            value = material if name == "material" else pigment
             raise DiffractionError(
-                f"{name}='{value}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
+                f"{name} is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
                 f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others"
             )

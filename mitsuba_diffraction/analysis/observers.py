@@ -33,8 +33,7 @@ of CIE 2006 (170-1), for 2 degrees.
 from __future__ import annotations
 
 import difflib
-import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -80,35 +79,32 @@ class Eye:
     density: tuple[float, ...]
 
 
-def pigment_template(peak: float, wavelengths: ArrayLike = GRID, beta: bool = True) -> Reals:
-    """Return the absorbance (n,) of an A1 pigment with this λmax in nm, its maximum 1."""
-    lam = np.asarray(wavelengths, np.float64)
-    x = peak / lam
+def pigment_template(peak: float, beta: bool = True) -> Reals:
+    """Return the absorbance of an A1 pigment with this λmax in nm at `GRID`, its maximum 1."""
+    x = peak / GRID
     a = 0.8795 + 0.0459 * np.exp(-((peak - 300.0) ** 2) / 11940.0)
     alpha = 1.0 / (
         np.exp(69.7 * (a - x)) + np.exp(28.0 * (0.922 - x)) + np.exp(-14.9 * (1.104 - x)) + 0.674
     )
     if beta:
         place, width = 189.0 + 0.315 * peak, -40.5 + 0.195 * peak
-        alpha += 0.26 * np.exp(-(((lam - place) / width) ** 2))
+        alpha += 0.26 * np.exp(-(((GRID - place) / width) ** 2))
     return np.asarray(alpha / alpha.max())
 
 
-def droplet_transmittance(kind: str, cut: float, wavelengths: ArrayLike = GRID) -> Reals:
-    """Return the transmittance (n,) of an oil droplet: C, Y, R, P by λcut in nm; T, clear."""
-    lam = np.asarray(wavelengths, np.float64)
+def droplet_transmittance(kind: str, cut: float) -> Reals:
+    """Return the transmittance of an oil droplet at `GRID`: C, Y, R, P by λcut in nm; T, clear."""
     if kind == "T":
-        return np.ones_like(lam)
+        return np.ones_like(GRID)
     slope, intercept = _DROPLETS[kind]
     gradient = 0.5 / (slope * cut + intercept - cut)
-    return np.asarray(np.exp(-np.exp(-2.89 * gradient * (lam - cut) + 1.08)))
+    return np.asarray(np.exp(-np.exp(-2.89 * gradient * (GRID - cut) + 1.08)))
 
 
-def bird_media(wavelengths: ArrayLike = GRID) -> Reals:
-    """Return the transmittance (n,) of a blue tit's ocular media, the polynomial of pavo."""
-    lam = np.asarray(wavelengths, np.float64)
+def bird_media() -> Reals:
+    """Return the transmittance of a blue tit's ocular media at `GRID`, the polynomial of pavo."""
     terms = (8.928e-13, -2.595e-9, 3.006e-6, -0.001736, 0.5013, -55.56)
-    return np.asarray(np.maximum(np.log(np.maximum(np.polyval(terms, lam), 1e-300)), 0.0))
+    return np.asarray(np.maximum(np.log(np.maximum(np.polyval(terms, GRID), 1e-300)), 0.0))
 
 
 def _modelled(
@@ -158,12 +154,7 @@ def eye_of(name: str) -> Eye:
     """
     if name.lower() in EYES:
         return EYES[name.lower()]()
-    if Path(name).suffix.lower() != ".csv":
-        raise DiffractionError(
-            f"observer={quoted(name)} is unknown{_nearest(name, EYES)}; choose one of "
-            f"{', '.join(EYES)}, or a CSV of wavelengths (nm) and a column for each receptor"
-        )
-    names, table = _columns(name)
+    names, table = _columns(name, "observer", EYES, "a column for each receptor")
     if len(names) < 2:
         raise DiffractionError(
             f"'{name}' is not a table of receptors: give a header, wl and a name for each of two "
@@ -184,14 +175,20 @@ def eye_of(name: str) -> Eye:
     return Eye(names, curves / curves.sum(axis=1, keepdims=True), (1.0,) * len(names))
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
-    """Return a question for the names nearest to `name`, or nothing."""
-    close = difflib.get_close_matches(name.lower(), known, cutoff=0.65)
-    return f" (did you mean {' or '.join(close)}?)" if close else ""
+def _columns(
+    name: str, parameter: str, known: Collection[str], columns: str
+) -> tuple[tuple[str, ...], Reals]:
+    """Return the names of a CSV's columns behind wavelengths, and its numbers; none if wrong.
 
-
-def _columns(name: str) -> tuple[tuple[str, ...], Reals]:
-    """Return the names of a CSV's columns behind wavelengths, and its numbers; none if wrong."""
+    Raises a DiffractionError for other files; the message lists known values of the parameter.
+    """
+    if Path(name).suffix.lower() != ".csv":
+        close = difflib.get_close_matches(name.lower(), known, cutoff=0.65)
+        hint = f" (did you mean {' or '.join(close)}?)" if close else ""
+        raise DiffractionError(
+            f"{parameter}={quoted(name)} is unknown{hint}; choose one of {', '.join(known)}, or a "
+            f"CSV of wavelengths (nm) and {columns}"
+        )
     header, *lines = read_text(name).splitlines() or [""]
     names = tuple(word.strip() for word in header.split(",")[1:])
     try:
@@ -217,12 +214,7 @@ def illuminant_of(name: str) -> Reals:
     if light in ILLUMINANTS:
         power = 1.0 / GRID if light == "ideal" else illuminant_power(light.upper(), GRID)
         return _of_mean_1(power * GRID)
-    if Path(name).suffix.lower() != ".csv":
-        raise DiffractionError(
-            f"illuminant={quoted(name)} is unknown{_nearest(name, ILLUMINANTS)}; choose one of "
-            f"{', '.join(ILLUMINANTS)}, or a CSV of wavelengths (nm) and photons"
-        )
-    names, table = _columns(name)
+    names, table = _columns(name, "illuminant", ILLUMINANTS, "photons")
     covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
     if not (covers and table[:, 1].min() >= 0.0 < table[:, 1].max()):
         raise DiffractionError(
@@ -308,9 +300,7 @@ def contrasts(catches: ArrayLike, noise: ArrayLike) -> Reals:
     with np.errstate(divide="ignore"):
         f = np.where(q > 0.0, np.log(np.maximum(q, 1e-300)), np.nan)
     weights = e**-2 / np.sum(e**-2)
-    result = np.zeros((len(q), len(q)))
-    for i, j in itertools.combinations(range(len(q)), 2):
-        step = f[i] - f[j]
-        distance = np.sqrt(np.sum(((step - weights @ step) / e) ** 2))
-        result[i, j] = result[j, i] = distance
-    return result
+    steps = f[:, None] - f
+    result = np.sqrt(np.sum(((steps - (steps @ weights)[..., None]) / e) ** 2, axis=-1))
+    np.fill_diagonal(result, 0.0)
+    return np.asarray(result)

@@ -42,7 +42,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
     files: dict[Path, None] = {}
     for name in names:
         if name.is_dir():
-            held = [f for f in sorted(name.iterdir()) if f.is_file() and _may_be_scan(f)]
+            shown = [f for f in sorted(name.iterdir()) if f.is_file() and f.name[0] != "."]
+            held = [f for f in shown if f.suffix.lower() not in _NO_SCANS]
             if not held:
                 raise DiffractionError(f"'{name}' holds no scans; name another folder")
         elif not name.exists() and glob.has_magic(str(name)):
@@ -54,10 +55,6 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
             held = [name]
         files |= dict.fromkeys(held)
     return list(files)
-
-
-def _may_be_scan(file: Path) -> bool:
-    return not file.name.startswith(".") and file.suffix.lower() not in _NO_SCANS
 
 
 def sample_of(file: Path, repeats: str = "name") -> str:

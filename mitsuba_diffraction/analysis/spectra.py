@@ -32,6 +32,8 @@ from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
 from .known_wavelengths import check_material
+from .maps.evaluate import opaque
+from .maps.hemisphere import flat_interaction
 from .spectrometer import Geometry, across_plane, cone, light_direction, lobe_width
 
 Reals = NDArray[np.float64]
@@ -211,19 +213,10 @@ def brdf_values(bsdf: Any, wi: Reals, wo: Reals, wavelength: Reals) -> Reals:
     bsdf : of the current variant, spectral and vectorised.
     """
     light, view = (mi.Vector3f(*(upload(mi.Float, c) for c in d.T)) for d in (wi, wo))
-    si = _interaction(view)
+    si = flat_interaction(view, len(wo))
     si.wavelengths = mi.UnpolarizedSpectrum(upload(mi.Float, wavelength))
     f = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, light))[0]
     return np.asarray(f, np.float64) / wi[:, 2]
-
-
-def _interaction(view: Any) -> Any:
-    """Return points of a flat surface in air, seen from directions (mi.Vector3f)."""
-    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(view))
-    si.n = mi.Normal3f(0.0, 0.0, 1.0)
-    si.sh_frame = mi.Frame3f(si.n)
-    si.wi = view
-    return si
 
 
 def _signals(
@@ -263,9 +256,9 @@ def _integrals(
     """
     light = light_direction(geometry)
     directions, weights = map(np.concatenate, zip(*cones, strict=True))
-    si = _interaction(mi.Vector3f(*(upload(mi.Float, column) for column in directions.T)))
-    towards = mi.Vector3f(*(float(c) for c in light))
-    dr.make_opaque(towards)
+    view = mi.Vector3f(*(upload(mi.Float, column) for column in directions.T))
+    si = flat_interaction(view, len(directions))
+    towards = mi.Vector3f(opaque(light))
     turned = (weights * directions[:, 2] / light[2]).reshape(len(cones), -1)
     stokes = _stokes(light, across_plane(geometry))
     context, channels = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
@@ -275,9 +268,7 @@ def _integrals(
         if before is not None:
             before(float(lam[first]))
         index = np.minimum(first + np.minimum(np.arange(channels), packet - 1), lam.size - 1)
-        wavelengths = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in lam[index]])
-        dr.make_opaque(wavelengths)  # one kernel for all wavelengths
-        si.wavelengths = wavelengths
+        si.wavelengths = mi.UnpolarizedSpectrum(opaque(lam[index]))
         f = bsdf.eval(context, si, towards)
         parts = [f] if not mi.is_polarized else [f[0, 0], f[0, 1], f[0, 2]]
         dr.eval(parts)

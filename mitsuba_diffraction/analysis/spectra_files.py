@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 import functools
-import io
 import itertools
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..optics.colour import encode_srgb, linear_srgb, response
+from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, noises, quantum_catches
 from .spectra import Reals, Spectra
-from .spectral_variables import colours_of
+from .spectral_variables import colours_of, daylit
 from .survey_files import write_table
 
 if TYPE_CHECKING:
@@ -72,10 +70,11 @@ def save_csv(groups: Groups, path: str | os.PathLike[str]) -> None:
 
 def save_errors(groups: Groups, path: str | os.PathLike[str]) -> None:
     """Write the standard errors of means, in the columns of `save_csv`, per cent."""
-    columns: dict[str, Reals] = {}
-    for name, each in groups.items():
-        if each.error is not None:
-            columns |= dict(zip(each.names(name), each.error.T, strict=True))
+    columns = {
+        name: values
+        for group, each in groups.items() if each.error is not None
+        for name, values in zip(each.names(group), each.error.T, strict=True)
+    }  # fmt: skip
     _write(path, next(iter(groups.values())).wavelength, columns)
 
 
@@ -125,20 +124,16 @@ def save_catches(
 
 
 def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["wl", *columns])
-    for n, lam in enumerate(wavelength):
-        writer.writerow([f"{lam:g}", *(f"{100.0 * values[n]:.6g}" for values in columns.values())])
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
+    rows = [
+        {"wl": f"{lam:g}", **{name: f"{100.0 * each[n]:.6g}" for name, each in columns.items()}}
+        for n, lam in enumerate(wavelength)
+    ]
+    write_table(Path(path), ["wl", *columns], rows)
 
 
 def colour_of(spectra: Spectra) -> Reals:
     """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
-    step = np.gradient(spectra.wavelength) if spectra.wavelength.size > 1 else np.ones(1)
-    weights = response(spectra.wavelength) * step[:, None]
-    linear = np.maximum(linear_srgb(spectra.value.T @ weights), 0.0)
+    linear = daylit(spectra)
     brightest = linear.max(axis=1, keepdims=True)
     return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
 

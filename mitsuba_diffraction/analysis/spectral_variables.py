@@ -37,10 +37,8 @@ def colours_of(spectra: Spectra) -> list[dict[str, Any]]:
     from matplotlib.colors import rgb_to_hsv
 
     lam, values = spectra.wavelength, spectra.value.T
-    step = np.gradient(lam) if lam.size > 1 else np.ones(1)
-    linear = np.maximum(linear_srgb(values @ (response(lam) * step[:, None])), 0.0)
     rows = []
-    for name, curve, colour in zip(spectra.geometry.names, values, linear, strict=True):
+    for name, curve, colour in zip(spectra.geometry.names, values, daylit(spectra), strict=True):
         row: dict[str, Any] = {"spectrum": name}
         if colour.max() > _DARK:
             encoded = encode_srgb(colour / colour.max())
@@ -49,6 +47,13 @@ def colours_of(spectra: Spectra) -> list[dict[str, Any]]:
             row |= {"hue": round(360.0 * float(hue), 1), "chroma": round(float(chroma), 4)}
         rows.append(row | _pavo(lam, 100.0 * curve))
     return rows
+
+
+def daylit(spectra: Spectra) -> Reals:
+    """Return the colours in daylight, linear sRGB without negative parts, (detectors, 3)."""
+    lam = spectra.wavelength
+    step = np.gradient(lam) if lam.size > 1 else np.ones(1)
+    return np.maximum(linear_srgb(spectra.value.T @ (response(lam) * step[:, None])), 0.0)
 
 
 def _pavo(lam: Reals, curve: Reals) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import wavenumber
+from .maps.hemisphere import polar
 
 Reals = NDArray[np.float64]
 
@@ -87,10 +88,7 @@ def light_direction(geometry: Geometry) -> Reals:
 
 def in_plane(geometry: Geometry, angle: float) -> Reals:
     """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
-    theta, phi = math.radians(-angle), math.radians(geometry.azimuth)
-    return np.array(
-        [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
-    )
+    return polar(math.radians(-angle), math.radians(geometry.azimuth))
 
 
 def cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:

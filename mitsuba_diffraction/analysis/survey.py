@@ -147,12 +147,10 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
-    diffracted = diffracted_light(table, LightDirection(job.theta, phi))
+    light = LightDirection(job.theta, phi)
+    diffracted = diffracted_light(table, light)
     row["diffracted"] = diffracted.share
-    index, floor = (
-        diffracted.iridescence(),
-        chance_iridescence(table, LightDirection(job.theta, phi)),
-    )
+    index, floor = diffracted.iridescence(), chance_iridescence(table, light)
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (

@@ -63,11 +63,6 @@ def _iridescence(row: Mapping[str, Any]) -> str:
     return f"iridescence {index:.2g}, by chance {chance:.2g}{beyond}"
 
 
-def _crop(row: Mapping[str, Any]) -> str:
-    """Text of a crop's number; empty for a whole scan."""
-    return f", crop {row['crop']}" if row.get("crop") else ""
-
-
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
     from matplotlib.figure import Figure
@@ -80,8 +75,9 @@ def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
             axes.imshow(picture)
         period = row.get("period_1_um")
         title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
+        crop = f", crop {row['crop']}" if row.get("crop") else ""
         axes.set_title(
-            f"{Path(row['file']).name[:34]}{_crop(row)}\n{title}{_iridescence(row)}"
+            f"{Path(row['file']).name[:34]}{crop}\n{title}{_iridescence(row)}"
             + (f"\n{row['tiling']}" if row["tiling"] else ""),
             fontsize=6,
         )

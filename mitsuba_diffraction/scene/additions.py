@@ -110,7 +110,7 @@ def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
     props = sensor.props
     pose = np.array(props["to_world"].matrix)
-    film = next(state.nodes[n].props for n in _targets(sensor)
+    film = next(state.nodes[n].props for n in _targets(sensor).values()
                 if state.nodes[n].type == mi.ObjectType.Film)  # fmt: skip
     size = np.array([film.get("width", 768), film.get("height", 576)], float)
     tangents = size / size.min() * np.tan(np.radians(float(props["fov"]) / 2))
@@ -194,13 +194,12 @@ def remove_dark_lights(state: Any) -> None:
     dark = {
         number
         for number, node in enumerate(nodes)
-        if node.type == mi.ObjectType.Emitter and black.intersection(_targets(node))
+        if node.type == mi.ObjectType.Emitter and black.intersection(_targets(node).values())
     }
-    resolved = mi.Properties.Type.ResolvedReference
-    for props in (node.props for node in nodes):
-        for name in list(props.keys()):
-            if props.type(name) == resolved and props[name].index() in dark:
-                del props[name]
+    for node in nodes:
+        for name, target in _targets(node).items():
+            if target in dark:
+                del node.props[name]
 
 
 def put_box_filters(state: Any) -> None:
@@ -211,11 +210,8 @@ def put_box_filters(state: Any) -> None:
     for node in state.nodes:
         if node.type != mi.ObjectType.Film:
             continue
-        for name in list(node.props.keys()):
-            value = node.props[name]
-            if isinstance(value, mi.Properties.ResolvedReference) and (
-                state.nodes[value.index()].type == mi.ObjectType.ReconstructionFilter
-            ):
+        for name, target in _targets(node).items():
+            if state.nodes[target].type == mi.ObjectType.ReconstructionFilter:
                 del node.props[name]
         node.props["box"] = mi.load_dict({"type": "box"})
 
@@ -236,20 +232,14 @@ def _node_of(state: Any, name: str) -> int:
 def _put_on_shape(state: Any, number: int, text: str) -> None:
     """Give a shape a BSDF with the surface, over the scene's BSDF."""
     shape = state.nodes[number].props
-    beneath, replaced = None, []
-    for key in shape.keys():  # noqa: SIM118 - Properties is no mapping
-        kind = shape.type(key)
-        if kind == mi.Properties.Type.ResolvedReference:
-            target = shape[key].index()
-        elif kind == mi.Properties.Type.Reference:
-            target = state.id_to_index.get(shape[key].id(), -1)
-        else:
-            continue
-        if target >= 0 and state.nodes[target].type == mi.ObjectType.BSDF:
-            beneath = target
-            replaced.append(key)
-    surface = _surface(state, text, None if beneath is None else _inside(state, beneath))
-    changed = _copy(shape, shape.plugin_name(), leave=replaced)
+    targets = {
+        name: target
+        for name, target in _targets(state.nodes[number], state.id_to_index).items()
+        if state.nodes[target].type == mi.ObjectType.BSDF
+    }
+    beneath = _inside(state, [*targets.values()][-1]) if targets else None
+    surface = _surface(state, text, beneath)
+    changed = _copy(shape, shape.plugin_name(), leave=[*targets])
     changed.set_id(shape.id())
     changed["bsdf"] = mi.Properties.ResolvedReference(_append(state, _two_sided(state, surface)))
     state.nodes[number].props = changed
@@ -263,7 +253,8 @@ def _put_on_bsdf(state: Any, number: int, text: str) -> None:
         inside = _append(state, _copy(props, props.plugin_name()))
     surface = _surface(state, text, inside)
     nested = any(
-        node.type == mi.ObjectType.BSDF and number in _targets(node) for node in state.nodes
+        node.type == mi.ObjectType.BSDF and number in _targets(node).values()
+        for node in state.nodes
     )
     replaced = surface if nested else _two_sided(state, surface)
     replaced.set_id(name)
@@ -275,16 +266,22 @@ def _inside(state: Any, number: int) -> int:
     node = state.nodes[number]
     if node.props.plugin_name() != "twosided":
         return number
-    targets = _targets(node)
-    return targets[0] if targets else number
+    return next(iter(_targets(node).values()), number)
 
 
-def _targets(node: Any) -> list[int]:
-    """Return the numbers of the nodes within a node."""
-    resolved = mi.Properties.Type.ResolvedReference
-    props = node.props
-    names = [name for name in props.keys() if props.type(name) == resolved]  # noqa: SIM118
-    return [int(props[name].index()) for name in names]
+def _targets(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int]:
+    """Return the numbers of the nodes within a node, by the names of its properties.
+
+    ids : numbers by id, to which references that Mitsuba has not resolved are looked up.
+    """
+    props, kinds = node.props, mi.Properties.Type
+    found = {}
+    for name in list(props.keys()):
+        if props.type(name) == kinds.ResolvedReference:
+            found[name] = int(props[name].index())
+        elif ids and props.type(name) == kinds.Reference and props[name].id() in ids:
+            found[name] = ids[props[name].id()]
+    return found
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
@@ -323,7 +320,7 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
     if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
         if "pigment" in old:
             props["pigment"] = old["pigment"]
-        for target in _targets(state.nodes[beneath]):
+        for target in _targets(state.nodes[beneath]).values():
             if state.nodes[target].type == mi.ObjectType.BSDF:
                 props["beneath"] = mi.Properties.ResolvedReference(target)
     return props

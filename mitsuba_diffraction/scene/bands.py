@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -71,50 +73,40 @@ def put_bands(state: Any, bands: Bands) -> None:
         node.props = film
 
 
-class WiderTables:
-    """Context in which heights of loaded scenes have tables from a wavelength on.
+@contextlib.contextmanager
+def wider_tables(first: float) -> Iterator[None]:
+    """Give heights of scenes that are loaded inside tables from a wavelength on.
 
     first : nm; default tables begin at 360.
     """
-
-    def __init__(self, first: float) -> None:
-        self._first = min(first, SHORTEST_WAVELENGTH)
-
-    def __enter__(self) -> Self:
-        for name, kind in _plugins().items():
-            mi.register_bsdf(name, self._maker(kind))
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for name, kind in _plugins().items():
-            mi.register_bsdf(name, kind)
-
-    def _maker(self, kind: Callable[..., Any]) -> Callable[[Any], Any]:
-        def make(props: Any) -> Any:
-            bsdf = kind(props, self._table)
-            shortest = getattr(describe(bsdf), "shortest_wavelength", 0.0)
-            if shortest > self._first:
-                raise DiffractionError(
-                    f"the table begins at {shortest:g} nm, and the eye sees from {self._first:g} "
-                    f"nm; give heights, or DiffractionTable.build(wavelength_range="
-                    f"({self._first:g}, 830))"
-                )
-            return bsdf
-
-        return make
-
-    def _table(self, request: TableRequest) -> DiffractionTable:
-        _, last = request.settings.wavelength_range
-        first = min(self._first, request.settings.wavelength_range[0])
-        return request.cached(replace(request.settings, wavelength_range=(first, last)))
-
-
-def _plugins() -> dict[str, Callable[..., Any]]:
-    """Return the BSDFs that build tables, of the current variant."""
     from ..plugin.diffraction import Diffraction
     from ..plugin.transmission.diffraction_dielectric import DiffractionDielectric
 
-    return {"diffraction": Diffraction, "diffraction_dielectric": DiffractionDielectric}
+    first = min(first, SHORTEST_WAVELENGTH)
+
+    def table(request: TableRequest) -> DiffractionTable:
+        low, last = request.settings.wavelength_range
+        wider = replace(request.settings, wavelength_range=(min(first, low), last))
+        return request.cached(wider)
+
+    def make(kind: Callable[..., Any], props: Any) -> Any:
+        bsdf = kind(props, table)
+        shortest = getattr(describe(bsdf), "shortest_wavelength", 0.0)
+        if shortest > first:
+            raise DiffractionError(
+                f"the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; give "
+                f"heights, or DiffractionTable.build(wavelength_range=({first:g}, 830))"
+            )
+        return bsdf
+
+    kinds = {"diffraction": Diffraction, "diffraction_dielectric": DiffractionDielectric}
+    for name, kind in kinds.items():
+        mi.register_bsdf(name, functools.partial(make, kind))
+    try:
+        yield
+    finally:
+        for name, kind in kinds.items():
+            mi.register_bsdf(name, kind)
 
 
 def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> None:
@@ -124,7 +116,11 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> N
 
     sensors : cameras of the scene; surfaces : BSDFs that diffract, by the names of their shapes.
     """
-    ranges = [_recorded(sensor) for sensor in sensors if _has_bands(sensor)]
+    # spectral variants alone use a film's own responses
+    banded = [
+        s for s in sensors if mi.is_spectral and s.film().sensor_response_function() is not None
+    ]
+    ranges = [_recorded(sensor) for sensor in banded]
     if not ranges:
         return
     first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
@@ -139,11 +135,6 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> N
                     f"{name} is black outside {low} to {high} nm, the range of its table, and the "
                     f"camera records {first:.4g} to {last:.4g} nm; make the table with {wider}"
                 )
-
-
-def _has_bands(sensor: Any) -> bool:
-    """Whether a sensor's film has responses of its own, which spectral variants alone use."""
-    return mi.is_spectral and sensor.film().sensor_response_function() is not None
 
 
 def _recorded(sensor: Any) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -135,15 +134,11 @@ def framing(positions: Floats, camera: Floats, tangents: tuple[float, float]) ->
     the camera's axes |x − c_x| ≤ t (z − c_z) for all vertices.
     """
     local = positions @ camera
-    depth, place = np.inf, np.zeros(3)
-    for axis, tangent in enumerate(tangents):
-        t = _FILLED * tangent
-        upper = (local[:, axis] - t * local[:, 2]).max()
-        lower = (-local[:, axis] - t * local[:, 2]).max()
-        depth = min(depth, -(upper + lower) / (2.0 * t))
-        place[axis] = (upper - lower) / 2.0
-    place[2] = depth
-    return np.asarray(camera @ place)
+    t = _FILLED * np.array(tangents)
+    across, away = local[:, :2], t * local[:, 2:]
+    upper, lower = (across - away).max(axis=0), (-across - away).max(axis=0)
+    depth = (-(upper + lower) / (2.0 * t)).min()
+    return np.asarray(camera @ [*(upper - lower) / 2.0, depth])
 
 
 def turned_around(positions: Floats) -> Floats:
@@ -155,12 +150,9 @@ def turned_around(positions: Floats) -> Floats:
     heights = z.min() + np.ptp(z) * np.arange(65) / 64
     around = 2 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     circle = np.stack([np.cos(around), np.sin(around)], axis=-1)
-    rings = [
-        np.column_stack([r * circle, np.full(_AZIMUTHS, h)])
-        for r, ends in zip(widest, pairwise(heights), strict=True)
-        for h in ends
-    ]
-    return np.concatenate(rings)
+    ends = np.column_stack([heights[:-1], heights[1:]]).ravel()
+    rings = widest.repeat(2)[:, None, None] * circle
+    return np.column_stack([rings.reshape(-1, 2), ends.repeat(_AZIMUTHS)])
 
 
 def _upright(up: str) -> Floats:

@@ -23,7 +23,7 @@ from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from ..system import memory
-from .parameters import check_parameters, parameters_of, refuse_pipes
+from .parameters import check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
@@ -103,18 +103,18 @@ def load_scene(
     import mitsuba as mi
 
     from .additions import split_values
-    from .bands import WiderTables, warn_of_dark_bands
+    from .bands import warn_of_dark_bands, wider_tables
     from .orbit import turn_cameras
 
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
-    refuse_pipes(file, values.parameters)
+    files_of(file, values.parameters, with_sources=False)  # refuses pipes
     check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
-        with contextlib.nullcontext() if bands is None else WiderTables(bands.first):
+        with contextlib.nullcontext() if bands is None else wider_tables(bands.first):
             scene = _instantiated(file, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error

@@ -64,21 +64,16 @@ def parameters_of(
     return defaults if _collect(scene, dict(values or {}), defaults, 0) else None
 
 
-def refuse_pipes(scene: Path, values: Mapping[str, str]) -> None:
-    """Raise a DiffractionError if the scene names a pipe or a device, for which Mitsuba waits."""
-    _walk(scene, values, with_sources=False)
-
-
-def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]:
+def files_of(
+    scene: Path, values: Mapping[str, str] | None = None, *, with_sources: bool = True
+) -> list[Path]:
     """List the scene, its includes, and every file named by one of them or by a recipe they name.
 
-    Raises a DiffractionError if one is a pipe or a device, or a recipe is wrong.
+    Raises a DiffractionError if one is a pipe or a device, for which Mitsuba would wait, or a
+    recipe is wrong.
+
+    with_sources : whether recipes are read, for the files that they name.
     """
-    return _walk(scene, values, with_sources=True)
-
-
-def _walk(scene: Path, values: Mapping[str, str] | None, with_sources: bool) -> list[Path]:
-    """List the files that a scene names, with those that recipes among them name if asked."""
     from ..heights.recipes import Recipe
 
     defaults = parameters_of(scene, values) or {}

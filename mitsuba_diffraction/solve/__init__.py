@@ -21,7 +21,7 @@ chandezon   solver: coordinates that follow slopes
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
 nodes       choice of the numbers of nodes
-scattered   interpolation between scattered samples
+samples     checks of lights' orders, interpolation between lights, errors of a table
 sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 
-from ..tables.orders import OrderTable, cells
+from ..tables.orders import OrderTable
 from ..tables.orders.polarised import mueller_of
 from .jobs import Jobs, Problem
-from .nodes import Place
+from .nodes import places_at
+from .samples import missed_shares
 from .stations import Complex, Real
 
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
@@ -43,37 +43,35 @@ class Measured(NamedTuple):
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
     """Compare a table with solutions at random directions and wavelengths.
 
-    Directions are sampled as in diffuse light within the superstrate, wavelengths evenly.
+    Directions are sampled as in diffuse light within the superstrate, or a block, wavelengths
+    evenly; of two sides, light of each by turns. Where order 0 is alone, it is the colour; of a
+    block, the light that goes through.
     """
     x, y, lam = diffuse_light(SAMPLES, table.wavelengths)
-    cell = cells.to_cell(x, y, lam, table.optical_period)
-    w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
-    places = [
-        Place(int(band), int(kind), float(tau), float(rho), (float(at),))
-        for band, kind, tau, rho, at in zip(
-            cell.band, cell.kind, cell.tau, cell.rho, w, strict=True
-        )
-    ]
+    cell, places = places_at(x, y, lam, table.wavelengths, table.optical_period)
     solved = jobs.amplitudes(problem, places, "measuring the error")
     missed, light, turned = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
+    index = table.block or 1.0  # light of a table has its direction above the surface
+    guided = index * np.hypot(x, y) >= 1.0
     for n, place in enumerate(places):
-        j = int(cell.channel[n])
-        side, count = n % table.sides, int(cell.channels[n])  # from above and below by turns
+        j, count = int(cell.channel[n]), int(cell.channels[n])
+        side = n % table.sides * int(not (table.block and guided[n]))
         truth = powers(solved[place])[0, side * count + j].mean(axis=-1)  # (ports,)
         orders = j - np.arange(count)
-        of = functools.partial(table.efficiency, x[n], y[n], lam[n], orders, from_below=side == 1)
-        got = np.concatenate([of(transmitted=other != side) for other in range(table.sides)])
-        # where order 0 is alone, it is the colour
-        coloured = np.tile(orders != 0 if count > 1 else True, table.sides)
+        at, below = (index * x[n], index * y[n], lam[n], orders), (side == 1) != bool(table.block)
+        got = np.concatenate([
+            table.efficiency(*at, from_below=below, transmitted=other != side)
+            for other in range(table.sides)
+        ])  # fmt: skip
+        alone = np.arange(table.sides) != (side if table.block else -1)
+        coloured = np.tile(orders != 0, table.sides) if count > 1 else alone
         missed[n], light[n] = np.abs(got - truth)[coloured].sum(), truth[coloured].sum()
         if table.polarised:
             matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
             error = matrices - mueller_of(solved[place])[0, j]
             turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
-    floor = 0.05 * light.mean()  # directions with hardly any light in orders
     return Measured(
-        float(missed.sum() / light.sum()),
-        float(np.quantile(missed / np.maximum(light, floor), 0.95)),
+        *missed_shares(missed, light),
         np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
         float(turned / light.sum()) if table.polarised else None,
     )

@@ -8,26 +8,25 @@ efficiencies do (`measured`), with the same warning.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import DiffractionError
-from ..tables.orders import OrderTable, cells
+from ..tables.orders import OrderTable
 from ..tables.orders.lookup import turned_axes
 from ..tables.orders.polarised import mueller_of
 from ..tables.orders.table import check_outline
 from .efficiencies import Efficiencies, check_light
-from .films import Layers, Substance, material_text, structure_of
+from .films import Layers, Substance, structure_of
 from .grating_index import Material, material_of
-from .jobs import Jobs, problem_of, solver_of
+from .jobs import Jobs, problem_of
 from .measured import table_of
-from .nodes import Place
-from .orders import MOST_EXCESS, Estimate, Settings, announce_stage, silent
+from .nodes import places_at
+from .orders import MOST_EXCESS, Estimate, Settings, announce_stage, header_of, silent
 from .profiles import Profile
-from .resolution import Chosen, chosen_resolution, resolution_error
-from .stations import Complex, Grating, Real
+from .resolution import resolved
+from .stations import Grating, Real
 
 #: Lights of which the resolution is chosen, and solutions at most.
 _COMPARED, _MOST = 5, 100_000
@@ -83,70 +82,45 @@ def solve_beam(
         profile, substance, how.wavelengths, layers=layers, beneath=beneath, substrate=substrate
     )
     grating = Grating(profile, substance, superstrate, how.wavelengths, structure=structure)
-    light = _Lights(grating, lam, polar, azimuth)
     problem = problem_of(grating, how.method, how.resolution or 0)
-    middle = light.places[:: max(len(light.places) // _COMPARED, 1)]
-    if how.resolution is None:
-        chosen = chosen_resolution(problem, work, middle, how.tolerance / 2)
-    else:
-        chosen = Chosen(problem, resolution_error(problem, work, middle))
-    announce_stage(announce, "solving", chosen.problem, work, light.places)
-    solved = work.amplitudes(chosen.problem, light.places, "solving orders")
-    values, orders = light.efficiencies(solved)
-    header: dict[str, Any] = {
-        "solver": solver_of(chosen.problem).name,
-        "material": material_text(grating),
-        "profile": profile.name,
-        "depth": profile.depth,
-        "solver_error": chosen.error,
-        "tolerance": how.tolerance,
+    grid = [axis.ravel() for axis in np.meshgrid(lam, polar, azimuth, indexing="ij")]
+    sine, turn = np.sin(np.radians(grid[1])), np.radians(grid[2])
+    # solvers take y ≥ 0, the mirror image
+    x, y = -sine * np.cos(turn), np.abs(sine * np.sin(turn))
+    cell, places = places_at(x, y, grid[0], how.wavelengths, grating.optical_period)
+    chosen = resolved(problem, work, places[:: max(len(places) // _COMPARED, 1)], how.tolerance / 2)
+    announce_stage(announce, "solving", chosen.problem, work, places)
+    solved = work.amplitudes(chosen.problem, places, "solving orders")
+    first, last = int((cell.channel - cell.channels + 1).min()), int(cell.channel.max())
+    axes = turned_axes(x, y)
+    values = np.full((len(places), last - first + 1, 2), np.nan)
+    for n, (place, j) in enumerate(zip(places, cell.channel.tolist(), strict=True)):
+        both = _s_and_p(mueller_of(solved[place])[0, j], axes.cosine[n], axes.sine[n])
+        values[n, j - np.arange(len(both)) - first] = both
+    header = header_of(chosen, how) | {
         "directions": [[float(t), float(p)] for t in polar for p in azimuth],
         "processor_seconds": round(work.processor_seconds, 1),
     }
-    grid = Efficiencies(lam, polar, azimuth, orders, values)
-    return table_of(grid, profile.period, superstrate, f"the table of {profile.name}", header)
+    shape = lam.size, polar.size, azimuth.size, *values.shape[1:]
+    orders = np.arange(first, last + 1)
+    lights = Efficiencies(lam, polar, azimuth, orders, values.reshape(shape))
+    return table_of(lights, profile.period, superstrate, f"the table of {profile.name}", header)
 
 
-class _Lights:
-    """Grid of light (a wavelengths, b θ, c φ) in the coordinates of stations.
+def _s_and_p(matrices: Real, cosine: float, sine: float) -> Real:
+    """Return the efficiencies (q, 2) of s and p light from the Mueller matrices (q, 4, 4).
 
-    places : of each light, in the order of the grid.
+    Raises a DiffractionError if they sum to more than a coarse solution may.
+
+    cosine, sine : of the turn from the axes of the matrices to s and p.
     """
-
-    def __init__(self, grating: Grating, lam: Real, theta: Real, phi: Real) -> None:
-        grid = np.meshgrid(lam, theta, phi, indexing="ij")
-        self._shape = grid[0].shape
-        lam, theta, phi = (part.ravel() for part in grid)
-        sine = np.sin(np.radians(theta))
-        # solvers take y ≥ 0, the mirror image
-        self._x, self._y = -sine * np.cos(np.radians(phi)), np.abs(sine * np.sin(np.radians(phi)))
-        optical = grating.optical_period
-        self._cell = cell = cells.to_cell(self._x, self._y, lam, optical)
-        w = cells.w_of(cell.k_continuous, lam, grating.wavelengths, optical)
-        rows = zip(cell.band, cell.kind, cell.tau, cell.rho, w, strict=True)
-        self.places = [
-            Place(int(k), int(kind), float(tau), float(rho), (float(at),))
-            for k, kind, tau, rho, at in rows
-        ]
-
-    def efficiencies(self, solved: dict[Place, Complex]) -> tuple[Real, NDArray[np.int64]]:
-        """Return efficiencies (a, b, c, m, 2) of s and p light, NaN where none, and the orders."""
-        last = np.max(self._cell.channel)
-        first = np.min(self._cell.channel - self._cell.channels + 1)
-        orders = np.arange(int(first), int(last) + 1)
-        values = np.full((len(self.places), len(orders), 2), np.nan)
-        axes = turned_axes(self._x, self._y)
-        for n, place in enumerate(self.places):
-            j = int(self._cell.channel[n])
-            row = mueller_of(solved[place])[0, j, :, 0]  # (q, 4): M00 … M03
-            part = axes.cosine[n] * row[:, 1] + axes.sine[n] * row[:, 2]
-            both = np.stack([row[:, 0] + part, row[:, 0] - part], axis=-1)
-            total = float(row[:, 0].sum())
-            if total > MOST_EXCESS:
-                raise DiffractionError(
-                    f"efficiencies of a solution sum to {total:.4g}; use a higher resolution, or "
-                    "another method"
-                )
-            both /= np.maximum(both.sum(axis=0), 1.0)
-            values[n, j - np.arange(len(row)) - orders[0]] = np.maximum(both, 0.0)
-        return values.reshape(*self._shape, len(orders), 2), orders
+    row = matrices[:, 0]  # M00 … M03
+    part = cosine * row[:, 1] + sine * row[:, 2]
+    both = np.stack([row[:, 0] + part, row[:, 0] - part], axis=-1)
+    total = float(row[:, 0].sum())
+    if total > MOST_EXCESS:
+        raise DiffractionError(
+            f"efficiencies of a solution sum to {total:.4g}; use a higher resolution, or another "
+            "method"
+        )
+    return np.maximum(both / np.maximum(both.sum(axis=0), 1.0), 0.0)

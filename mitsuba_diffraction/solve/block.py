@@ -8,7 +8,6 @@ conserve the energy of clear materials to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -16,15 +15,23 @@ from ..errors import DiffractionError, check_choice
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.blocks import even_nodes, factors
 from ..tables.orders.table import Counts, check_outline
-from .accuracy import SAMPLES, Measured, diffuse_light, powers
+from .accuracy import measured_error, powers
 from .grating_index import Material, material_of
-from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
-from .nodes import Place
-from .orders import REFINEMENTS, Estimate, Settings, announce_stage, refuse_or_warn, silent
+from .jobs import AUTO, Jobs, problem_of
+from .nodes import Place, at_nodes, kinds_of, places_of
+from .orders import (
+    REFINEMENTS,
+    Estimate,
+    Settings,
+    announce_stage,
+    conclude,
+    header_of,
+    silent,
+)
 from .profiles import Profile
-from .resolution import Chosen, chosen_resolution, places_to_test, resolution_error
+from .resolution import places_to_test, resolved
 from .sheet import check_clear
-from .stations import Complex, Grating, Real, reversed_light
+from .stations import Complex, Grating, Real
 
 #: Nodes of the first table; each refinement halves the distance between them.
 COUNTS = Counts(9, 7, 3)
@@ -75,67 +82,34 @@ def solve_block(
     grating = Grating(turned, around, index, how.wavelengths, block=True)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, "coupled", how.resolution or 0)
-    tested = places_to_test(bands)
-    if how.resolution is None:
-        chosen = chosen_resolution(problem, work, tested, how.tolerance / 2)
-    else:
-        chosen = Chosen(problem, resolution_error(problem, work, tested))
+    chosen = resolved(problem, work, places_to_test(bands), how.tolerance / 2)
     problem, counts = chosen.problem, COUNTS
-    header: dict[str, Any] = {
-        "solver": solver_of(problem).name,
-        "material": substance.name,
-        "profile": profile.name,
-        "depth": profile.depth,
-        "solver_error": chosen.error,
-        "tolerance": how.tolerance,
-    }
+    header = header_of(chosen, how) | {"material": substance.name}
     for refinement in range(REFINEMENTS + 1):
-        places = [place for band in bands for place in _places(band, counts)]
+        places = [place for band in bands for place in places_of(band, counts, even_nodes)]
         announce_stage(announce, "solving", problem, work, places)
         solved = work.amplitudes(problem, places, "solving orders")
         made = tuple(_band(grating, band, counts, solved) for band in bands)
         table = OrderTable(profile.period, how.wavelengths, made, header=header, block=index)
-        error = _measured(table, problem, work)
+        error = measured_error(table, problem, work)
         finer = Counts(*(2 * n - 1 for n in counts))
         size = table.nbytes // 4 * np.prod(finer) // np.prod(counts)
         if error.within(how.tolerance) or refinement == REFINEMENTS or size > _MOST_VALUES:
             break
         counts = finer
-    header |= {
-        "error_mean": error.mean, "error_worst": error.most,
-        "reciprocity_error": table.reciprocity,
-        "processor_seconds": round(work.processor_seconds, 1),
-    }  # fmt: skip
-    if not error.within(how.tolerance):
-        refuse_or_warn(error, how)
+    header["reciprocity_error"] = table.reciprocity
+    conclude(header, error, how, work)
     return table
-
-
-def _places(band: int, counts: Counts) -> list[Place]:
-    """Return the stations of a band, up to τ = ½; reciprocity gives the others."""
-    tau, rho, w = (even_nodes(n).tolist() for n in counts)
-    return [
-        Place(band, kind, t, r, tuple(w))
-        for kind in ((cells.A, cells.B) if band else (cells.A,))
-        for t in tau[: (counts.tau + 1) // 2]
-        for r in rho
-    ]
 
 
 def _band(grating: Grating, band: int, counts: Counts, solved: Mapping[Place, Complex]) -> Band:
     """Assemble a band from its stations."""
+    places = places_of(band, counts, even_nodes)
+    moved = {place: solved[place] * _to_node(grating, place) for place in places}
     kinds = []
-    places = _places(band, counts)
-    for kind in (cells.A, cells.B) if band else (cells.A,):
-        of_kind = [
-            solved[place] * _to_node(grating, place) for place in places if place.kind == kind
-        ]
-        half = np.concatenate([powers(values) for values in of_kind])
-        back = np.concatenate([powers(reversed_light(values, 2)) for values in of_kind])
-        half, back = (values.reshape(-1, *counts[1:], *half.shape[1:]) for values in (half, back))
-        middle = 0.5 * (half[-1:] + back[-1:])  # its own reverse
-        whole = np.concatenate([half[:-1], middle, back[:-1][::-1]])
-        kinds.append(_lossless(whole).astype(np.float32))
+    for kind in kinds_of(band):
+        values = at_nodes(kind, places, counts, moved, 2, powers)
+        kinds.append(_lossless(values.astype(np.float64)).astype(np.float32))
     return Band(band, *kinds)
 
 
@@ -166,48 +140,3 @@ def _to_node(grating: Grating, place: Place) -> Real:
     wanted, known = factors(index * node.x, index * node.y, index)
     ratio = np.where(known, wanted / np.where(known, solved, 1.0), 1.0)
     return np.sqrt(ratio)[:, :, None, :, None]
-
-
-def _measured(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
-    """Compare a table with solutions at random directions within and above, by turns.
-
-    Light in all orders but 0; where order 0 is alone, light that goes through.
-    """
-    assert table.block is not None
-    x, y, lam = diffuse_light(SAMPLES, table.wavelengths)
-    cell = cells.to_cell(x, y, lam, table.optical_period)
-    w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
-    rows = zip(cell.band, cell.kind, cell.tau, cell.rho, w, strict=True)
-    places = [
-        Place(int(k), int(kind), float(tau), float(rho), (float(at),))
-        for k, kind, tau, rho, at in rows
-    ]
-    solved = jobs.solve(problem, places, "measuring the error")
-    missed, light = np.zeros(SAMPLES), np.zeros(SAMPLES)
-    for n, place in enumerate(places):
-        j, count = int(cell.channel[n]), int(cell.channels[n])
-        within = n % 2 == 0 or table.block * np.hypot(x[n], y[n]) >= 1.0
-        port = j if within else count + j
-        truth = _unpolarised(solved[place])[port]
-        orders = j - np.arange(count)
-        place_of = table.block * x[n], table.block * y[n], lam[n]
-        got = np.concatenate(
-            [
-                table.efficiency(*place_of, orders, from_below=within, transmitted=within != side)
-                for side in (True, False)
-            ]
-        )
-        others = np.tile(orders != 0, 2) if count > 1 else np.arange(2) != port
-        missed[n], light[n] = np.abs(got - truth)[others].sum(), truth[others].sum()
-    floor = 0.05 * light.mean()
-    return Measured(
-        float(missed.sum() / light.sum()),
-        float(np.quantile(missed / np.maximum(light, floor), 0.95)),
-        np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
-        None,
-    )
-
-
-def _unpolarised(values: Real) -> Real:
-    """Return efficiencies (ports, ports) of a station of one wavelength, (1, j, 2, q, 2)."""
-    return np.asarray(values[0].sum(axis=3).mean(axis=1))

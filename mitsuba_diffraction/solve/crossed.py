@@ -6,17 +6,15 @@ Moharam et al. 1995 (JOSA A 12, 1068), Li 1997 (JOSA A 14, 2758). Heights are cu
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.metadata
-from collections.abc import Iterator
-from concurrent.futures import Executor, as_completed
+import time
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError, warn
 from ..extras import optional
 from ..heights.field import HeightField
@@ -25,8 +23,9 @@ from ..tables.orders import CrossedTable
 from ..tables.orders.crossed import all_orders, most_orders
 from .efficiencies import Efficiencies
 from .grating_index import Material, material_of
-from .jobs import make_folder
+from .jobs import Jobs, Solved, digest_of
 from .measured_crossed import crossed_table
+from .samples import missed_shares
 from .stations import Real
 
 #: Lights at which the table and the solver are checked.
@@ -112,13 +111,17 @@ def solve_crossed(
     lights = {(t, p) for t in theta.tolist() for p in (phi.tolist() if t else [0.0])}
     mirrors = _mirrors(field)
     wanted = {_reduced(light, mirrors)[0] for light in lights}
-    store = _Store(folder, cell, lam)
-    solved = dict(_solve_all(cell, sorted(wanted), lam, last, executor, store, progress))
+    outline = (field.extent, cell.harmonics, slices), field.heights, lam, index
+    digest = digest_of(*outline)
+    solved = Jobs(folder, executor, progress).results(
+        functools.partial(_solved, cell, lam, last), sorted(wanted),
+        lambda light: (digest, light), "solving directions",
+    )  # fmt: skip
     values = np.empty((len(lam), len(theta), len(phi), (2 * last[0] + 1) * (2 * last[1] + 1), 2))
     for a, t in enumerate(theta.tolist()):
         for b, p in enumerate(phi.tolist()):
             light, flipped = _reduced((t, p if t else 0.0), mirrors)
-            powers = solved[light][:, :: flipped[1], :: flipped[0]]
+            powers = solved[light].values[:, :: flipped[1], :: flipped[0]]
             values[:, a, b] = powers.reshape(len(lam), -1, 1)
     m_x, m_y = all_orders(last)
     pairs = np.column_stack([m_x.ravel(), m_y.ravel()])
@@ -136,69 +139,10 @@ def solve_crossed(
     return table
 
 
-def _solve_all(
-    cell: UnitCell, lights: list[tuple[float, float]], lam: Real, last: tuple[int, int],
-    executor: Executor | None, store: _Store, progress: Progress,
-) -> Iterator[tuple[tuple[float, float], Real]]:  # fmt: skip
-    """Yield each light with its efficiencies (λ, m_y, m_x), stored ones first."""
-    task = functools.partial(reflected, cell, lam=lam, last=last)
-    known = {light: powers for light in lights if (powers := store.read(light)) is not None}
-    yield from known.items()
-    missing = [light for light in lights if light not in known]
-    progress(len(known), len(lights), "solving directions")
-    futures = {executor.submit(task, light): light for light in missing} if executor else {}
-    results = (
-        ((futures[future], future.result()) for future in as_completed(futures))
-        if executor
-        else ((light, task(light)) for light in missing)
-    )
-    try:
-        for done, (light, powers) in enumerate(results, len(known) + 1):
-            store.write(light, powers)
-            yield light, powers
-            progress(done, len(lights), "solving directions")
-    finally:
-        for future in futures:
-            future.cancel()
-
-
-class _Store:
-    """Results of lights in a folder, of a cell and its wavelengths; None stores nothing."""
-
-    def __init__(self, folder: Path | None, cell: UnitCell, lam: Real) -> None:
-        self._folder = folder
-        indices = cell.material.index(lam)
-        outline = repr((cell.field.extent, cell.harmonics, cell.slices))
-        self._content = hashlib.sha256(outline.encode())
-        for array in (cell.field.heights, lam, indices):
-            assert array is not None
-            self._content.update(np.ascontiguousarray(array).tobytes())
-
-    def read(self, light: tuple[float, float]) -> Real | None:
-        """Return the efficiencies of a light, or None."""
-        if (file := self._file(light)) is None or not file.is_file():
-            return None
-        try:
-            return np.asarray(np.load(file), np.float64)
-        except (OSError, ValueError, EOFError):
-            return None  # solved again
-
-    def write(self, light: tuple[float, float], powers: Real) -> None:
-        """Store the efficiencies of a light.
-
-        Raises a DiffractionError if the folder cannot be written.
-        """
-        if (file := self._file(light)) is not None:
-            make_folder(file.parent)
-            with atomic_path(file) as temporary, temporary.open("wb") as stream:
-                np.save(stream, powers)
-
-    def _file(self, light: tuple[float, float]) -> Path | None:
-        if self._folder is None:
-            return None
-        content = self._content.copy()
-        content.update(repr(light).encode())
-        return self._folder / f"{content.hexdigest()[:24]}.npy"
+def _solved(cell: UnitCell, lam: Real, last: tuple[int, int], light: tuple[float, float]) -> Solved:
+    """Return the efficiencies of `reflected`, with their time."""
+    start = time.thread_time()
+    return Solved(reflected(cell, light, lam, last), time.thread_time() - start)
 
 
 def reflected(cell: UnitCell, light: tuple[float, float], lam: Real, last: tuple[int, int]) -> Real:
@@ -283,10 +227,6 @@ def _checked(
     found = table.efficiency(x, y, lam, m_x, m_y)
     parts = np.abs(found - truth), np.abs(other - truth), truth
     missed, moved, light = (part[:, others].sum(axis=-1) for part in parts)
-    whole = max(float(light.sum()), 1e-12)
-    floor = max(0.05 * whole / _CHECKED, 1e-12)
-    return {
-        "error_mean": float(missed.sum()) / whole,
-        "error_worst": float(np.quantile(missed / np.maximum(light, floor), 0.95)),
-        "solver_error": float(moved.sum()) / whole,
-    }
+    mean, worst = missed_shares(missed, light)
+    change, _ = missed_shares(moved, light)
+    return {"error_mean": mean, "error_worst": worst, "solver_error": change}

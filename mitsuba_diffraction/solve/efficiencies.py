@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
-from ..errors import DiffractionError, one_line, quoted, warn
+from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
 from ..files import FileKind, kind_of, read_bytes, read_text
 from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
@@ -44,9 +44,6 @@ CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
 PAIR = ("order_x", "order_y")
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
-#: Difference between light and reversed light above which a file hardly holds powers: grids of 5 to
-#: 45° have 0.02 to 0.14, efficiencies without the ratio of cosines 0.4 to 0.8.
-_ONE_WAY = 0.2
 #: Bytes of a CSV at most: two million lines. NetCDF files may be larger.
 _LARGEST_CSV = 100_000_000
 _LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
@@ -349,17 +346,4 @@ def _check(grid: Efficiencies, shown: str) -> None:
         raise DiffractionError(
             f"{shown}, {where}, order {grid.orders[order]}: efficiencies must be 0 to 1, got "
             f"{grid.values[wrong][0]:g}; they are shares of the incident light, no per cent"
-        )
-
-
-def warn_of_one_way(error: float, shown: str) -> None:
-    """Warn of light without reciprocity.
-
-    error : difference between light and reversed light, as a share of the orders but 0.
-    """
-    if error > _ONE_WAY:
-        warn(
-            f"light and reversed light differ by {error:.0%} in {shown}, which no grating does: "
-            "efficiencies are shares of power, |amplitude|² times the ratio of cosines; check "
-            "that, and the signs of the orders and of phi"
         )

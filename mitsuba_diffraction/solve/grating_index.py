@@ -32,10 +32,7 @@ class Material:
         if self.values is None:
             return None
         lam = np.asarray(wavelength, np.float64)
-        real, imaginary = (
-            np.interp(lam, self.wavelengths, part) for part in (self.values.real, self.values.imag)
-        )
-        return np.asarray(real + 1j * imaginary)
+        return np.asarray(np.interp(lam, self.wavelengths, self.values))
 
 
 def material_of(

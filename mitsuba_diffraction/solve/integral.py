@@ -54,13 +54,14 @@ class IntegralSolver:
         try:
             from gratinglab import profiles
             from gratinglab.problem import Problem
+            from gratinglab.solvers.integral import _nystrom
             from gratinglab.solvers.integral._boundary import physical_boundary
             from gratinglab.solvers.integral._nystrom import OperatorAssembler
         except ImportError as error:
             raise DiffractionError(
                 "gratinglab is not installed; install the extra: pip install '.[solve]'"
             ) from error
-        self.points, self.period = points, profile.period
+        self.points, self.period, self._nystrom = points, profile.period, _nystrom
         x, z = profile.x / profile.period, profile.z / profile.period
         if len(x) == 2:  # gratinglab wants three vertices
             x, z = np.insert(x, 1, x.mean()), np.insert(z, 1, z.mean())
@@ -92,14 +93,8 @@ class IntegralSolver:
 
     def _operators(self, k: complex, alpha: float) -> tuple[Complex, Complex]:
         """Single layer V and ½ + K (corners subtracted) of the medium above."""
-        from gratinglab.solvers.integral import _nystrom
-
-        options = self._options(k, alpha)
-        double = _nystrom.double_layer_matrix(self._boundary, subtract_corners=True, **options)
-        return (
-            _nystrom.single_layer_matrix(self._boundary, **options),
-            double + 0.5 * np.eye(self.points),
-        )
+        double = self._matrix("double_layer", k, alpha, subtract_corners=True)
+        return self._matrix("single_layer", k, alpha), double + 0.5 * np.eye(self.points)
 
     def _finite(
         self,
@@ -109,24 +104,19 @@ class IntegralSolver:
         index: complex,
         along: float,
     ) -> Complex:
-        from gratinglab.solvers.integral import _nystrom
-
         v_above, k_above = above
         root = np.sqrt(complex(index) ** 2 - along**2)
         k_below = 2 * np.pi / wavelength * (root if root.imag >= 0 else -root)
         ratio = (waves.k / k_below) ** 2
         c_e, c_b, s = index**2 * ratio, ratio, along * (1 - ratio)
-        options = self._options(k_below, waves.reference)
-        trace = _nystrom.single_layer_matrix(self._boundary, **options)
-        normal = _nystrom.adjoint_layer_matrix(self._boundary, **options)
+        trace = self._matrix("single_layer", k_below, waves.reference)
+        normal = self._matrix("adjoint_layer", k_below, waves.reference)
         normal[np.diag_indices(self.points)] -= 0.5
         if self._boundary.graded:
-            tangential = (
-                _nystrom.tangential_derivative_matrix(self._boundary, alpha0=waves.reference)
-                @ trace
-            )
+            derivative = self._nystrom.tangential_derivative_matrix
+            tangential = derivative(self._boundary, alpha0=waves.reference) @ trace
         else:
-            tangential = _nystrom.tangential_layer_matrix(self._boundary, **options)
+            tangential = self._matrix("tangential_layer", k_below, waves.reference)
         first, second = k_above @ trace, v_above @ normal
         cross = s * (v_above @ tangential)
         system = np.block([[first - c_e * second, -cross], [cross, first - c_b * second]])
@@ -143,11 +133,10 @@ class IntegralSolver:
         densities = solve_linear(system, right, overwrite_a=True, overwrite_b=True)
         w, tau = densities[:n], densities[n:]
         none = np.zeros_like(within)
-        e, b = trace @ w + np.hstack([within, none]), trace @ tau + np.hstack([none, within])
-        e_across = normal @ w + np.hstack([across, none])
-        b_across = normal @ tau + np.hstack([none, across])
-        e_aside = tangential @ w + np.hstack([aside, none])
-        b_aside = tangential @ tau + np.hstack([none, aside])
+        (e, b), (e_across, b_across), (e_aside, b_aside) = (
+            (layer @ w + np.hstack([part, none]), layer @ tau + np.hstack([none, part]))
+            for layer, part in ((trace, within), (normal, across), (tangential, aside))
+        )
         up = (
             waves.reflected(c_e * e_across + s * b_aside, e),
             waves.reflected(c_b * b_across - s * e_aside, b),
@@ -161,12 +150,9 @@ class IntegralSolver:
 
     def _perfect(self, waves: _Waves) -> Complex:
         """A perfect conductor: E vanishes on it, and so does the normal derivative of B."""
-        from gratinglab.solvers.integral import _nystrom
-
-        options = self._options(waves.k, waves.reference)
         incident = waves.incident.T
-        single = _nystrom.single_layer_matrix(self._boundary, **options)
-        double = _nystrom.neumann_matrix(self._boundary, **options)
+        single = self._matrix("single_layer", waves.k, waves.reference)
+        double = self._matrix("neumann", waves.k, waves.reference)
         none = np.zeros_like(incident)
         e = waves.reflected(solve_linear(single, -incident), none)
         b = waves.reflected(none, solve_linear(double, incident))
@@ -175,14 +161,12 @@ class IntegralSolver:
             result[:, n, :, n] = waves.flux * fields.T
         return result
 
-    def _options(self, k: complex, alpha: float) -> dict[str, Any]:
-        return {
-            "k": k,
-            "alpha0": alpha,
-            "period": self.period,
-            "terms": self._terms,
-            "assembler": self._assembler,
-        }
+    def _matrix(self, kind: str, k: complex, alpha: float, **options: Any) -> Any:
+        """Return an operator of gratinglab by name, in a medium of wavenumber k."""
+        return getattr(self._nystrom, f"{kind}_matrix")(
+            self._boundary, k=k, alpha0=alpha, period=self.period, terms=self._terms,
+            assembler=self._assembler, **options,
+        )  # fmt: skip
 
 
 class _Waves:

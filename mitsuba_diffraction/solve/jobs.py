@@ -7,17 +7,18 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, check_choice, one_line
@@ -26,22 +27,17 @@ from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
-from .profiles import Profile
 from .sheet import sheet_efficiencies
 from .stations import Complex, Grating, Real, Solver, on_both_sides
-from .structure import Structure
 
-#: Solvers by name: from a profile and a resolution (points on the boundary; harmonics).
-METHODS: dict[str, Callable[[Profile, int], Solver]] = {
-    "integral": IntegralSolver,
-    "coupled": CoupledWaves,
-    "chandezon": Chandezon,
-}
-#: Solvers of layers by name: from a profile, a resolution and a structure.
-LAYERED: dict[str, Callable[[Profile, int, Structure], Solver]] = {
-    "coupled": CoupledWaves,
-    "chandezon": Chandezon,
-}
+Item = TypeVar("Item", bound=Hashable)
+
+#: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
+#: solve layers, a structure.
+METHODS: dict[str, Callable[..., Solver]] = {
+    "integral": IntegralSolver, "coupled": CoupledWaves, "chandezon": Chandezon,
+}  # fmt: skip
+LAYERED = ("coupled", "chandezon")
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
@@ -99,40 +95,42 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
             f"method {method} does not solve these layers; use method=coupled, or leave out "
             "layers, beneath and substrate"
         )
-    content = hashlib.sha256(
-        repr(
-            ("amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin)
-            + (("block",) if grating.block else ())
-        ).encode()
-    )
+    outline = "amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin
     profile, material = grating.profile, grating.material
-    content.update(repr(profile.period).encode())
-    for array in (profile.x, profile.z, material.wavelengths, material.values):
-        content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
-    content.update(repr(structure.lengths).encode())
-    for medium in structure.materials:
-        for array in (medium.wavelengths, medium.values):
-            content.update(b"none" if array is None else np.ascontiguousarray(array).tobytes())
-    return Problem(grating, method, resolution, content.hexdigest())
+    digest = digest_of(
+        outline + (("block",) if grating.block else ()),
+        profile.period, profile.x, profile.z, material.wavelengths, material.values,
+        structure.lengths,
+        *(part for medium in structure.materials for part in (medium.wavelengths, medium.values)),
+    )  # fmt: skip
+    return Problem(grating, method, resolution, digest)
+
+
+def digest_of(*parts: object) -> str:
+    """Return the SHA-256 of the numbers of arrays, and of the texts of other parts."""
+    content = hashlib.sha256()
+    for part in parts:
+        is_array = isinstance(part, np.ndarray)
+        content.update(np.ascontiguousarray(part).tobytes() if is_array else repr(part).encode())
+    return content.hexdigest()
 
 
 @lru_cache(maxsize=2)
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
     grating = problem.grating
-    if grating.structure:
-        return LAYERED[problem.method](grating.profile, problem.resolution, grating.structure)
-    return METHODS[problem.method](grating.profile, problem.resolution)
+    layers = [grating.structure] if grating.structure else []
+    return METHODS[problem.method](grating.profile, problem.resolution, *layers)
 
 
 class Solved(NamedTuple):
-    """Amplitudes of a place, and the processor seconds that they took.
+    """Numbers of a solution, and the processor seconds that they took.
 
-    values : (w, j, 2, q, 2), see `stations.Solver`, of single precision. For a sheet, whose light
-        has no phase, they are roots of its efficiencies.
+    values : of a place, amplitudes (w, j, 2, q, 2), see `stations.Solver`, of single precision. For
+        a sheet, whose light has no phase, they are roots of its efficiencies.
     """
 
-    values: Complex
+    values: NDArray[Any]
     seconds: float
 
 
@@ -162,8 +160,7 @@ def solve_place(problem: Problem, place: Place) -> Solved:
         values = np.sqrt(sheet_efficiencies(values, station))
     if grating.block:
         values = on_both_sides(values, station)
-    values = values.astype(np.complex64).astype(np.complex128)
-    return Solved(values, time.thread_time() - start)
+    return Solved(values.astype(np.complex64), time.thread_time() - start)
 
 
 @dataclass
@@ -180,7 +177,7 @@ class Jobs:
     folder: Path | None = None
     executor: Executor | None = None
     progress: Progress = silent
-    _seconds: dict[tuple[str, int, Place], float] = field(default_factory=dict, init=False)
+    _seconds: dict[str, float] = field(default_factory=dict, init=False)
 
     def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
         """Return the efficiencies at all places; see `amplitudes`."""
@@ -190,30 +187,47 @@ class Jobs:
     def amplitudes(
         self, problem: Problem, places: Sequence[Place], text: str
     ) -> dict[Place, Complex]:
-        """Return the amplitudes at all places, of which those in the folder are read.
+        """Return the amplitudes at all places; see `results`."""
 
-        An exception or Ctrl-C leaves finished stations in the folder.
+        def key(place: Place) -> object:
+            return problem.digest, problem.resolution, tuple(place)
+
+        known = self.results(partial(solve_place, problem), places, key, text)
+        return {place: solved.values.astype(np.complex128) for place, solved in known.items()}
+
+    def results(
+        self,
+        task: Callable[[Item], Solved],
+        items: Iterable[Item],
+        key: Callable[[Item], object],
+        text: str,
+    ) -> dict[Item, Solved]:
+        """Return the results of a task for all items, of which those in the folder are read.
+
+        An exception or Ctrl-C leaves finished results in the folder.
+
+        key : all that the result of an item depends on, as text of which its file is named.
 
         Raises a DiffractionError if the folder cannot be written.
         """
-        files = {place: self._file(problem, place) for place in places}
-        results = {place: _read(file) for place, file in files.items()}
-        known = {place: solved for place, solved in results.items() if solved is not None}
-        missing = [place for place in files if place not in known]
+        names = {item: digest_of(key(item))[:24] for item in items}
+        files = {} if self.folder is None else {
+            item: self.folder / f"{name}.npz" for item, name in names.items()
+        }  # fmt: skip
+        results = {item: _read(file) for item, file in files.items()}
+        known = {item: solved for item, solved in results.items() if solved is not None}
+        missing = [item for item in names if item not in known]
         if self.folder is not None and missing:
             make_folder(self.folder)
-        done = len(known)
-        self.progress(done, len(files), text)
-        for place, solved in self._solved(problem, missing):
-            known[place] = solved
-            if (file := files[place]) is not None:
-                with atomic_path(file) as temporary:
-                    np.savez(temporary, values=np.complex64(solved.values), seconds=solved.seconds)
-            done += 1
-            self.progress(done, len(files), text)
-        for place, solved in known.items():
-            self._seconds[problem.digest, problem.resolution, place] = solved.seconds
-        return {place: solved.values for place, solved in known.items()}
+        self.progress(len(known), len(names), text)
+        for item, solved in self._solved(task, missing):
+            known[item] = solved
+            if item in files:
+                with atomic_path(files[item]) as temporary:
+                    np.savez(temporary, values=solved.values, seconds=solved.seconds)
+            self.progress(len(known), len(names), text)
+        self._seconds |= {names[item]: solved.seconds for item, solved in known.items()}
+        return known
 
     @property
     def processor_seconds(self) -> float:
@@ -226,24 +240,19 @@ class Jobs:
             return timed(problem, place)
         return float(self.executor.submit(timed, problem, place).result())
 
-    def _solved(self, problem: Problem, places: Iterable[Place]) -> Iterator[tuple[Place, Solved]]:
+    def _solved(
+        self, task: Callable[[Item], Solved], items: Iterable[Item]
+    ) -> Iterator[tuple[Item, Solved]]:
         if self.executor is None:
-            for place in places:
-                yield place, solve_place(problem, place)
+            yield from ((item, task(item)) for item in items)
             return
-        futures = {self.executor.submit(solve_place, problem, place): place for place in places}
+        futures = {self.executor.submit(task, item): item for item in items}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
         finally:
             for future in futures:
                 future.cancel()
-
-    def _file(self, problem: Problem, place: Place) -> Path | None:
-        if self.folder is None:
-            return None
-        key = hashlib.sha256(repr((problem.digest, problem.resolution, tuple(place))).encode())
-        return self.folder / f"{key.hexdigest()[:24]}.npz"
 
 
 def timed(problem: Problem, place: Place) -> float:
@@ -311,11 +320,11 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def _read(file: Path | None) -> Solved | None:
-    if file is None or not file.is_file():
+def _read(file: Path) -> Solved | None:
+    if not file.is_file():
         return None
     try:
         with np.load(file) as stored:
-            return Solved(stored["values"].astype(np.complex128), float(stored["seconds"]))
+            return Solved(stored["values"], float(stored["seconds"]))
     except (OSError, ValueError, EOFError, KeyError, BadZipFile):
         return None  # solved again

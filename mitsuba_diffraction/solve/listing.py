@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
@@ -102,27 +102,13 @@ def list_orders(
     x, y = _mirror(polar, azimuth)
     leaves = np.abs(x + m * lam / (1e3 * table.optical_period)) < np.sqrt(1 - y**2) - _EDGE
     lam, polar, azimuth, m, x, y = (part[leaves] for part in (lam, polar, azimuth, m, x, y))
-    shares = [_shares(table, x, y, lam, m, polarised, False)]
-    if table.thin:
-        shares.append(_shares(table, x, y, lam, m, polarised, True))
+    lookup = table.polarised_efficiency if polarised else table.efficiency
     kinds = REFLECTED + (TRANSMITTED if table.thin else ())
+    shares = [lookup(x, y, lam, m, transmitted=kind == TRANSMITTED[0]) for kind in kinds[::2]]
+    if not polarised:
+        shares = [np.repeat(values[:, None], 2, axis=1) for values in shares]
     rows = np.column_stack([lam, polar, azimuth, m, *shares])
     return Listing((*CSV_AXES, *kinds), rows)
-
-
-def _shares(
-    table: OrderTable,
-    x: Real,
-    y: Real,
-    wavelength: Real,
-    order: NDArray[np.int64],
-    polarised: bool,
-    transmitted: bool,
-) -> Real:
-    """Return the shares (n, 2) of s and p light, or of unpolarised light twice."""
-    lookup = table.polarised_efficiency if polarised else table.efficiency
-    values = lookup(x, y, wavelength, order, transmitted=transmitted)
-    return np.asarray(values if polarised else np.repeat(values[:, None], 2, axis=1))
 
 
 def _crossed(table: CrossedTable, lights: list[Real], polarised: bool) -> Listing:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError, warn
 from ..tables.orders import Band, CrossedTable, OrderTable, cells
-from ..tables.orders.table import LARGEST_SUM, MOST_NODES, S_AND_P, Counts, check_outline
-from .efficiencies import ROUNDING, Efficiencies, read_efficiencies, warn_of_one_way
+from ..tables.orders.table import MOST_NODES, S_AND_P, Counts, check_outline
+from .efficiencies import Efficiencies, read_efficiencies
 from .measured_crossed import crossed_table, warn_of_gaps
-from .scattered import interpolated
+from .nodes import kinds_of
+from .samples import check_orders, interpolated, missed_shares, warn_of_one_way
 from .stations import Real
 
 #: Nodes of the table, to which samples are interpolated linearly.
@@ -163,15 +164,16 @@ def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
     values = grid.values.reshape(len(lam), len(grid.orders), -1)
     # order m lies at p − m, which 0 to K hold
     step, room = lam / (1e3 * optical_period), np.sqrt(1.0 - y**2)
-    _check_orders(grid, values, (-room - x) / step, (room - x) / step, shown)
+    lowest, highest = ((side * room - x) / step for side in (-1.0, 1.0))
+
+    def propagates(orders: NDArray[np.int64], edge: float) -> NDArray[np.bool_]:
+        above = orders >= lowest[:, None] - edge * _EDGE
+        return np.asarray(above & (orders <= highest[:, None] + edge * _EDGE))
+
+    every = np.arange(int(np.floor(lowest.min())), int(np.ceil(highest.max())) + 1)
+    signs = "the period, and the signs of the orders and of theta"
+    check_orders(grid, values.reshape(*values.shape[:2], -1, 2), every, propagates, signs, shown)
     powers = np.maximum(np.nan_to_num(values), 0.0)
-    total = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2))
-    if total.max() > LARGEST_SUM:
-        brightest = int(total.max(axis=1).argmax())
-        raise DiffractionError(
-            f"{shown}, {grid.light(brightest)}: the orders sum to {total.max():.4g}, above "
-            f"{LARGEST_SUM}"
-        )
     cell = cells.to_cell(x, y, lam, optical_period)
     ends = float(lam.min()), float(lam.max())
     w = cells.w_of(cell.k_continuous, lam, ends, optical_period)
@@ -179,84 +181,38 @@ def _samples(grid: Efficiencies, optical_period: float, shown: str) -> _Samples:
     return _Samples(x, y, lam, cell, w, s, grid.orders, powers)
 
 
-def _check_orders(
-    grid: Efficiencies, values: Real, lowest: Real, highest: Real, shown: str
-) -> None:
-    """Refuse orders that do not propagate, but have light, and those that do, but are missing.
-
-    values : (n, m, 2) or (n, m, 4) of all light and orders; lowest, highest : (n,) orders between
-        which all propagate.
-    """
-    lit = np.nan_to_num(values).max(axis=-1) > ROUNDING
-    extra = np.argwhere(lit & ~_between(grid.orders, lowest, highest, _EDGE))
-    if len(extra):
-        light, place = map(int, extra[0])
-        raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {grid.orders[place]} does not propagate; check "
-            "the period, and the signs of the orders and of theta"
-        )
-    known = ~np.isnan(values).any(axis=-1) & _between(grid.orders, lowest, highest, -_EDGE)
-    first, last = np.ceil(lowest + _EDGE), np.floor(highest - _EDGE)
-    lacking = np.flatnonzero(known.sum(axis=1) < last - first + 1)
-    if len(lacking):
-        light = int(lacking[0])
-        listed = set(grid.orders[known[light]].tolist())
-        order = next(m for m in range(int(first[light]), int(last[light]) + 1) if m not in listed)
-        raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {order} propagates, and has no efficiencies; "
-            "list it, with 0 if it has no light"
-        )
-
-
-def _between(
-    orders: NDArray[np.int64], lowest: Real, highest: Real, edge: float
-) -> NDArray[np.bool_]:
-    """Whether orders (m,) lie between two ends (n,), widened by an edge: (n, m)."""
-    return (orders >= lowest[:, None] - edge) & (orders <= highest[:, None] + edge)
-
-
 def _errors(table: OrderTable, samples: _Samples) -> dict[str, float]:
-    """Compare a table with the file, unpolarised, as `orders.measured_error` does with solutions.
+    """Compare a table with the file, unpolarised, as `accuracy.measured_error` does with solutions.
 
     Light at which a single order propagates is left out, unless there is no other.
+
+    Reversed light is compared in all orders but 0, reflected: η_m(ωi) = η_m(−ωo), where the file
+    has light as oblique as the reversed light. Its error is a share of the light.
     """
-    sides = (False, True) if table.thin else (False,)
-    missed, light = np.zeros(len(samples.x)), np.zeros(len(samples.x))
+    x, y, lam = samples.x, samples.y, samples.wavelength
+    missed, light, turned, sent = np.zeros(len(x)), np.zeros(len(x)), 0.0, 0.0
+    oblique = np.hypot(x, y).max()
     lone = not samples.powers[:, samples.orders != 0].any()
-    for order in samples.orders:
+    for order in samples.orders.tolist():
         if order == 0 and not lone:
             continue
-        truth = samples.of_order(int(order))
-        for side in sides:
+        truth = samples.of_order(order)
+        reflected = table.efficiency(x, y, lam, order)
+        found = [reflected]
+        if table.thin:
+            found.append(table.efficiency(x, y, lam, order, transmitted=True))
+        for side, got in enumerate(found):
             share = truth[:, 2 * side : 2 * side + 2].mean(axis=-1)
-            options = {"transmitted": True} if side else {}
-            got = table.efficiency(samples.x, samples.y, samples.wavelength, order, **options)
             missed, light = missed + np.abs(got - share), light + share
-    floor = 0.05 * light.mean()
-    return {
-        "error_mean": float(missed.sum() / max(light.sum(), 1e-12)),
-        "error_worst": float(np.quantile(missed / np.maximum(light, max(floor, 1e-12)), 0.95)),
-        "reciprocity_error": _one_way(table, samples),
-    }
-
-
-def _one_way(table: OrderTable, samples: _Samples) -> float:
-    """Return the mean difference between light and reversed light, over the light.
-
-    Of all orders but 0, reflected, without polarisation: η_m(ωi) = η_m(−ωo), where the file has
-    light as oblique as the reversed light.
-    """
-    missed = light = 0.0
-    oblique = np.hypot(samples.x, samples.y)
-    for order in samples.orders[samples.orders != 0]:
-        out = samples.x + order * samples.wavelength / (1e3 * table.optical_period)
-        known = np.hypot(out, samples.y) <= oblique.max()
-        places = samples.y[known], samples.wavelength[known], order
-        there = table.efficiency(samples.x[known], *places)
-        back = table.efficiency(-out[known], *places)
-        missed += float(np.abs(back - there).sum())
-        light += float(there.sum())
-    return missed / max(light, 1e-12)
+        if order:
+            out = x + order * lam / (1e3 * table.optical_period)
+            known = np.hypot(out, y) <= oblique
+            back = table.efficiency(-out[known], y[known], lam[known], order)
+            turned += float(np.abs(back - reflected[known]).sum())
+            sent += float(reflected[known].sum())
+    mean, worst = missed_shares(missed, light)
+    one_way = turned / max(sent, 1e-12)
+    return {"error_mean": mean, "error_worst": worst, "reciprocity_error": one_way}
 
 
 def _lacks_directions(samples: _Samples, last: int) -> bool:
@@ -266,15 +222,14 @@ def _lacks_directions(samples: _Samples, last: int) -> bool:
     return any(
         (k, kind, j) not in present
         for k in range(int(cell.band.min()), last + 1)
-        for kind in ((cells.A, cells.B) if k else (cells.A,))
+        for kind in kinds_of(k)
         for j in range(k + 1 - kind)
     )
 
 
 def _band(k: int, counts: Counts, samples: _Samples) -> Band:
     """Interpolate a band, each segment between kinks from its own samples."""
-    kinds = (cells.A, cells.B) if k else (cells.A,)
-    return Band(k, *(_kind(k, kind, counts, samples) for kind in kinds))
+    return Band(k, *(_kind(k, kind, counts, samples) for kind in kinds_of(k)))
 
 
 def _kind(k: int, kind: int, counts: Counts, samples: _Samples) -> NDArray[np.float32]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.spatial import KDTree
 
 from ..errors import DiffractionError, warn
@@ -17,9 +18,8 @@ from ..tables.orders.crossed import (
     most_orders,
     propagates,
 )
-from ..tables.orders.table import LARGEST_SUM
-from .efficiencies import ROUNDING, Efficiencies, warn_of_one_way
-from .scattered import interpolated
+from .efficiencies import Efficiencies
+from .samples import check_orders, interpolated, missed_shares, warn_of_one_way
 from .stations import Real
 
 #: Widest gap between azimuths, degrees, that needs no warning.
@@ -46,7 +46,15 @@ def crossed_table(
     mirror = _mirror(grid)
     # (λ, direction, order) of unpolarised light
     known = grid.values.mean(axis=-1).reshape(len(grid.wavelengths), len(mirror), -1)
-    _check(grid, known, mirror, periods, last, shown)
+
+    def propagates_at(orders: NDArray[np.int64], edge: float) -> NDArray[np.bool_]:
+        share = 1.0 - 1e-6 * edge
+        light = grid.wavelengths * share, mirror * share
+        return _open(*light, (orders[:, 0], orders[:, 1]), periods).reshape(-1, len(orders))
+
+    signs = "the periods, and the signs of the orders, of theta and of phi"
+    each = known.reshape(-1, known.shape[-1], 1, 1)
+    check_orders(grid, each, np.column_stack(_orders(last)), propagates_at, signs, shown)
     powers = _dense(grid, known, last)
     filled = _filled(powers, grid.wavelengths, mirror, periods, last)
     table = CrossedTable(
@@ -94,45 +102,6 @@ def _open(
     return propagates(x, y, wavelengths[:, None, None], *orders, periods)
 
 
-def _check(
-    grid: Efficiencies, known: Real, mirror: Real, periods: tuple[float, float],
-    last: tuple[int, int], shown: str,
-) -> None:  # fmt: skip
-    """Refuse light in evanescent orders, missing orders, and sums above 1.001."""
-    pairs = grid.orders.T
-    lit = np.nan_to_num(known) > ROUNDING
-    # at grazing, rounding decides
-    mild = _open(
-        grid.wavelengths * (1.0 - 1e-6), mirror * (1.0 - 1e-6), (pairs[0], pairs[1]), periods
-    )
-    if (extra := np.argwhere(lit & ~mild)).size:
-        lam, direction, order = extra[0]
-        raise DiffractionError(
-            f"{shown}, {grid.light(lam * len(mirror) + direction)}: order "
-            f"{tuple(map(int, pairs[:, order]))} does not propagate; check the periods, and the "
-            "signs of the orders, of theta and of phi"
-        )
-    listed = {tuple(map(int, pair)): n for n, pair in enumerate(pairs.T)}
-    m_x, m_y = _orders(last)
-    must = _open(grid.wavelengths * (1.0 + 1e-6), mirror * (1.0 + 1e-6), (m_x, m_y), periods)
-    for n, pair in enumerate(zip(m_x.tolist(), m_y.tolist(), strict=True)):
-        absent = (
-            np.isnan(known[..., listed[pair]]) if pair in listed else np.full(must.shape[:2], True)
-        )
-        if (lacking := np.argwhere(must[..., n] & absent)).size:
-            lam, direction = lacking[0]
-            raise DiffractionError(
-                f"{shown}, {grid.light(lam * len(mirror) + direction)}: order {pair} propagates, "
-                "and has no efficiencies; list it, with 0 if it has no light"
-            )
-    sums = np.nansum(known, axis=-1)
-    if (largest := float(sums.max())) > LARGEST_SUM:
-        raise DiffractionError(
-            f"{shown}, {grid.light(int(sums.argmax()))}: the orders sum to {largest:.4g}, above "
-            f"{LARGEST_SUM}"
-        )
-
-
 def _dense(grid: Efficiencies, known: Real, last: tuple[int, int]) -> Real:
     """Return efficiencies (λ, direction, order) of all orders of the table; 0 where unlisted."""
     m_x, m_y = _orders(last)
@@ -167,16 +136,12 @@ def _filled(
 
 def _nodes(filled: Real, wavelengths: Real, mirror: Real, last: tuple[int, int]) -> Any:
     """Return the values of the table's even grid."""
-    least = np.diff(wavelengths).min() if len(wavelengths) > 1 else 1.0
-    count = 1 + round(float(np.ptp(wavelengths) / least)) if len(wavelengths) > 1 else 2
-    even = np.linspace(wavelengths[0], wavelengths[-1], min(max(count, 2), MOST_WAVELENGTHS))
-    upper = np.clip(np.searchsorted(wavelengths, even), 1, max(len(wavelengths) - 1, 1))
     if len(wavelengths) == 1:
         along = np.repeat(filled, 2, axis=0)
     else:
-        low, high = wavelengths[upper - 1], wavelengths[upper]
-        share = ((even - low) / (high - low))[:, None, None]
-        along = filled[upper - 1] * (1.0 - share) + filled[upper] * share
+        count = 1 + round(float(np.ptp(wavelengths) / np.diff(wavelengths).min()))
+        even = np.linspace(wavelengths[0], wavelengths[-1], min(count, MOST_WAVELENGTHS))
+        along = make_interp_spline(wavelengths, filled, k=1)(even)
     axis = np.linspace(-1.0, 1.0, NODES)
     y, x = np.meshgrid(axis, axis, indexing="ij")
     places = np.stack([x, y], axis=-1)
@@ -205,11 +170,7 @@ def _errors(table: CrossedTable, powers: Real, wavelengths: Real, mirror: Real) 
     # the file has light to compare with up to its last angle
     known = np.hypot(out_x, out_y) <= np.hypot(x, y).max()
     back = np.where(known, table.efficiency(-out_x, -out_y, *light), got)
-    missed, total = np.abs(got - truth).sum(axis=-1), truth.sum(axis=-1)
-    floor = max(0.05 * float(total.mean()), 1e-12)
-    whole = max(float(total.sum()), 1e-12)
-    return {
-        "error_mean": float(missed.sum()) / whole,
-        "error_worst": float(np.quantile(missed / np.maximum(total, floor), 0.95)),
-        "reciprocity_error": float(np.abs(back - got).sum()) / whole,
-    }
+    total = truth.sum(axis=-1)
+    mean, worst = missed_shares(np.abs(got - truth).sum(axis=-1), total)
+    one_way = float(np.abs(back - got).sum()) / max(float(total.sum()), 1e-12)
+    return {"error_mean": mean, "error_worst": worst, "reciprocity_error": one_way}

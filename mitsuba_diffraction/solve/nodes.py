@@ -7,7 +7,7 @@ low bands, which need several times as many nodes as high ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 
 from ..tables.orders import cells
+from ..tables.orders.table import Counts
+from .stations import Complex, Real, reversed_light
 
 #: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most.
 MAX_NODES = (36, 24, 8)
@@ -33,6 +35,56 @@ class Place(NamedTuple):
     w: tuple[float, ...]
 
 
+def kinds_of(band: int) -> tuple[int, ...]:
+    """Return the kinds of a band: A, and, but for band 0, B."""
+    return (cells.A, cells.B) if band else (cells.A,)
+
+
+def places_of(band: int, counts: Counts, nodes: Callable[[int], Real] = cells.nodes) -> list[Place]:
+    """Return the stations of a band: up to τ = ½, of which reciprocity makes the other half."""
+    tau, rho, w = (nodes(count).tolist() for count in counts)
+    half = tau[: (counts.tau + 1) // 2]
+    return [Place(band, kind, t, r, tuple(w)) for kind in kinds_of(band) for t in half for r in rho]
+
+
+def places_at(
+    x: Real, y: Real, wavelength: Real, wavelengths: tuple[float, float], optical_period: float
+) -> tuple[cells.Cell, list[Place]]:
+    """Return the cell of each of some lights (n,), and its station, of one w.
+
+    x, y, wavelength, optical_period : as for `cells.to_cell`; wavelengths : of the table, nm.
+    """
+    cell = cells.to_cell(x, y, wavelength, optical_period)
+    w = cells.w_of(cell.k_continuous, wavelength, wavelengths, optical_period)
+    columns = (part.tolist() for part in (cell.band, cell.kind, cell.tau, cell.rho, w))
+    rows = zip(*columns, strict=True)
+    return cell, [Place(band, kind, tau, rho, (at,)) for band, kind, tau, rho, at in rows]
+
+
+def at_nodes(
+    kind: int,
+    places: Sequence[Place],
+    counts: Counts,
+    solved: Mapping[Place, Complex],
+    sides: int,
+    values_of: Callable[[Complex], Real],
+) -> NDArray[np.float32]:
+    """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …).
+
+    places : of a band, of `places_of`.
+    """
+    of_kind = [place for place in places if place.kind == kind]
+    shape = values_of(solved[of_kind[0]]).shape
+    values = np.empty((counts.tau, counts.rho, *shape), np.float32)
+    for number, place in enumerate(of_kind):
+        n, m = divmod(number, counts.rho)
+        values[n, m] = values_of(solved[place])
+        back = values_of(reversed_light(solved[place], sides))
+        opposite = counts.tau - 1 - n
+        values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
+    return values
+
+
 class Line(NamedTuple):
     """Places along one variable (0 τ, 1 ρ, 2 w) of a kind, at Chebyshev nodes."""
 
@@ -45,7 +97,7 @@ def lines(band: int, most: tuple[int, int, int] = MAX_NODES) -> Iterator[Line]:
 
     Along τ, half of the nodes are enough: reciprocity gives the others.
     """
-    for kind in (cells.A, cells.B) if band else (cells.A,):
+    for kind in kinds_of(band):
         for tau, rho, w in _CROSSINGS:
             half = cells.nodes(most[0])[: most[0] // 2]
             yield Line(0, tuple(Place(band, kind, float(t), rho, (w,)) for t in half))

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import DiffractionError, quoted, warn
 from ..heights.lengths import count_between, number_between
@@ -19,17 +18,26 @@ from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
 from .films import Layers, Substance, material_text, structure_of
 from .grating_index import Material, material_of
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
-from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
+from .nodes import (
+    MAX_NODES,
+    MIN_NODES,
+    Line,
+    Place,
+    at_nodes,
+    count_for,
+    kinds_of,
+    lines,
+    places_of,
+)
 from .profiles import Profile
 from .resolution import (
     Chosen,
-    chosen_resolution,
     coarsest,
     energy_error,
     finer_problem,
     places_to_test,
     reciprocity_error,
-    resolution_error,
+    resolved,
 )
 from .sheet import check_clear
 from .stations import Complex, Grating, Real, reversed_light
@@ -133,40 +141,19 @@ def solve_orders(
         raise DiffractionError(
             "polarised: tables of thin sheets have efficiencies alone; leave out polarised, or thin"
         )
-    grating = Grating(
-        profile,
-        substance,
-        superstrate,
-        how.wavelengths,
-        thin,
-        structure_of(
-            profile,
-            substance,
-            how.wavelengths,
-            layers=layers,
-            beneath=beneath,
-            substrate=substrate,
-            thin=thin,
-        ),
-    )
+    structure = structure_of(
+        profile, substance, how.wavelengths,
+        layers=layers, beneath=beneath, substrate=substrate, thin=thin,
+    )  # fmt: skip
+    grating = Grating(profile, substance, superstrate, how.wavelengths, thin, structure)
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     problem = problem_of(grating, how.method, how.resolution or 0)
-    if how.resolution is None:
-        chosen = chosen_resolution(problem, work, places_to_test(bands), how.tolerance / 2)
-    else:
-        chosen = Chosen(problem, resolution_error(problem, work, places_to_test(bands)))
-    problem = chosen.problem
-    coarse = problem
+    chosen = resolved(problem, work, places_to_test(bands), how.tolerance / 2)
+    coarse = problem = chosen.problem
     if how.resolution is None and problem.method == "integral":  # others cost about the same
         coarse = replace(problem, resolution=coarsest(problem))
     counts = _counts(coarse, work, bands, how, tell)
-    header: dict[str, Any] = {
-        "material": material_text(grating),
-        "profile": profile.name,
-        "depth": profile.depth,
-        "solver_error": chosen.error,
-        "tolerance": how.tolerance,
-    }
+    header = header_of(chosen, how)
     for refinement in range(REFINEMENTS + 1):
         problem, solved = _solved_at_nodes(problem, counts, work, tell)
         header |= {
@@ -181,17 +168,31 @@ def solve_orders(
         if error.within(how.tolerance) or refinement == REFINEMENTS:
             break
         counts = _refined_counts(counts, error.bands)
-    header |= {"error_mean": error.mean, "error_worst": error.most}
-    header["processor_seconds"] = round(work.processor_seconds, 1)
-    if error.polarised is not None:
-        header["error_polarised"] = error.polarised
-    if not error.within(how.tolerance):
-        refuse_or_warn(error, how)
+    conclude(header, error, how, work)
     return table
 
 
-def refuse_or_warn(error: Measured, how: Settings) -> None:
-    """Refuse a table that misses its tolerance, or warn if it is accepted."""
+def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
+    """Return the entries that the headers of all solved tables have."""
+    grating = chosen.problem.grating
+    return {
+        "solver": solver_of(chosen.problem).name,
+        "material": material_text(grating),
+        "profile": grating.profile.name,
+        "depth": grating.profile.depth,
+        "solver_error": chosen.error,
+        "tolerance": how.tolerance,
+    }
+
+
+def conclude(header: dict[str, Any], error: Measured, how: Settings, jobs: Jobs) -> None:
+    """Add a table's error to its header; refuse it above the tolerance, or warn if accepted."""
+    header |= {"error_mean": error.mean, "error_worst": error.most}
+    header["processor_seconds"] = round(jobs.processor_seconds, 1)
+    if error.polarised is not None:
+        header["error_polarised"] = error.polarised
+    if error.within(how.tolerance):
+        return
     mean = max(error.mean, error.polarised or 0.0)
     text = (
         f"the table misses {mean:.2%} of the light in its orders on average (tolerance "
@@ -213,7 +214,7 @@ def _solved_at_nodes(
     announce: Callable[[Estimate], None],
 ) -> tuple[Problem, dict[Place, Complex]]:
     """Solve all nodes, at a higher resolution if solutions have light from nothing."""
-    places = [place for band in counts for place in _places(band, counts[band])]
+    places = [place for band in counts for place in places_of(band, counts[band])]
     for _ in range(_RAISED):
         announce_stage(announce, "solving", problem, jobs, places)
         solved = jobs.amplitudes(problem, places, "solving orders")
@@ -312,67 +313,29 @@ def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
     return elements.reshape(*elements.shape[:3], 16)
 
 
-def _places(band: int, counts: Counts) -> list[Place]:
-    """Return the stations of a band: the first half of τ, of which reciprocity makes the other."""
-    w = tuple(float(value) for value in cells.nodes(counts.w))
-    half = cells.nodes(counts.tau)[: (counts.tau + 1) // 2]
-    return [
-        Place(band, kind, float(tau), float(rho), w)
-        for kind in ((cells.A, cells.B) if band else (cells.A,))
-        for tau in half
-        for rho in cells.nodes(counts.rho)
-    ]
-
-
 def _band(
     band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool, sides: int
 ) -> Band:
     """Assemble the efficiencies, and Mueller matrices, of a band from its stations."""
-    kinds, matrices = [], []
-    for kind in (cells.A, cells.B) if band else (cells.A,):
-        at_nodes = functools.partial(_at_nodes, band, kind, counts, solved, sides)
-        values = at_nodes(powers)
+    kinds, matrices, places = [], [], places_of(band, counts)
+    for kind in kinds_of(band):
+        values = at_nodes(kind, places, counts, solved, sides, powers)
         total = values.sum(axis=-2, keepdims=True)
         kinds.append(values / np.maximum(total, 1.0))
         if polarised:
-            matrices.append(at_nodes(lambda amplitudes: mueller_of(_limited(amplitudes))))
+            matrices.append(at_nodes(kind, places, counts, solved, sides, _limited_mueller))
     return Band(band, *kinds, mueller=tuple(matrices) or None)
 
 
-def _limited(amplitudes: Complex) -> Complex:
-    """Scale amplitudes (w, j, 2, q, 2) whose powers sum to more than 1."""
+def _limited_mueller(amplitudes: Complex) -> Real:
+    """Return the Mueller matrices of amplitudes, scaled where their powers sum to more than 1."""
     total = powers(amplitudes).sum(axis=2)
-    return amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None]
-
-
-def _at_nodes(
-    band: int,
-    kind: int,
-    counts: Counts,
-    solved: Mapping[Place, Complex],
-    sides: int,
-    values_of: Callable[[Complex], Real],
-) -> NDArray[np.float32]:
-    """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …)."""
-    places = [place for place in _places(band, counts) if place.kind == kind]
-    shape = values_of(solved[places[0]]).shape
-    values = np.empty((counts.tau, counts.rho, *shape), np.float32)
-    for number, place in enumerate(places):
-        n, m = divmod(number, counts.rho)
-        values[n, m] = values_of(solved[place])
-        back = values_of(reversed_light(solved[place], sides))
-        opposite = counts.tau - 1 - n
-        values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
-    return values
+    return mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
 
 
 def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
     """Return the largest violation of reciprocity in any band; see `resolution`."""
-    places = [
-        Place(band, kind, 0.5, 0.41, (0.5,))
-        for band in bands
-        for kind in ((cells.A, cells.B) if band else (cells.A,))
-    ]
+    places = [Place(band, kind, 0.5, 0.41, (0.5,)) for band in bands for kind in kinds_of(band)]
     solved = jobs.solve(problem, places, "checking reciprocity")
     return reciprocity_error(solved, problem.grating.sides)
 

@@ -53,8 +53,6 @@ class Profile:
     def __post_init__(self) -> None:
         number_between(self.period, f"{self.name}: period", 0.01, 1e3, " µm")
         x, z = (np.asarray(values, np.float64) for values in (self.x, self.z))
-        object.__setattr__(self, "x", x)
-        object.__setattr__(self, "z", z)
         if x.ndim != 1 or x.shape != z.shape or not 2 <= len(x) <= MOST_VERTICES:
             raise DiffractionError(
                 f"{self.name}: expected 2 to {MOST_VERTICES} pairs (x, z), got x {x.shape}, "
@@ -65,8 +63,8 @@ class Profile:
         slack = 1e-6 * self.period
         if (x.min() < -slack or x.max() > self.period + slack) and np.ptp(x) < 2.0 * self.period:
             x, z = _begun_elsewhere(x, z, self.period)
-            object.__setattr__(self, "x", x)
-            object.__setattr__(self, "z", z)
+        object.__setattr__(self, "x", x)
+        object.__setattr__(self, "z", z)
         if x.min() < -slack or x.max() > self.period + slack:
             raise DiffractionError(
                 f"{self.name}: x runs from {x.min():g} to {x.max():g} µm, but one period is 0 to "

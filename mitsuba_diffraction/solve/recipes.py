@@ -121,10 +121,10 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     Raises a DiffractionError if the generator or file is unknown, or an argument is missing,
     unknown or out of range.
     """
-    names = ", ".join(GENERATORS)
     if not isinstance(name, str) or (name not in GENERATORS and "." not in name):
         raise DiffractionError(
-            f"profile: expected one of {names}, or a file (.csv), got {quoted(name)}"
+            f"profile: expected one of {', '.join(GENERATORS)}, or a file (.csv), got "
+            f"{quoted(name)}"
         )
     make = GENERATORS.get(name)
     known = inspect.signature(make).parameters if make else {"period": None}

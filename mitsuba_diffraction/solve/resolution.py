@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.orders import cells
 from .films import material_text
 from .jobs import Jobs, Problem
-from .nodes import Place
+from .nodes import Place, kinds_of
 from .stations import Real, reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
@@ -67,22 +66,23 @@ def chosen_resolution(
     )
 
 
+def resolved(problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float) -> Chosen:
+    """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
+    if problem.resolution == 0:
+        return chosen_resolution(problem, jobs, places, tolerance)
+    return Chosen(problem, resolution_error(problem, jobs, places))
+
+
 def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
     """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
-    return _refined(problem, values, jobs, places).error
-
-
-class _Refined(NamedTuple):
-    problem: Problem
-    values: dict[Place, Real]
-    error: float
+    return _refined(problem, values, jobs, places)[2]
 
 
 def _refined(
     problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
-) -> _Refined:
-    """Solve at the next resolution, and compare.
+) -> tuple[Problem, dict[Place, Real], float]:
+    """Return the problem at the next resolution, its efficiencies, and the share that changes.
 
     Raises a DiffractionError if the grating reflects nothing.
     """
@@ -96,7 +96,7 @@ def _refined(
             "light; choose materials that differ from the medium above, and layers that light "
             "passes"
         )
-    return _Refined(fine, finer, missed / light)
+    return fine, finer, missed / light
 
 
 def finer_problem(problem: Problem) -> Problem:
@@ -110,8 +110,7 @@ def places_to_test(bands: Sequence[int]) -> list[Place]:
     return [
         Place(band, kind, tau, 0.41, (0.05, 0.95))
         for band in some
-        for kind, tau in ((cells.A, 0.5), (cells.B, 0.2))
-        if band or kind == cells.A
+        for kind, tau in zip(kinds_of(band), (0.5, 0.2), strict=False)
     ]
 
 

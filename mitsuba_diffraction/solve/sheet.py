@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from ..errors import DiffractionError
 from ..optics import fresnel
+from ..tables.orders.table import LEAST_BLOCK
 from .grating_index import Material
 from .stations import Complex, Real, Station
 
-#: Least index of a thin sheet: orders of light that goes through depend on n − 1.
-LEAST_INDEX = 1.01
 #: Share of the light that a totally reflecting side sends back: where a channel has no way out, as
 #: in a flat sheet, the sum would not end.
 _KEPT = 1.0 - 1e-7
@@ -37,13 +37,13 @@ def check_clear(material: Material, wavelengths: tuple[float, float]) -> None:
 
     wavelengths : shortest and longest, in vacuum, nm.
 
-    Raises a DiffractionError if the material absorbs, or has an index below `LEAST_INDEX`.
+    Raises a DiffractionError if the material absorbs, or has an index below `LEAST_BLOCK`.
     """
     index = material.index(wavelengths)
-    if index is None or index.imag.any() or index.real.min() < LEAST_INDEX:
+    if index is None or index.imag.any() or index.real.min() < LEAST_BLOCK:
         raise DiffractionError(
             f"material {material.name}: light goes through a clear material only; "
-            f"give its index, a real number of {LEAST_INDEX:g} to 100, such as 1.58"
+            f"give its index, a real number of {LEAST_BLOCK:g} to 100, such as 1.58"
         )
 
 
@@ -77,14 +77,14 @@ def _efficiencies(amplitudes: Complex, station: Station, index: float, y: float)
     common = slice(-int(inside[0]), n - int(inside[0]))
     returned = np.einsum("xjb,jbc->xjc", side[within, within].reshape(-1, m, 4), back)
     system = np.eye(4 * m) - returned.reshape(-1, 4 * m)
-    entered = _diagonal(into)[:, _rows(common, m)]
+    entered = block_diag(*into)[:, _rows(common, m)]
     came = np.hstack([side[within, above], side[within, within] @ entered])
     down = np.linalg.solve(system, came)
-    up = _diagonal(back) @ down
+    up = block_diag(*back) @ down
     up[:, 4 * n :] += entered
-    total = np.vstack([side[above, within] @ up, (_diagonal(out) @ down)[_rows(common, m)]])
+    total = np.vstack([side[above, within] @ up, (block_diag(*out) @ down)[_rows(common, m)]])
     total[: 4 * n, : 4 * n] += side[above, above]
-    total[4 * n :, 4 * n :] += _diagonal(mirror[common])
+    total[4 * n :, 4 * n :] += block_diag(*mirror[common])
     # |E|² and |B|² of all products; (out, in) to (in, out)
     powers = total.reshape(2 * n, 4, 2 * n, 4)[:, ::3][..., ::3].real
     return np.asarray(np.maximum(powers, 0.0).transpose(2, 3, 0, 1))
@@ -159,14 +159,6 @@ class _FlatSide:
 def _products(jones: Complex) -> Complex:
     """Return the matrices (n, 4, 4) that take products of components, of Jones matrices."""
     return np.einsum("nac,nbd->nabcd", jones, jones.conj()).reshape(len(jones), 4, 4)
-
-
-def _diagonal(blocks: Complex) -> Complex:
-    """Return the matrix with (n, 4, 4) blocks on its diagonal."""
-    n = len(blocks)
-    result = np.zeros((n, 4, n, 4), complex)
-    result[np.arange(n), :, np.arange(n)] = blocks
-    return result.reshape(4 * n, 4 * n)
 
 
 def _rows(channels: slice, count: int) -> NDArray[np.int64]:

@@ -92,14 +92,12 @@ class Grating:
             None if index is None else index / self.superstrate,
             np.sqrt(1.0 - cosine**2),
             self.thin or self.block,
-            tuple(self._relative(material, lam) for material in self.structure.materials),
+            tuple(
+                layer / self.superstrate
+                for material in self.structure.materials
+                if (layer := material.index(lam)) is not None  # always: `films.structure_of`
+            ),
         )
-
-    def _relative(self, material: Material, wavelength: Real) -> Complex:
-        """Return an index relative to the medium above; wavelength : in vacuum, nm."""
-        index = material.index(wavelength)
-        assert index is not None  # `films.structure_of` refuses perfect conductors
-        return np.asarray(index / self.superstrate)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -65,11 +64,8 @@ class Structure:
     @property
     def lengths(self) -> tuple[float, ...]:
         """All lengths, µm, which with the materials identify the structure."""
-        return tuple(self._lengths())
-
-    def _lengths(self) -> Iterator[float]:
-        yield from (len(self.films), *(film.thickness for film in self.films))
+        lengths: list[float] = [len(self.films), *(film.thickness for film in self.films)]
         for thickness, parts in self.slices:
-            yield from (thickness, len(parts))
-            for part in parts:
-                yield from (part.begin, part.end)
+            lengths += [thickness, len(parts)]
+            lengths += [end for part in parts for end in (part.begin, part.end)]
+        return tuple(lengths)

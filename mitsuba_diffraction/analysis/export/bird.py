@@ -17,7 +17,7 @@ import numpy as np
 from ...atomic import atomic_path
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Sample, means, polar
+from .cells import Cells, Grid, Sample, means, unit_vector
 
 #: Default directions to the light, degrees, nodes of θ of the eye, and wavelengths, nm.
 DEFAULT = Grid(
@@ -53,8 +53,8 @@ def save_bird(
         theta_i: Float, phi_i: Float, theta_r: Float, phi_r: Float, a: Float, b: Float
     ) -> Sample:
         tilted = theta_r + a * size
-        wo = polar(tilted, phi_r + b * size)
-        return Sample(polar(theta_i, phi_i), wo, dr.abs(dr.sin(tilted)))
+        wo = unit_vector(tilted, phi_r + b * size)
+        return Sample(unit_vector(theta_i, phi_i), wo, dr.abs(dr.sin(tilted)))
 
     cells = Cells([np.radians(angle) for angle in angles], sample)
     values = means(bsdf, cells, grid.wavelengths, size, False, progress)

@@ -19,7 +19,8 @@ from ...plugin.loops import sum_of
 from ...plugin.memory import read_record, upload
 from ...plugin.types import Buffer, Float, Index, Spectrum, Vector3f
 from ...progress import Progress
-from ..maps.hemisphere import sub_samples
+from ..maps.evaluate import opaque
+from ..maps.hemisphere import flat_interaction, sub_samples
 
 Reals = NDArray[np.float64]
 
@@ -153,8 +154,7 @@ def means(
             done = first + (min(_LAUNCH, count - first) * wave) // len(wavelengths)
             progress(done, count, "evaluating")
             light = wavelengths[wave : wave + packet]
-            spectrum = mi.UnpolarizedSpectrum(np.resize(light, packet).tolist())
-            dr.make_opaque(spectrum)  # one kernel for all wavelengths
+            spectrum = mi.UnpolarizedSpectrum(opaque(np.resize(light, packet)))
             total = _total(bsdf, cells.sample, nodes, places, len(pattern), spectrum, cosine)
             for column, channel in zip(range(len(light)), total, strict=False):
                 result[first : first + _LAUNCH, wave + column] = np.array(channel)
@@ -177,10 +177,8 @@ def _total(
         a, b, shift, _ = read_record(places, n, 4)
         wi, wo, weight = sample(*nodes, a, b)
         lit = wo.z > 0.0
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.n = mi.Normal3f(0.0, 0.0, 1.0)
-        si.sh_frame = mi.Frame3f(si.n)
-        si.wi, si.wavelengths = wi, wavelengths + shift
+        si = flat_interaction(wi, 1)
+        si.wavelengths = wavelengths + shift
         f = bsdf.eval(mi.BSDFContext(), si, dr.select(lit, wo, mi.Vector3f(0.0, 0.0, 1.0)))
         if not cosine:
             f, weight = f * dr.rcp(dr.select(lit, wo.z, 1.0)), dr.select(lit, weight, 0.0)
@@ -198,7 +196,7 @@ def _tent(share: Reals) -> Reals:
     return np.asarray(np.sign(share - 0.5) * (1.0 - np.sqrt(1.0 - np.abs(2.0 * share - 1.0))))
 
 
-def polar(theta: Float, phi: Float) -> Vector3f:
-    """Return unit vectors of angles in rad from the normal, and from x towards y."""
+def unit_vector(theta: Float, phi: Float) -> Vector3f:
+    """Return a unit vector, at angles in rad from the normal, and from x towards y."""
     sine, cosine = dr.sincos(theta)
     return mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine)

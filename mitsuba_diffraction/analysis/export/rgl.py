@@ -7,25 +7,23 @@ to the light. Without `jacobian` and with an even `vndf` the tensors are f cosθ
 
 from __future__ import annotations
 
-import struct
+import contextlib
 from pathlib import Path
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Sample, means, polar
+from .cells import Cells, Grid, Sample, means, unit_vector
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
 DEFAULT = Grid(
     np.arange(0.0, 86.0, 8.5), np.linspace(-180.0, 180.0, 25), np.arange(360.0, 831.0, 20.0), 64
 )
-# Numbers of Mitsuba's `Struct::Type`.
-_TYPES = {"uint8": 1, "float32": 10}
 
 
 def save_rgl(
@@ -45,8 +43,8 @@ def save_rgl(
     def sample(azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float) -> Sample:
         place = dr.minimum(dr.abs(u + a / (n - 1)), 1.0)
         theta_m = 0.5 * np.pi * dr.square(place)
-        half = polar(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
-        wi = polar(elevation, azimuth)
+        half = unit_vector(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
+        wi = unit_vector(elevation, azimuth)
         cosine = dr.dot(wi, half)
         solid = place * dr.sin(theta_m) * dr.maximum(cosine, 0.0)
         return Sample(wi, 2.0 * cosine * half - wi, solid)
@@ -59,33 +57,13 @@ def save_rgl(
     density += 1e-2 * density.mean(axis=(2, 3), keepdims=True) + 1e-9
     ones = np.ones((2, 2))
     spectra = np.moveaxis(values.reshape(*shape, -1), -1, 2)
-    write_tensors(
-        path,
-        {
-            "description": np.frombuffer(text.encode() or b"-", np.uint8),
-            "phi_i": phi.astype(np.float32), "theta_i": theta.astype(np.float32),
-            "wavelengths": grid.wavelengths.astype(np.float32), "ndf": ones.astype(np.float32),
-            "sigma": ones.astype(np.float32), "vndf": np.ones((*shape[:2], 2, 2), np.float32),
-            "luminance": density.astype(np.float32), "spectra": np.ascontiguousarray(spectra),
-            "jacobian": np.zeros(1, np.uint8),
-        },
-    )  # fmt: skip
-
-
-def write_tensors(path: Path, tensors: dict[str, NDArray[Any]]) -> None:
-    """Write a file of tensors by name, of type uint8 or float32."""
-    heads = [
-        (struct.pack("<H", len(name)) + name.encode() + struct.pack("<HB", array.ndim, kind),
-         struct.pack(f"<{array.ndim}Q", *array.shape))
-        for name, array in tensors.items()
-        for kind in [_TYPES[array.dtype.name]]
-    ]  # fmt: skip
-    start = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(tensors))
-    offset = len(start) + sum(len(head) + 8 + len(tail) for head, tail in heads)
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        file.write(start)
-        for (head, tail), array in zip(heads, tensors.values(), strict=True):
-            file.write(head + struct.pack("<Q", offset) + tail)
-            offset += array.nbytes
-        for array in tensors.values():
-            file.write(array.tobytes())
+    tensors = {
+        "phi_i": phi, "theta_i": theta, "wavelengths": grid.wavelengths, "ndf": ones, "sigma": ones,
+        "vndf": np.ones((*shape[:2], 2, 2)), "luminance": density, "spectra": spectra,
+    }  # fmt: skip
+    numbers = {name: array.astype(np.float32) for name, array in tensors.items()}
+    # Mitsuba's writer prints the file's name
+    with atomic_path(path) as temporary, contextlib.redirect_stdout(None):
+        mi.tensor_io.write(
+            str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
+        )

@@ -18,7 +18,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Reals, Sample, means, polar
+from .cells import Cells, Grid, Reals, Sample, means, unit_vector
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
 DEFAULT = Grid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
@@ -48,9 +48,9 @@ def save_zemax(
     def sample(
         rotation: Float, theta: Float, azimuth: Float, radial: Float, a: Float, b: Float
     ) -> Sample:
-        mirror = polar(theta, rotation)
+        mirror = unit_vector(theta, rotation)
         # from the mirror direction towards the normal, and counter-clockwise from there
-        up = -polar(theta + 0.5 * np.pi, rotation)
+        up = -unit_vector(theta + 0.5 * np.pi, rotation)
         turned, away = azimuth + a * steps[0], dr.abs(radial + b * steps[1])
         around = dr.cos(turned) * up + dr.sin(turned) * dr.cross(mirror, up)
         wo = dr.cos(away) * mirror + dr.sin(away) * around

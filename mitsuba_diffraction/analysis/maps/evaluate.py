@@ -15,7 +15,7 @@ from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
-from ...progress import Progress
+from ...progress import Progress, silent
 from ...tables.build.spectrum import GLOSSY_RADIUS
 from . import hemisphere
 from .result import Bands, BrdfMap, LightDirection
@@ -93,14 +93,8 @@ def brdf_map(
     narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
-    sums: _SpectralSums | _RgbSums
-    if mi.is_rgb:
-        sums = _RgbSums(cosine)
-    else:
-        sums = _SpectralSums(
-            bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral
-        )
-    coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress)
+    sums = _Sums(bands, illuminant, cosine, spectral)
+    coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress or silent)
     if mi.is_rgb:
         to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
         values = np.moveaxis(np.moveaxis(values, 0, -1) @ to_xyz, -1, 0).astype(np.float32)
@@ -145,27 +139,39 @@ def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool
         )
 
 
-class _SpectralSums:
-    """Sums over wavelengths: tristimulus values, bands or both, with one kernel for all packets."""
+class _Sums:
+    """Sums over wavelengths: tristimulus values, bands or both, with one kernel for all packets.
 
-    def __init__(
-        self, bands: Bands, illuminant: str, cosine: bool, *, colours: bool, spectral: bool
-    ) -> None:
+    In RGB variants, linear sRGB of the whole spectrum.
+    """
+
+    def __init__(self, bands: Bands, illuminant: str, cosine: bool, spectral: bool) -> None:
         self.bands, self.illuminant, self.cosine = bands, illuminant, cosine
-        self.colours, self.keeps_bands = colours, spectral or not colours
-        self.count = (3 if colours else 0) + (bands.count if self.keeps_bands else 0)
+        self.colours, self.keeps_bands = not bands.is_single, spectral or bands.is_single
+        self.count = (3 if self.colours else 0) + (bands.count if self.keeps_bands else 0)
         self._context = mi.BSDFContext()
+
+    def _value(self, bsdf: Any, si: Any, wo: Any, active: Any) -> Any:
+        """Return f, or f·cosθo."""
+        f = bsdf.eval(self._context, si, wo, active)
+        return f if self.cosine else f * dr.rcp(wo.z)
 
     def add(
         self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
     ) -> None:
-        """Add one sample of each pixel to its totals: X, Y, Z, bands, or both.
+        """Add one sample of each pixel to its totals: X, Y, Z, bands, or both; or R, G, B.
 
         Parameters
         ----------
         totals : `count` variables mi.Float; changed in place.
         offset : position of the wavelength in each band, 0 to 1.
         """
+        if mi.is_rgb:
+            f = self._value(bsdf, si, wo, active)
+            for n in range(3):
+                totals[n] += f[n]
+            dr.eval(totals)
+            return
         packet = len(mi.Spectrum())
         wavelengths = self.bands.wavelengths(offset)
         weights = (
@@ -176,14 +182,12 @@ class _SpectralSums:
             index = np.minimum(np.arange(first, first + packet), self.bands.count - 1)
             used = min(packet, self.bands.count - first)
             # opaque, since every literal would compile another kernel
-            si.wavelengths = mi.Spectrum(_opaque(wavelengths[index]))
-            f = bsdf.eval(self._context, si, wo, active)
-            if not self.cosine:
-                f *= dr.rcp(wo.z)
+            si.wavelengths = mi.Spectrum(opaque(wavelengths[index]))
+            f = self._value(bsdf, si, wo, active)
             if weights is not None:
                 padded = weights[index] * (np.arange(packet) < used)[:, None]
                 for n in range(3):
-                    totals[n] += dr.dot(mi.Spectrum(_opaque(padded[:, n])), f)
+                    totals[n] += dr.dot(mi.Spectrum(opaque(padded[:, n])), f)
             if self.keeps_bands:
                 start = self.count - self.bands.count + first
                 for n in range(used):
@@ -192,35 +196,13 @@ class _SpectralSums:
             dr.eval(totals[:3])
 
 
-class _RgbSums:
-    """Linear sRGB of RGB variants, with the interface of `_SpectralSums`."""
-
-    count = 3
-    keeps_bands = False
-
-    def __init__(self, cosine: bool) -> None:
-        self.cosine = cosine
-        self._context = mi.BSDFContext()
-
-    def add(
-        self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
-    ) -> None:
-        """Add one sample of each pixel; `offset` is not used."""
-        f = bsdf.eval(self._context, si, wo, active)
-        if not self.cosine:
-            f *= dr.rcp(wo.z)
-        for n in range(3):
-            totals[n] += f[n]
-        dr.eval(totals)
-
-
 def _over_pixels(
     bsdf: Any,
     light: LightDirection,
     resolution: int,
     samples: int,
-    sums: _SpectralSums | _RgbSums,
-    progress: Progress | None,
+    sums: _Sums,
+    progress: Progress,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the means over each pixel: coverage (n, n) and sums (count, n, n)."""
     inside = hemisphere.inside(resolution)
@@ -233,16 +215,12 @@ def _over_pixels(
     for chunk in range(chunks):
         part = slice(chunk * LAUNCH_PIXELS, (chunk + 1) * LAUNCH_PIXELS)
         x0, y0 = (upload(mi.Float, low[index[part]]) for index in (columns, rows))
-        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(x0))
-        si.n = mi.Normal3f(0.0, 0.0, 1.0)
-        si.sh_frame = mi.Frame3f(si.n)
-        si.wi = mi.Vector3f(_opaque(light.direction))
         hit = dr.zeros(mi.Float, dr.width(x0))
+        si = hemisphere.flat_interaction(mi.Vector3f(opaque(light.direction)), dr.width(x0))
         totals = [dr.zeros(mi.Float, dr.width(x0)) for _ in range(sums.count)]
         for n, (shift_x, shift_y, offset) in enumerate(pattern):
-            if progress is not None:
-                progress(chunk * samples + n, chunks * samples, "evaluating")
-            shift = _opaque(np.array([shift_x, shift_y]) * size)
+            progress(chunk * samples + n, chunks * samples, "evaluating")
+            shift = opaque(np.array([shift_x, shift_y]) * size)
             x, y = x0 + shift[0], y0 + shift[1]
             z2 = 1.0 - dr.square(x) - dr.square(y)
             active = z2 > 0.0
@@ -254,13 +232,12 @@ def _over_pixels(
         coverage[rows[part], columns[part]] = np.array(hit) / samples
         for total, value in zip(totals, values, strict=True):
             value[rows[part], columns[part]] = np.array(total) / samples
-    if progress is not None:
-        progress(chunks * samples, chunks * samples, "evaluating")
+    progress(chunks * samples, chunks * samples, "evaluating")
     return coverage, values
 
 
-def _opaque(values: NDArray[np.float64]) -> list[Any]:
-    """Return numbers as opaque Dr.Jit variables of one element each."""
+def opaque(values: NDArray[np.float64]) -> list[Any]:
+    """Return numbers as opaque Dr.Jit variables of one element each, which share a kernel."""
     variables = [mi.Float(float(v)) for v in values]
     dr.make_opaque(variables)
     return variables

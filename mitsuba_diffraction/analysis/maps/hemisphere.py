@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError
 
@@ -20,6 +21,24 @@ MOST_SAMPLES = 1024
 
 # Least and largest number of samples per pixel that is chosen automatically; 64 take a minute.
 _AUTOMATIC_SAMPLES = (4, 64)
+
+
+def polar(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+    """Return unit vectors (..., 3) of angles in rad from the normal, and from x towards y."""
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def flat_interaction(wi: Any, count: int) -> Any:
+    """Return points of a flat surface in air, with one or `count` ωi (mi.Vector3f)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    si.n = mi.Normal3f(0.0, 0.0, 1.0)
+    si.sh_frame = mi.Frame3f(si.n)
+    si.wi = wi
+    return si
 
 
 def check_resolution(resolution: int) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import encode_srgb, linear_srgb
 from ...optics.geometry import check_angles
+from .hemisphere import polar
 
 Image = NDArray[np.float32]
 
@@ -45,9 +46,7 @@ class LightDirection:
     @property
     def direction(self) -> NDArray[np.float64]:
         """Unit vector ωi (3,) towards the light."""
-        theta, phi = math.radians(self.theta), math.radians(self.phi)
-        sin = math.sin(theta)
-        return np.array([sin * math.cos(phi), sin * math.sin(phi), math.cos(theta)])
+        return polar(math.radians(self.theta), math.radians(self.phi))
 
     @property
     def mirror(self) -> NDArray[np.float64]:

@@ -76,8 +76,13 @@ class Sample:
 
     def window_sums(self, table: DiffractionTable) -> Array:
         """Look up the window sums (n,) of the pairs in a table, in double precision."""
-        k, (u, v, w) = wavenumber(self.wavelength), diffraction_coordinates(self.wi, self.wo)
-        return table.window_sum(k * u, k * v, k * w)
+        return _window_sums(table, self.wi, self.wo, self.wavelength)
+
+
+def _window_sums(table: DiffractionTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+    """Return window sums of pairs (…, 3) at wavelengths that their shape is broadcast with."""
+    k, (u, v, w) = wavenumber(wavelength), diffraction_coordinates(wi, wo)
+    return table.window_sum(k * u, k * v, k * w)
 
 
 def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Array:
@@ -154,7 +159,9 @@ def measure_wavelengths(
 ) -> Spectral:
     """Measure sums and rays with a table, at pairs (n, 3) of directions."""
     lam = np.arange(_FIRST, _LAST, _FINEST) + 0.5 * _FINEST
-    spectrum = _spectrum(table, wi, wo, lam)  # (pairs, wavelengths)
+    # window sums over λ², up to a factor, (pairs, wavelengths)
+    k = wavenumber(lam)
+    spectrum = _window_sums(table, wi[:, None], wo[:, None], lam) * (k / k.mean()) ** 2
     weights = linear_srgb(response(lam))
     exact = spectrum @ weights * _FINEST
     lit = exact.max(axis=1) > 1e-4 * exact.max()
@@ -179,18 +186,6 @@ def measure_wavelengths(
         noise = estimate.std(axis=1) / total
         counts[count] = float(np.sqrt(np.mean(noise**2)))
     return Spectral(steps, counts)
-
-
-def _spectrum(
-    table: DiffractionTable,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    lam: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the window sums over λ², up to a factor, (pairs, wavelengths)."""
-    k, (u, v, w) = wavenumber(lam), diffraction_coordinates(wi, wo)
-    sums = table.window_sum(k * u[:, None], k * v[:, None], k * w[:, None])
-    return sums * (k / k.mean()) ** 2
 
 
 def _draw_wavelengths(u: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

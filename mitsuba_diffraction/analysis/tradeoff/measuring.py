@@ -39,6 +39,11 @@ class Setting:
     crop: float | None = None
 
     @property
+    def coherence(self) -> str:
+        """Coherence of the table."""
+        return str(self.arguments.get("coherence", "ensemble"))
+
+    @property
     def usable(self) -> bool:
         """Whether users can build this table: no conversion, and a proper tolerance."""
         return self.stored is None and self.arguments.get("tolerance", 1e-3) < _ANY
@@ -51,19 +56,14 @@ _ANY = 0.999
 def settings(quick: bool) -> Iterator[Setting]:
     """Yield the settings to measure, the defaults first."""
     yield Setting("default", "the defaults")
-    tolerances = (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6)
-    for tolerance in tolerances:
+    for tolerance in (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6):
         yield Setting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
     for basis in ("chebyshev", "taylor"):
         for tolerance in (1e-3,) if quick else (1e-2, 1e-3, 1e-4):
             arguments = {"basis": basis, "tolerance": tolerance}
             yield Setting("basis", f"{basis}, {tolerance:.0e}", arguments)
-    if quick:
-        counts: tuple[int, ...] = (4, 8)
-    else:
-        counts = (4, 6, 8, 12)
     for basis in ("svd", "chebyshev"):
-        for terms in counts:
+        for terms in (4, 8) if quick else (4, 6, 8, 12):
             arguments = {"basis": basis, "terms": terms}
             yield Setting(f"terms, {basis}", f"{terms} terms, {basis}", arguments)
     for taps in (2, 3, 4) if quick else (2, 3, 4, 5):
@@ -127,16 +127,12 @@ def measure(
     lanes, rounds : queries per call, and number of timed calls.
     progress : called as progress(done, total, text).
     """
-    modes = {str(setting.arguments.get("coherence", "ensemble")) for setting in chosen}
-    samples = {
-        mode: Sample.draw(field, coherence_width, mode, pairs, progress) for mode in sorted(modes)
-    }
-    finest = {
-        mode: DiffractionTable.build(
+    samples, finest = {}, {}
+    for mode in sorted({setting.coherence for setting in chosen}):
+        samples[mode] = Sample.draw(field, coherence_width, mode, pairs, progress)
+        finest[mode] = DiffractionTable.build(
             field, coherence_width=coherence_width, coherence=mode, tolerance=FINEST
         )
-        for mode in sorted(modes)
-    }
     results, calls = [], {}
     rough = mi.load_dict({"type": "roughconductor", "material": "Al"})
     queries = Queries.random(lanes)
@@ -144,7 +140,6 @@ def measure(
     calls[""] = partial(rough.eval, context, queries.si, queries.wo)
     for n, setting in enumerate(chosen):
         progress(n, len(chosen), setting.name)
-        mode = str(setting.arguments.get("coherence", "ensemble"))
         start = time.perf_counter()
         try:
             table = _table(field, setting, coherence_width)
@@ -159,8 +154,8 @@ def measure(
             table.save(file)
             bsdf = quiet_bsdf(file, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
-        sample = samples[mode]
-        loss = power_colour_difference(finest[mode], table)
+        sample = samples[setting.coherence]
+        loss = power_colour_difference(finest[setting.coherence], table)
         _, _, _, _, terms = table.coefficients.shape
         results.append(
             Measured(

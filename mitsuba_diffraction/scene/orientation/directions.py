@@ -146,8 +146,7 @@ class Surface:
             opposite = corners[:, (n + 2) % 3] - corners[:, (n + 1) % 3]
             rising += at[:, n, None] * np.cross(normal, opposite) / squared
         total = np.zeros_like(self.positions)
-        for n in range(3):
-            np.add.at(total, self.faces[:, n], rising * np.sqrt(squared))
+        np.add.at(total, self.faces, (rising * np.sqrt(squared))[:, None])
         return unit(total)
 
 

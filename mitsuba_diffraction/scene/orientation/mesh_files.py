@@ -57,7 +57,8 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         mesh = interchange_mesh(file)
         _check_faces(file, len(mesh.positions), mesh.faces)
         return mesh
-    _need_variant()
+    if mi.variant() is None:
+        mi.set_variant("scalar_rgb")
     kind = KINDS[file.suffix.lower()]
     _check_faces(file, *_vertices_and_faces(file, kind))
     return mesh_arrays(_load(file, kind, face_normals=False))
@@ -165,11 +166,6 @@ def write_ply(
         file.write("\n".join(header).encode("ascii", "replace"))
         file.write(vertices.tobytes())
         file.write(faces.tobytes())
-
-
-def _need_variant() -> None:
-    if mi.variant() is None:
-        mi.set_variant("scalar_rgb")
 
 
 def triangulated_ply(data: bytes) -> bytes | None:

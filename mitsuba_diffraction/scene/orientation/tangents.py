@@ -21,7 +21,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...plugin.textures import ORIENTATION
-from .trimesh import texture_tangents
+from .trimesh import texture_tangents, unit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,8 +47,8 @@ def _turning(orientation: Floats) -> Bools:
 
     orientation : (m, 3, 2) cosine and sine of the angle from each triangle's tangent.
     """
-    unit = _unit(orientation)
-    cosine = (unit * np.roll(unit, -1, axis=1)).sum(axis=2)
+    turn = unit(orientation)
+    cosine = (turn * np.roll(turn, -1, axis=1)).sum(axis=2)
     return np.asarray(cosine < np.cos(np.radians(BREAK)))
 
 
@@ -253,8 +253,7 @@ def check_tangents(
     mirrored = (np.cross(dp_du, dp_dv) * outward).sum(axis=1) < 0
     flat = ~(ratio > FLAT * np.median(ratio))
     good = ~flat
-    tangent = np.zeros_like(dp_du)
-    tangent[good] = dp_du[good] / np.linalg.norm(dp_du[good], axis=1, keepdims=True)
+    tangent = np.where(good[:, None], unit(dp_du), 0.0)
 
     front = across / (2 * area[:, None])
     front *= np.where((front * outward).sum(axis=1) < 0, -1.0, 1.0)[:, None]
@@ -334,9 +333,5 @@ def _jumps(
 
 def _laid(tangent: Floats, normal: Floats, turn: Floats) -> Floats:
     """Turn unit tangents (n, 3) by (cosine, sine) (n, 2), counter-clockwise around normals."""
-    unit = _unit(turn)
-    return unit[:, :1] * tangent + unit[:, 1:] * np.cross(normal, tangent)
-
-
-def _unit(turn: Floats) -> Floats:
-    return np.asarray(turn / np.maximum(np.linalg.norm(turn, axis=-1, keepdims=True), 1e-12))
+    cosine, sine = np.split(unit(turn), 2, axis=-1)
+    return cosine * tangent + sine * np.cross(normal, tangent)

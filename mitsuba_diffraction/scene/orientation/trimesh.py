@@ -62,10 +62,8 @@ def across(corners: Floats) -> Floats:
 def vertex_normals(positions: Floats, faces: Ints) -> Floats:
     """Unit normals (n, 3): the mean over a vertex's triangles, weighted by their areas."""
     total = np.zeros_like(positions)
-    for n in range(3):
-        np.add.at(total, faces[:, n], across(positions[faces]))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+    np.add.at(total, faces, across(positions[faces])[:, None])
+    return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
 
 
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:

@@ -87,10 +87,7 @@ def quantiles(
     values: NDArray[np.float64], light: NDArray[np.float64], shares: list[float]
 ) -> list[float]:
     """Values below which these shares of the light lie."""
-    order = np.argsort(values)
-    below = np.cumsum(light[order])
-    places = np.searchsorted(below, np.asarray(shares) * below[-1])
-    return [float(values[order][min(int(n), len(order) - 1)]) for n in places]
+    return list(map(float, np.quantile(values, shares, weights=light, method="inverted_cdf")))
 
 
 def lobes_in_a_pixel(turn: float, sigma: float) -> float:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import response
 from ...plugin.memory import upload
-from .recording import Session
+from .recording import Recorded, Session
 
 #: Longest paths that are followed, vertices and camera included.
 MOST_BOUNCES = 12
@@ -51,10 +51,6 @@ class TracedPaths:
     # where the camera does not see the BSDF
     lobe_turn: NDArray[np.float64]
 
-    def of(self, bsdfs: list[int]) -> NDArray[np.void]:
-        """Return the look-ups of some BSDFs."""
-        return self.lookups[np.isin(self.lookups["bsdf"], bsdfs)]
-
 
 def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) -> TracedPaths:
     """Trace paths through a scene that was loaded in a recording session.
@@ -83,12 +79,10 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
     parts = [np.empty(0, LOOKUP)]
     met = np.zeros((len(session.bsdfs), paths), bool)
     for number, vertex in enumerate(vertices):
-        onward = reaching[len(vertices) - 1 - number]
-        for records, returned, light in (
-            (vertex.lit, vertex.lit_value, vertex.direct),
-            (vertex.sampled, vertex.sampled_value, onward),
-        ):
-            for record in records:
+        lights = vertex.direct, reaching[len(vertices) - 1 - number]
+        for answer, light in zip(vertex.answers, lights, strict=False):
+            returned = _lanes(answer.value, paths)
+            for record in answer.records:
                 lane = record.lane
                 met[record.bsdf, lane] = True
                 share = np.divide(
@@ -110,15 +104,19 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
     )
 
 
-@dataclass(frozen=True)
-class _Vertex:
-    """A bounce: light straight from emitters, and the look-ups for it and for the next ray."""
+class _Answer(NamedTuple):
+    """Value and density of a BSDF, and the look-ups that it recorded."""
+
+    value: Any
+    density: Any
+    records: list[Recorded]
+
+
+class _Vertex(NamedTuple):
+    """A bounce: light straight from emitters, and the answers for it and for the next ray."""
 
     direct: NDArray[np.float64]  # (paths, wavelengths), as it reaches the camera
-    lit: list[Any]
-    lit_value: NDArray[np.float64]
-    sampled: list[Any]
-    sampled_value: NDArray[np.float64]
+    answers: tuple[_Answer, ...] = ()
 
 
 class _Followed(NamedTuple):
@@ -128,14 +126,6 @@ class _Followed(NamedTuple):
     vertices: list[_Vertex]
     emitted: list[NDArray[np.float64]]  # light that the ray to each vertex meets at an emitter
     directions: NDArray[np.float64]  # (paths, 2) x and y of ωi at the first vertex
-
-
-class _Answer(NamedTuple):
-    """Value and density of a BSDF, and the look-ups that it recorded."""
-
-    value: Any
-    density: Any
-    records: list[Any]
 
 
 def _follow(scene: Any, sensor: Any, session: Session, paths: int, seed: int) -> _Followed:
@@ -191,12 +181,7 @@ def _follow(scene: Any, sensor: Any, session: Session, paths: int, seed: int) ->
         drawn, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), active)
         delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
         onward = _recorded(session, bsdf, context, asked, drawn.wo, active & ~delta)
-        vertices.append(
-            _Vertex(
-                _lanes(direct, paths), answer.records, _lanes(answer.value, paths),
-                onward.records, _lanes(onward.value, paths),
-            )
-        )  # fmt: skip
+        vertices.append(_Vertex(_lanes(direct, paths), (answer, onward)))
         throughput = throughput * mi.unpolarized_spectrum(weight)
         active &= dr.any(throughput > 0.0)
         density, before = drawn.pdf, si
@@ -204,7 +189,7 @@ def _follow(scene: Any, sensor: Any, session: Session, paths: int, seed: int) ->
         sampler.schedule_state()
         dr.eval(ray, throughput, active, density, delta, before)
     # Emitters that the last ray meets are seen from the vertex before it
-    vertices += [_nothing(paths, wavelengths.shape[1])] * (len(emitted) - len(vertices))
+    vertices += [_Vertex(np.zeros_like(wavelengths))] * (len(emitted) - len(vertices))
     return _Followed(wavelengths, vertices, emitted, directions)
 
 
@@ -222,11 +207,6 @@ def _recorded(session: Session, bsdf: Any, context: Any, si: Any, wo: Any, activ
 def _heuristic(a: Any, b: Any) -> Any:
     """The power heuristic's weight of the density a."""
     return dr.select(a > 0.0, dr.square(a) * dr.rcp(dr.square(a) + dr.square(b)), 0.0)
-
-
-def _nothing(paths: int, count: int) -> _Vertex:
-    zeros = np.zeros((paths, count))
-    return _Vertex(zeros, [], zeros, [], zeros)
 
 
 def _lane(value: Any, count: int) -> NDArray[np.float64]:
@@ -256,8 +236,9 @@ def _response(sensor: Any, wavelengths: NDArray[np.float64]) -> NDArray[np.float
 def _turns(incident: NDArray[np.float64], first: _Vertex, count: int) -> NDArray[np.float64]:
     """Median of how far ωi turns between the two paths of a pixel, per BSDF."""
     owner = np.full(len(incident), -1)
-    for record in (*first.lit, *first.sampled):
-        owner[record.lane] = record.bsdf
+    for answer in first.answers:
+        for record in answer.records:
+            owner[record.lane] = record.bsdf
     same = (owner[0::2] == owner[1::2]) & (owner[0::2] >= 0)
     turned = np.hypot(*(incident[0::2] - incident[1::2]).T)
     return np.array(

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
 from ...optics.second_order_change import applies
@@ -111,7 +113,7 @@ def _names(session: Session) -> str:
 def _recorded(key: str, session: Session, traced: TracedPaths) -> RecordedTable:
     table = session.tables[key]
     bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if described_table(bsdf) is table]
-    rows = traced.of(bsdfs)
+    rows = traced.lookups[np.isin(traced.lookups["bsdf"], bsdfs)]
     lookups = None
     if len(rows):
         total = float(min(traced.total[bsdfs].sum(), 1.0))
