@@ -29,6 +29,7 @@ from .lengths import (
     height_unit_of,
     is_auto,
     micrometres_of,
+    numbers_of,
     pixel_size_of,
 )
 from .validity import seam_defects, tilted
@@ -97,17 +98,12 @@ def _sigmas(value: object) -> float | None:
     """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
-    try:
-        if isinstance(value, bool) or not isinstance(value, (str, numbers.Real)):
-            raise ValueError
-        number = float(value)
-        if not 1 <= number < math.inf:
-            raise ValueError
-    except (ValueError, OverflowError) as error:
+    sigmas = numbers_of(value) if isinstance(value, str | numbers.Real) else None
+    if sigmas is None or len(sigmas) != 1 or sigmas[0] < 1.0:
         raise DiffractionError(
             f"clip: expected how many standard deviations to keep, at least 1, got {value!r}"
-        ) from error
-    return number
+        )
+    return sigmas[0]
 
 
 _CHECKS: dict[str, Callable[[Any], Any]] = {
@@ -164,10 +160,8 @@ def treated_by_default(
 def _by_default(field: HeightField, option: str) -> HeightField:
     """Say in the last line of the history that nobody asked for this treatment."""
     *lines, last = field.history
-    return HeightField(
-        field.heights, field.pixel_size, name=field.name, cut_out=field.cut_out,
-        history=(*lines, f"{last} (by default; {option}=none leaves it out)"),
-    )  # fmt: skip
+    line = f"{last} (by default; {option}=none leaves it out)"
+    return replace(field, history=(*lines, line))
 
 
 def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
@@ -197,12 +191,8 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
         values = raw.values if lengths.scale == 1.0 else raw.values * np.float64(lengths.scale)
     notes = (*raw.notes, *lengths.overrides)
     if options.crop is not None:
-        before = (values.shape[0], values.shape[1])
-        region = preprocess.central_slices(before, lengths.pixel_size, options.crop, shown)
-        values = values[region]
-        if values.shape != before:
-            after = (values.shape[0], values.shape[1])
-            notes = (*notes, preprocess.crop_line(before, after, lengths.pixel_size))
+        values, line = preprocess.central_part(values, lengths.pixel_size, options.crop, shown)
+        notes = (*notes, line) if line else notes
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
     heights, note = preprocess.fill_missing(heights, method, shown)
