@@ -6,10 +6,10 @@ import math
 import numbers
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -72,8 +72,7 @@ class LoadOptions:
 
     def specified(self) -> dict[str, Any]:
         """Return the options that are set, by name."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 def _channel(value: object) -> str | int | None:
@@ -186,12 +185,12 @@ def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
 def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     """Scale to µm, crop and fill the heights of a file; the user's lengths override the file's."""
     shown = repr(str(file))
-    lengths = _lengths(raw, shown, options)
+    scale, pixel_size, lines = _lengths(raw, shown, options)
     with np.errstate(over="ignore", invalid="ignore"):  # HeightField refuses infinite heights
-        values = raw.values if lengths.scale == 1.0 else raw.values * np.float64(lengths.scale)
-    notes = (*raw.notes, *lengths.overrides)
+        values = raw.values if scale == 1.0 else raw.values * np.float64(scale)
+    notes = (*raw.notes, *lines)
     if options.crop is not None:
-        values, line = preprocess.central_part(values, lengths.pixel_size, options.crop, shown)
+        values, line = preprocess.central_part(values, pixel_size, options.crop, shown)
         notes = (*notes, line) if line else notes
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
@@ -199,19 +198,19 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
-    return HeightField(heights, lengths.pixel_size, name=file.name, history=history, cut_out=True)
+    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
 
 
-class _Lengths(NamedTuple):
-    """Lengths of a file's heights once the user's options are applied."""
+def _lengths(
+    raw: RawHeights, shown: str, options: LoadOptions
+) -> tuple[float, tuple[float, float], list[str]]:
+    """Combine lengths of the file with lengths from options; warn of overrides.
 
-    scale: float  # µm per unit of the values
-    pixel_size: tuple[float, float]  # µm
-    overrides: list[str]  # one line for each length that an option states or overrides
-
-
-def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
-    """Combine lengths of the file with lengths from options; warn of overrides."""
+    Returns
+    -------
+    µm per unit of the values, the pixel size (µm), and one line for each length that an option
+    states or overrides.
+    """
     pixel_size = options.pixel_size or raw.pixel_size
     scale, lines = _height_scale(raw, shown, options, pixel_size is None)
     if pixel_size is None:
@@ -226,7 +225,7 @@ def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
         warn(f"{shown}: {line}")
     if options.height_unit is not None and not raw.stated:
         lines.append(f"heights in {options.height_unit}, as height_unit states")
-    return _Lengths(scale, pixel_size, lines)
+    return scale, pixel_size, lines
 
 
 def _height_scale(

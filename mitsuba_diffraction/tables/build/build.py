@@ -35,8 +35,7 @@ from .checks import (
 from .choose import (
     MAX_INTERVALS,
     PACKET,
-    chebyshev_expansion,
-    svd_expansion,
+    series_expansion,
     taylor_expansion,
     too_many_intervals,
 )
@@ -303,10 +302,8 @@ def _first(wanted: _Wanted) -> _Setting:
     if settings.basis == "taylor":
         expansion = taylor_expansion(*asked)
         check_taylor(wanted.deepest, expansion, tolerance)
-    elif settings.basis == "chebyshev":
-        expansion = chebyshev_expansion(*asked)
     else:
-        expansion, functions = svd_expansion(*asked)
+        expansion, functions = series_expansion(*asked, settings.basis)
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     return _Setting(expansion, functions, half, taps, trims)
 

@@ -27,7 +27,7 @@ from scipy import sparse
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion
-from ..powers import order_0_power, power_expansion, powers_of
+from ..powers import order_0_power, power_expansion, power_series
 from ..table import DiffractionTable
 from ..window import taps_at
 
@@ -247,19 +247,14 @@ class _Source:
     """
 
     def __init__(self, table: DiffractionTable) -> None:
-        self._table = table
-        self.expansion = table.expansion
-        coefficients = table.coefficients
-        if table.expansion.kind == "amplitude":
-            self.expansion = power_expansion(table)
-        if table.expansion.kind == "amplitude" and not table.grid.coherent:
-            powers = powers_of(coefficients.astype(np.float32), table.expansion, self.expansion)
-            self._scale = table.scale**2
-            self._bins = _flat(powers[:, :, :, None])
-        else:
-            self._scale = table.scale
-            self._bins = _flat(coefficients)
-        self._shape = coefficients.shape[1:3]
+        self._table, bins = table, table.coefficients
+        self._shape = bins.shape[1:3]
+        self._scale, self.expansion = table.scale, power_expansion(table)
+        if not table.grid.coherent:
+            powers, _, self._scale, self.expansion = power_series(table)
+            bins = powers[:, :, :, None]
+        flat = np.ascontiguousarray(np.moveaxis(bins, 0, 2), np.float32)
+        self._bins = flat.reshape(self._shape[0] * self._shape[1], -1)
         taps_x, taps_y = table.grid.taps
         self._smooth = taps_x * taps_y > _MOST_TAPS
         if self._smooth:
@@ -332,15 +327,6 @@ class _Source:
                 values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
             result[:, interval] = values @ new.fit(interval).astype(np.float32)
         return result.reshape(len(amplitudes), -1) * np.float32(self._scale)
-
-
-def _flat(coefficients: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(intervals, ny, nx, components, terms) to (ny·nx, intervals·components·terms)."""
-    intervals, ny, nx, components, terms = coefficients.shape
-    flat = np.empty((ny, nx, intervals, components, terms), np.float32)
-    for interval in range(intervals):
-        flat[:, :, interval] = coefficients[interval]
-    return flat.reshape(ny * nx, -1)
 
 
 def _smoothed(
