@@ -72,8 +72,14 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     """
     headers = _read(path, header_only=True)
     text = headers[0].get(TABLE_ATTRIBUTE)
-    document = _parsed(text, path)
-    if document is None:
+    try:
+        document = json.loads(text) if isinstance(text, str) else None
+    except (ValueError, RecursionError) as error:
+        raise DiffractionError(
+            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
+            "again with DiffractionTable.build"
+        ) from error
+    if not isinstance(document, dict):
         raise DiffractionError(
             f"'{path}' is an EXR image but no table; make one of it with "
             "DiffractionTable.build, or give it as heightfield"
@@ -103,27 +109,6 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
             "DiffractionTable.build"
         ) from error
-
-
-def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    """Return the JSON attribute of a table's file; None for an EXR image without one.
-
-    Raises a DiffractionError if the file is missing, a folder, or cannot be read as EXR.
-    """
-    return _parsed(_read(path, header_only=True)[0].get(TABLE_ATTRIBUTE), path)
-
-
-def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    if not isinstance(text, str):
-        return None
-    try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise DiffractionError(
-            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
-            "again with DiffractionTable.build"
-        ) from error
-    return document if isinstance(document, dict) else None
 
 
 def _check_headers(headers: list[dict[str, Any]], table: DiffractionTable, size: int) -> None:

@@ -19,10 +19,10 @@ from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
-from mitsuba_diffraction.tables.exr import read_document
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
 from tests.support.looked_up import look_up_in_plugin, use_table
+from tests.support.table_files import document_in
 
 _MOST = 500  # characters of a message
 _MOST_NUMBERS = 10**6  # of a table
@@ -149,7 +149,7 @@ def documents() -> dict[str, str]:
             if name.endswith(".exr"):
                 path = Path(folder, name)
                 path.write_bytes(content)
-                document = read_document(path) or {}
+                document = document_in(path)
                 document.pop("version")
                 found[name] = json.dumps(document)
         return found
