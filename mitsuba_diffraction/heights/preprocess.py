@@ -115,19 +115,13 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")
-    filled = _nearest(heights, missing)
+    nearest = scipy.ndimage.distance_transform_edt(
+        missing, return_distances=False, return_indices=True
+    )
+    filled = heights[tuple(nearest)]
     if method == "harmonic":
         filled = _harmonic(filled, missing)
     return filled, f"{share} had no height and were filled, method {method}"
-
-
-def _nearest(heights: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
-    """Fill with the height of the nearest measured point (exact Euclidean distance transform)."""
-    rows, columns = scipy.ndimage.distance_transform_edt(
-        missing, return_distances=False, return_indices=True
-    )
-    filled: FloatArray = heights[rows, columns]
-    return filled
 
 
 def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
