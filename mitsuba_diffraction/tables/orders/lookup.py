@@ -17,10 +17,11 @@ from .table import GROOVES, S_AND_P, Band, OrderTable
 
 #: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
 _IN_PLANE = 1e-7
-_OfKind = Callable[[Band, int], NDArray[Any]]
-_Finish = Callable[..., Array]
 #: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
 MIN_ANGLE = 1e-4
+
+_OfKind = Callable[[Band, int], NDArray[Any]]
+_Finish = Callable[..., Array]
 
 
 class _Light(NamedTuple):
@@ -149,9 +150,11 @@ def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
 
 
 def _split(light: _Light, components: str) -> tuple[Array, Array, Array]:
-    """Return mean and half difference of an order's two efficiencies, about the axes asked for.
+    """Return mean and half difference of an order's efficiencies for two components of the light.
 
     The difference lacks what phases would add, in proportion to the sine of 2ψ, the last result.
+
+    components : `GROOVES` or `S_AND_P`.
     """
     table = light.table
     if table.block:
@@ -219,18 +222,18 @@ def _values(light: _Light, of_kind: _OfKind, finish: _Finish) -> Array:
         propagates &= x * x + y * y < 1.0
     second = from_below != bool(table.block)  # whether the light's ports are the second half
     result = np.zeros((len(x), of_kind(table.bands[0], cells.A).shape[-1]))
-    for band, kind in ((band, kind) for band in table.bands for kind in (cells.A, cells.B)):
-        here = np.flatnonzero(propagates & (cell.band == band.k) & (cell.kind == kind))
-        if len(here):
-            channels = band.k + 1 - kind
-            came = cell.channel[here] + channels * second
-            weights_of = blocks.linear if table.block else cells.interpolation
-            nodes, places = of_kind(band, kind), (cell.tau[here], cell.rho[here], w[here])
-            weights = [weights_of(*pair) for pair in zip(nodes.shape, places, strict=False)]
-            rows = _between(nodes, weights, came)
-            rows = finish(rows, x[here], y[here], lam[here], cell.channel[here], came)
-            left = q[here] + channels * (second != transmitted)
-            result[here] = rows[np.arange(len(here)), left]
+    weights_of = blocks.linear if table.block else cells.interpolation
+    kinds = zip(cell.band[propagates].tolist(), cell.kind[propagates].tolist(), strict=True)
+    for k, kind in sorted({*kinds}):
+        here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
+        channels = k + 1 - kind
+        came = cell.channel[here] + channels * second
+        nodes, places = of_kind(table.bands[k], kind), (cell.tau[here], cell.rho[here], w[here])
+        weights = [weights_of(*pair) for pair in zip(nodes.shape, places, strict=False)]
+        rows = _between(nodes, weights, came)
+        rows = finish(rows, x[here], y[here], lam[here], cell.channel[here], came)
+        left = q[here] + channels * (second != transmitted)
+        result[here] = rows[np.arange(len(here)), left]
     return result.reshape(*shape, result.shape[-1])
 
 
