@@ -10,7 +10,7 @@ import base64
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -195,10 +195,10 @@ def _grid(fields: Mapping[str, Any]) -> Grid:
     _names(fields, required, required)
     _require(isinstance(fields["coherent"], bool), "coherent")
     grid = Grid(
-        last=_whole_pair(fields["last"], "last", 1, 1 << 20),
+        last=_pair(fields["last"], "last", 1, 1 << 20, _whole),
         steps=_pair(fields["steps"], "steps", 1e-9, 1e9),
         radius=_pair(fields["radius"], "radius", 1e-9, 1e9),
-        taps=_whole_pair(fields["taps"], "taps", 1, MAX_TAPS),
+        taps=_pair(fields["taps"], "taps", 1, MAX_TAPS, _whole),
         coherent=fields["coherent"],
         trims=tuple(_whole(n, "trims", 0, MAX_TAPS) for n in _list(fields["trims"], "trims")),
     )
@@ -311,13 +311,10 @@ def _two(value: Any, name: str) -> list[Any]:
     return pair
 
 
-def _pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
-    x, y = (_number(number, name, low, high) for number in _two(value, name))
-    return x, y
-
-
-def _whole_pair(value: Any, name: str, low: int, high: int) -> tuple[int, int]:
-    x, y = (_whole(number, name, low, high) for number in _two(value, name))
+def _pair(
+    value: Any, name: str, low: float, high: float, number: Callable[..., Any] = _number
+) -> tuple[Any, Any]:
+    x, y = (number(part, name, low, high) for part in _two(value, name))
     return x, y
 
 
