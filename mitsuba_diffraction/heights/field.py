@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -81,12 +81,14 @@ class HeightField:
         checked, offset = _checked_heights(heights, name)
         if offset:
             history = (*history, f"a constant offset of {offset:.6g} µm was subtracted")
-        object.__setattr__(self, "heights", checked)
-        object.__setattr__(self, "pixel_size", size)
-        object.__setattr__(self, "name", " ".join(str(name).split()))
-        object.__setattr__(self, "history", tuple(history))
-        object.__setattr__(self, "cut_out", bool(cut_out))
-        object.__setattr__(self, "periodic", bool(periodic))
+        vars(self).update(
+            heights=checked,
+            pixel_size=size,
+            name=" ".join(str(name).split()),
+            history=tuple(history),
+            cut_out=bool(cut_out),
+            periodic=bool(periodic),
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -109,10 +111,8 @@ class HeightField:
     @cached_property
     def rms_height(self) -> float:
         """Root-mean-square deviation from the mean height, µm."""
-        if self.heights.size <= LARGE:
-            return float(self.heights.std())
         mean = float(self.heights.mean())
-        total = sum(float(np.square(rows - mean).sum()) for rows in self._blocks())
+        total = sum(float(np.square(rows - mean).sum()) for rows in blocks(self.heights))
         return math.sqrt(total / self.heights.size)
 
     @cached_property
@@ -121,31 +121,19 @@ class HeightField:
 
         Steps at the seams between tiles are left out: they are not part of the surface.
         """
-        dx, dy = self.pixel_size
-        if self.heights.size > LARGE:
-            (ny, nx), along_x, along_y = self.shape, 0.0, 0.0
-            for rows in self._blocks(1):
-                along_x += float(np.square(np.diff(rows[:ROWS], axis=1)).sum())
-                along_y += float(np.square(np.diff(rows, axis=0)).sum())
-            along_x, along_y = along_x / (ny * (nx - 1)), along_y / ((ny - 1) * nx)
-            return math.sqrt(along_x / dx**2 + along_y / dy**2)
-        return math.sqrt(
-            _mean_square(np.diff(self.heights, axis=1)) / dx**2
-            + _mean_square(np.diff(self.heights, axis=0)) / dy**2
+        squares = (
+            sum(_squares(np.diff(rows, axis=axis)) for rows in blocks(self.heights, 1 - axis))
+            for axis in (1, 0)
         )
-
-    def _blocks(self, overlap: int = 0) -> Iterator[FloatArray]:
-        """Yield blocks of `ROWS` rows, each with `overlap` rows of the next block."""
-        for start in range(0, self.shape[0], ROWS):
-            yield self.heights[start : start + ROWS + overlap]
+        (ny, nx), (dx, dy), (along_x, along_y) = self.shape, self.pixel_size, squares
+        return math.sqrt(along_x / (ny * (nx - 1)) / dx**2 + along_y / ((ny - 1) * nx) / dy**2)
 
     def varies_along(self, axis: int) -> bool:
         """Return whether any height changes along y (axis 0) or x (axis 1)."""
-        first = self.heights[0] if axis == 0 else self.heights[:, :1]
-        blocks = range(0, self.shape[0], ROWS)
+        first = self.heights[0]
         return any(
-            bool(np.any(rows != (first if axis == 0 else first[start : start + ROWS])))
-            for start, rows in zip(blocks, self._blocks(), strict=True)
+            bool(np.any(rows != (first if axis == 0 else rows[:, :1])))
+            for rows in blocks(self.heights)
         )
 
     def changed(self, heights: npt.ArrayLike, line: str, **flags: bool) -> HeightField:
@@ -153,26 +141,16 @@ class HeightField:
 
         flags : `cut_out` and `periodic`, if they change.
         """
-        return HeightField(
-            heights,
-            self.pixel_size,
-            name=self.name,
-            history=(*self.history, line),
-            **{"cut_out": self.cut_out, "periodic": self.periodic, **flags},
-        )
+        changes: dict[str, Any] = {"heights": heights, "history": (*self.history, line), **flags}
+        return replace(self, **changes)
 
     def stretched(self, factor: float) -> HeightField:
         """Return the patch with its lengths in the plane, but not its heights, times a factor."""
         if factor == 1.0:
             return self
-        return HeightField(
-            self.heights,
-            (self.pixel_size[0] * factor, self.pixel_size[1] * factor),
-            name=self.name,
-            history=(*self.history, f"stretched in its plane by {factor:g}"),
-            cut_out=self.cut_out,
-            periodic=self.periodic,
-        )
+        line = f"stretched in its plane by {factor:g}"
+        size = (self.pixel_size[0] * factor, self.pixel_size[1] * factor)
+        return replace(self, pixel_size=size, history=(*self.history, line))
 
     @cached_property
     def _digest(self) -> str:
@@ -274,6 +252,13 @@ def _describe_missing(array: FloatArray) -> str:
     )
 
 
-def _mean_square(values: FloatArray) -> float:
+def blocks(heights: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
+    """Yield `ROWS` rows of large heights at a time, and `overlap` of the next ones; else all."""
+    rows = len(heights) if heights.size <= LARGE else ROWS
+    for start in range(0, len(heights), rows):
+        yield heights[start : start + rows + overlap]
+
+
+def _squares(values: FloatArray) -> float:
     flat = values.ravel()
-    return float(np.dot(flat, flat)) / flat.size
+    return float(np.dot(flat, flat))

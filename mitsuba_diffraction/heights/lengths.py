@@ -102,33 +102,18 @@ def is_auto(value: object) -> bool:
 
 def numbers_of(value: object) -> tuple[float, ...] | None:
     """Return the floats in a number, numeric string or short sequence, or `None` for others."""
-    parts: list[object]
     if isinstance(value, str):
-        parts = [part for part in re.split(r"[,\s]+", value.strip()) if part]
-    elif isinstance(value, (bool, np.bool_)):
-        return None
-    elif isinstance(value, numbers.Real):
-        parts = [value]
-    elif isinstance(value, np.ndarray):
-        parts = list(value.ravel()[:3])
-    elif isinstance(value, (tuple, list)):
-        parts = list(value[:3])
+        parts: list[Any] = [part for part in re.split(r"[,\s]+", value.strip()) if part]
     else:
+        listed = value.ravel() if isinstance(value, np.ndarray) else value
+        parts = list(listed[:3] if isinstance(listed, tuple | list | np.ndarray) else [listed])
+        if any(isinstance(n, bool | np.bool_) or not isinstance(n, numbers.Real) for n in parts):
+            return None
+    try:
+        result = tuple(float(part) for part in parts)
+    except (ValueError, OverflowError):
         return None
-    result = []
-    for part in parts:
-        if isinstance(part, (bool, np.bool_)) or not isinstance(part, (str, numbers.Real)):
-            return None
-        if isinstance(part, str) and isinstance(value, (tuple, list)):
-            return None
-        try:
-            number = float(part)
-        except (ValueError, OverflowError):
-            return None
-        if not math.isfinite(number):
-            return None
-        result.append(number)
-    return tuple(result)
+    return result if all(map(math.isfinite, result)) else None
 
 
 Lengths = float | Sequence[float]
@@ -162,11 +147,8 @@ def count_between(value: int, where: str, least: int, most: int) -> int:
 
 def length_pair(value: Lengths, where: str, least: float, most: float) -> tuple[float, float]:
     """Return lengths (along x, along y) in µm from one length for both or a pair."""
-    first, second = _pair(value, where)
-    return (
-        number_between(first, where, least, most, " µm"),
-        number_between(second, where, least, most, " µm"),
-    )
+    first, second = (number_between(n, where, least, most, " µm") for n in _pair(value, where))
+    return first, second
 
 
 def count_pair(value: Counts, where: str, least: int, most: int) -> tuple[int, int]:

@@ -14,7 +14,7 @@ Proceedings of the IEEE 66, 51-83 (1978): the Tukey (cosine-tapered) window.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from ..errors import DiffractionError
-from .field import LARGE, ROWS, FloatArray, HeightField
+from .field import FloatArray, HeightField, blocks
 from .seams import seam_share, seam_step
 
 Size = tuple[float, float]
@@ -40,54 +40,44 @@ _MAD_TO_SIGMA = 1.4826
 TAPER_SHARE = 0.1
 
 
-def central_slices(
-    shape: tuple[int, int], pixel_size: Size, size: Size, name: str
-) -> tuple[slice, slice]:
-    """Return the slices of rows and columns of the central region of a patch.
+def central_part(
+    values: npt.NDArray[Any], pixel_size: Size, size: Size, name: str
+) -> tuple[npt.NDArray[Any], str]:
+    """Return the central region of values (ny, nx), and the history line, "" if that is all.
 
     Raises a DiffractionError if the region is larger than the patch, or less than two pixels wide
     or high.
 
     Parameters
     ----------
-    shape : (ny, nx) of the patch.
     pixel_size : (dx, dy), µm.
     size : (width, height) of the region, µm, met to half a pixel.
     name : name of the patch in errors.
     """
-    slices = []
-    for count, pixel, length in zip(shape, pixel_size[::-1], size[::-1], strict=True):
-        kept = round(length / pixel)
-        if not 2 <= kept <= count:
-            (ny, nx), (dx, dy) = shape, pixel_size
+    (ny, nx), (dx, dy) = values.shape, pixel_size
+    whole = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
+    kept = round(size[0] / dx), round(size[1] / dy)
+    for count, most in zip(kept[::-1], (ny, nx), strict=True):
+        if not 2 <= count <= most:
             raise DiffractionError(
                 f"{name}: crop to {size[0]:g} x {size[1]:g} µm is "
-                f"{'larger than the patch' if kept > count else 'less than two pixels'}: the patch "
-                f"is {nx * dx:.4g} x {ny * dy:.4g} µm with pixels of {dx:.4g} x {dy:.4g} µm"
+                f"{'larger than the patch' if count > most else 'less than two pixels'}: the patch "
+                f"is {whole} with pixels of {dx:.4g} x {dy:.4g} µm"
             )
-        start = (count - kept) // 2
-        slices.append(slice(start, start + kept))
-    return slices[0], slices[1]
-
-
-def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size) -> str:
-    """Return the history line of a crop from shape `before` to shape `after`, both (ny, nx)."""
-    (dx, dy), (ny, nx) = pixel_size, after
-    return (
-        f"cropped to the middle {nx * dx:.4g} x {ny * dy:.4g} µm of "
-        f"{before[1] * dx:.4g} x {before[0] * dy:.4g} µm ({nx} x {ny} of "
-        f"{before[1]} x {before[0]} pixels)"
+    if kept == (nx, ny):
+        return values, ""
+    left, top = (nx - kept[0]) // 2, (ny - kept[1]) // 2
+    line = (
+        f"cropped to the middle {kept[0] * dx:.4g} x {kept[1] * dy:.4g} µm of {whole} "
+        f"({kept[0]} x {kept[1]} of {nx} x {ny} pixels)"
     )
+    return values[top : top + kept[1], left : left + kept[0]], line
 
 
 def crop(field: HeightField, size: Size) -> HeightField:
     """Crop to the central region of `size` = (width, height), µm, and mark the patch `cut_out`."""
-    rows, columns = central_slices(field.shape, field.pixel_size, size, field.name)
-    heights = field.heights[rows, columns]
-    if heights.shape == field.shape:
-        return field
-    line = crop_line(field.shape, (heights.shape[0], heights.shape[1]), field.pixel_size)
-    return field.changed(heights, line, cut_out=True, periodic=False)
+    heights, line = central_part(field.heights, field.pixel_size, size, field.name)
+    return field.changed(heights, line, cut_out=True, periodic=False) if line else field
 
 
 def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
@@ -125,19 +115,13 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")
-    filled = _nearest(heights, missing)
+    nearest = scipy.ndimage.distance_transform_edt(
+        missing, return_distances=False, return_indices=True
+    )
+    filled = heights[tuple(nearest)]
     if method == "harmonic":
         filled = _harmonic(filled, missing)
     return filled, f"{share} had no height and were filled, method {method}"
-
-
-def _nearest(heights: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
-    """Fill with the height of the nearest measured point (exact Euclidean distance transform)."""
-    rows, columns = scipy.ndimage.distance_transform_edt(
-        missing, return_distances=False, return_indices=True
-    )
-    filled: FloatArray = heights[rows, columns]
-    return filled
 
 
 def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
@@ -196,9 +180,9 @@ def plane_rise(field: HeightField) -> float:
 
 def level_plane(field: HeightField) -> HeightField:
     """Subtract the least-squares plane; the mean height stays."""
-    level = _without_plane(field)
-    line = f"plane removed: it rose {level.rise_x:.3g} µm along x and {level.rise_y:.3g} µm along y"
-    return field.changed(level.heights, line + rms_change(field, level.heights))
+    heights, rise = _without_plane(field)
+    line = f"plane removed: it rose {rise}{rms_change(field, heights)}"
+    return field.changed(heights, line)
 
 
 def level_lines(field: HeightField) -> HeightField:
@@ -207,16 +191,13 @@ def level_lines(field: HeightField) -> HeightField:
     Ridges parallel to x are lost with the rows' offsets.
     """
     medians = np.median(field.heights, axis=1)
-    aligned = HeightField(
-        field.heights - (medians - medians.mean())[:, None], field.pixel_size, name=field.name
-    )
-    level = _without_plane(aligned)
+    offsets = (medians - medians.mean())[:, None]
+    heights, rise = _without_plane(HeightField(field.heights - offsets, field.pixel_size))
     line = (
         f"scan lines aligned by their medians, which scattered by {medians.std():.3g} µm RMS, and "
-        f"the plane removed, which rose {level.rise_x:.3g} µm along x and {level.rise_y:.3g} µm "
-        "along y"
+        f"the plane removed, which rose {rise}{rms_change(field, heights)}"
     )
-    return field.changed(level.heights, line + rms_change(field, level.heights))
+    return field.changed(heights, line)
 
 
 def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
@@ -254,32 +235,20 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
 
 def rms_change(field: HeightField, heights: FloatArray) -> str:
     """Return the end of a history line: RMS change of height, a constant offset left out."""
-    if heights.size <= LARGE:
-        change = float((heights - field.heights).std())
-    else:  # by blocks of rows, so that no copy is as large as the field
-        starts = range(0, len(heights), ROWS)
-        rows = [slice(start, start + ROWS) for start in starts]
-        mean = float(heights.mean()) - float(field.heights.mean())
-        squares = sum(float(np.square(heights[r] - field.heights[r] - mean).sum()) for r in rows)
-        change = math.sqrt(squares / heights.size)
-    return f"; RMS change {change:.3g} µm"
+    mean = float(heights.mean()) - float(field.heights.mean())
+    pairs = zip(blocks(heights), blocks(field.heights), strict=True)
+    squares = sum(float(np.square(new - old - mean).sum()) for new, old in pairs)
+    return f"; RMS change {math.sqrt(squares / heights.size):.3g} µm"
 
 
-class _Levelled(NamedTuple):
-    """Heights without their least-squares plane, and the plane's rise across the patch, µm."""
-
-    heights: FloatArray
-    rise_x: float
-    rise_y: float
-
-
-def _without_plane(field: HeightField) -> _Levelled:
-    """Subtract the least-squares plane."""
+def _without_plane(field: HeightField) -> tuple[FloatArray, str]:
+    """Return heights without their least-squares plane, and its rise across the patch in words."""
     (x, y), (slope_x, slope_y) = _centred(field), plane_of(field)
     heights = field.heights - slope_x * x
     heights -= (slope_y * y)[:, None]
     heights.setflags(write=False)  # so that a HeightField need not copy it
-    return _Levelled(heights, slope_x * field.extent[0], slope_y * field.extent[1])
+    rise_x, rise_y = slope_x * field.extent[0], slope_y * field.extent[1]
+    return heights, f"{rise_x:.3g} µm along x and {rise_y:.3g} µm along y"
 
 
 def _centred(field: HeightField) -> tuple[FloatArray, ...]:

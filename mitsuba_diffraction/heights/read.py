@@ -6,10 +6,10 @@ import math
 import numbers
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from .lengths import (
     height_unit_of,
     is_auto,
     micrometres_of,
+    numbers_of,
     pixel_size_of,
 )
 from .validity import seam_defects, tilted
@@ -71,8 +72,7 @@ class LoadOptions:
 
     def specified(self) -> dict[str, Any]:
         """Return the options that are set, by name."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 def _channel(value: object) -> str | int | None:
@@ -97,17 +97,12 @@ def _sigmas(value: object) -> float | None:
     """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
-    try:
-        if isinstance(value, bool) or not isinstance(value, (str, numbers.Real)):
-            raise ValueError
-        number = float(value)
-        if not 1 <= number < math.inf:
-            raise ValueError
-    except (ValueError, OverflowError) as error:
+    sigmas = numbers_of(value) if isinstance(value, str | numbers.Real) else None
+    if sigmas is None or len(sigmas) != 1 or sigmas[0] < 1.0:
         raise DiffractionError(
             f"clip: expected how many standard deviations to keep, at least 1, got {value!r}"
-        ) from error
-    return number
+        )
+    return sigmas[0]
 
 
 _CHECKS: dict[str, Callable[[Any], Any]] = {
@@ -164,10 +159,8 @@ def treated_by_default(
 def _by_default(field: HeightField, option: str) -> HeightField:
     """Say in the last line of the history that nobody asked for this treatment."""
     *lines, last = field.history
-    return HeightField(
-        field.heights, field.pixel_size, name=field.name, cut_out=field.cut_out,
-        history=(*lines, f"{last} (by default; {option}=none leaves it out)"),
-    )  # fmt: skip
+    line = f"{last} (by default; {option}=none leaves it out)"
+    return replace(field, history=(*lines, line))
 
 
 def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
@@ -192,36 +185,32 @@ def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
 def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     """Scale to µm, crop and fill the heights of a file; the user's lengths override the file's."""
     shown = repr(str(file))
-    lengths = _lengths(raw, shown, options)
+    scale, pixel_size, lines = _lengths(raw, shown, options)
     with np.errstate(over="ignore", invalid="ignore"):  # HeightField refuses infinite heights
-        values = raw.values if lengths.scale == 1.0 else raw.values * np.float64(lengths.scale)
-    notes = (*raw.notes, *lengths.overrides)
+        values = raw.values if scale == 1.0 else raw.values * np.float64(scale)
+    notes = (*raw.notes, *lines)
     if options.crop is not None:
-        before = (values.shape[0], values.shape[1])
-        region = preprocess.central_slices(before, lengths.pixel_size, options.crop, shown)
-        values = values[region]
-        if values.shape != before:
-            after = (values.shape[0], values.shape[1])
-            notes = (*notes, preprocess.crop_line(before, after, lengths.pixel_size))
+        values, line = preprocess.central_part(values, pixel_size, options.crop, shown)
+        notes = (*notes, line) if line else notes
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
     heights, note = preprocess.fill_missing(heights, method, shown)
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
-    return HeightField(heights, lengths.pixel_size, name=file.name, history=history, cut_out=True)
+    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
 
 
-class _Lengths(NamedTuple):
-    """Lengths of a file's heights once the user's options are applied."""
+def _lengths(
+    raw: RawHeights, shown: str, options: LoadOptions
+) -> tuple[float, tuple[float, float], list[str]]:
+    """Combine lengths of the file with lengths from options; warn of overrides.
 
-    scale: float  # µm per unit of the values
-    pixel_size: tuple[float, float]  # µm
-    overrides: list[str]  # one line for each length that an option states or overrides
-
-
-def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
-    """Combine lengths of the file with lengths from options; warn of overrides."""
+    Returns
+    -------
+    µm per unit of the values, the pixel size (µm), and one line for each length that an option
+    states or overrides.
+    """
     pixel_size = options.pixel_size or raw.pixel_size
     scale, lines = _height_scale(raw, shown, options, pixel_size is None)
     if pixel_size is None:
@@ -236,7 +225,7 @@ def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
         warn(f"{shown}: {line}")
     if options.height_unit is not None and not raw.stated:
         lines.append(f"heights in {options.height_unit}, as height_unit states")
-    return _Lengths(scale, pixel_size, lines)
+    return scale, pixel_size, lines
 
 
 def _height_scale(

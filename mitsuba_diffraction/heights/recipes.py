@@ -78,21 +78,10 @@ class Recipe:
                 f"{', '.join(gratings.__all__)}"
             )
         options, table = options_and_settings(content, shown)
-        sources: tuple[Path, ...] = ()
-        arguments: tuple[Mapping[str, Any], ...] = ()
-        if "source" in content:
-            sources = _sources(content, file, shown)
-        else:
-            arguments = _arguments(content, shown)
-        return cls(
-            path=file,
-            sources=sources,
-            generator=content.get("generator"),
-            arguments=arguments,
-            options=options,
-            table=table,
-            output=_output(content, file, shown),
-        )
+        sources = _sources(content, file, shown) if "source" in content else ()
+        arguments = () if sources else _arguments(content, shown)
+        output = _output(content, file, shown)
+        return cls(file, sources, content.get("generator"), arguments, options, table, output)
 
     @classmethod
     def of_file(cls, path: Path, options: LoadOptions) -> Recipe:

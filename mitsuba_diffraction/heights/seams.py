@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .field import LARGE, ROWS, FloatArray, HeightField
+from .field import FloatArray, HeightField, blocks
 
 #: A seam counts as a defect where its RMS step is this many times the largest RMS step between
 #: neighbouring lines inside: a surface's own edges, as gratings have, occur inside, too.
@@ -32,9 +32,13 @@ class Seam:
 
 def seam_step(field: HeightField) -> float:
     """Return the RMS step of height across both seams, µm."""
+    return float(np.sqrt(np.mean(np.concatenate(edge_steps(field)) ** 2)))
+
+
+def edge_steps(field: HeightField) -> tuple[FloatArray, FloatArray]:
+    """Return last minus first column (ny,) and last minus first row (nx,), µm."""
     h = field.heights
-    steps = np.concatenate([h[0] - h[-1], h[:, 0] - h[:, -1]])
-    return float(np.sqrt(np.mean(steps**2)))
+    return h[:, -1] - h[:, 0], h[-1] - h[0]
 
 
 def seam_share(field: HeightField) -> float:
@@ -55,12 +59,8 @@ def seams_of(field: HeightField) -> tuple[Seam, Seam]:
 
 def _seam(h: FloatArray, pixel: float) -> Seam:
     """Return the seam between the last and the first row of `h`, rows `pixel` µm apart."""
-    rows = len(h) if h.size <= LARGE else ROWS
     within = np.concatenate(
-        [
-            np.mean(np.diff(h[start : start + rows + 1], axis=0) ** 2, axis=1)
-            for start in range(0, len(h) - 1, rows)
-        ]
+        [np.mean(np.diff(rows, axis=0) ** 2, axis=1) for rows in blocks(h, 1) if len(rows) > 1]
     )
     across = float(np.mean((h[-1] - h[0]) ** 2))
     lines = h.shape[1] / pixel**2

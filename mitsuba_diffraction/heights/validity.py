@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .field import FloatArray, HeightField
+from .field import HeightField
 from .preprocess import level_plane, plane_of, plane_rise, trend_of
-from .seams import Seam, seams_of
+from .seams import Seam, edge_steps, seams_of
 from .spectra import seen_slope
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
@@ -147,7 +147,7 @@ def seam_defects(field: HeightField) -> tuple[float, Seam | None]:
     if _is_facet(field):
         return 0.0, None
     seams = seams_of(field)
-    pairs = zip(seams, trend_of(field).steps(), _edge_steps(field), strict=True)
+    pairs = zip(seams, trend_of(field).steps(), edge_steps(field), strict=True)
     defects = [
         seam
         for seam, trend, step in pairs
@@ -158,12 +158,6 @@ def seam_defects(field: HeightField) -> tuple[float, Seam | None]:
     if not slope > SEAM_SHARE * (slope + inside):
         return 0.0, None
     return slope / (slope + inside), max(defects, key=lambda seam: seam.slope)
-
-
-def _edge_steps(field: HeightField) -> tuple[FloatArray, FloatArray]:
-    """Return last minus first column (ny,) and last minus first row (nx,), µm."""
-    h = field.heights
-    return h[:, -1] - h[:, 0], h[-1] - h[0]
 
 
 def _is_facet(field: HeightField) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..tables.height_scales import HeightScales
+from ..tables.energy.conservation import Energy
 
 #: Smallest factor over the largest that is tabulated: smaller ones have the values of this one.
 LEAST_SHARE = 0.25
@@ -43,7 +43,7 @@ class ScaleRange(NamedTuple):
         low, high = self._rounded
         return math.sqrt(low * high)
 
-    def nodes(self, scales: HeightScales) -> list[float]:
+    def nodes(self, scales: Energy) -> list[float]:
         """Return the height scales at which a function of them is tabulated."""
         if not self.varies:
             return list(scales.nodes(self.height_scale, interval=self.differentiable))

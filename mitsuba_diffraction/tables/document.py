@@ -10,7 +10,7 @@ import base64
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -83,33 +83,25 @@ def _present(record: Expansion | Grid) -> dict[str, Any]:
     return {name: value for name, value in fields.items() if value is not None}
 
 
-@dataclasses.dataclass(frozen=True)
-class TableDescription:
-    """Table without its coefficients.
+def shape_of(table: DiffractionTable) -> tuple[int, ...]:
+    """Return the shape of a table's coefficients, which it may lack."""
+    expansion = table.expansion
+    return expansion.intervals, *table.grid.shape, _COMPONENTS[expansion.kind], expansion.terms
 
-    fields : arguments of `DiffractionTable`.
+
+def with_coefficients(table: DiffractionTable, coefficients: NDArray[Any]) -> DiffractionTable:
+    """Return a table read by `parse_document` with its coefficients.
+
+    Raises a ValueError if they are not finite, or larger than any surface's.
     """
-
-    fields: Mapping[str, Any]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the coefficients."""
-        expansion, grid = self.fields["expansion"], self.fields["grid"]
-        components = _COMPONENTS[expansion.kind]
-        return expansion.intervals, *grid.shape, components, expansion.terms
-
-    def table(self, coefficients: NDArray[Any]) -> DiffractionTable:
-        """Return the table with its coefficients.
-
-        Raises a ValueError if they are not finite, or larger than any surface's.
-        """
-        _check_sizes(coefficients, self.fields["expansion"], self.fields["scale"])
-        return DiffractionTable(coefficients=coefficients, **self.fields)
+    _check_sizes(coefficients, table.expansion, table.scale)
+    return dataclasses.replace(table, coefficients=coefficients)
 
 
-def parse_document(document: Any) -> TableDescription:
+def parse_document(document: Any) -> DiffractionTable:
     """Read the result of `document_of`, checked field by field and against each other.
+
+    The table has no coefficients: `with_coefficients` adds them.
 
     Raises a ValueError with the field that does not fit.
     """
@@ -118,19 +110,14 @@ def parse_document(document: Any) -> TableDescription:
     wants = (_RATIOS,) if settings.second_order else ()
     _names(fields, (*_TABLE_FIELDS, *_SETTINGS, *wants), (*_TABLE_FIELDS, *wants))
     expansion = _expansion(_mapping(fields["expansion"], "expansion"))
-    spacing = _pair(fields["spacing"], "spacing", 1e-9, 1e9)
-    grid = _grid(_mapping(fields["grid"], "grid"))
+    components = _COMPONENTS[expansion.kind], expansion.series_terms
     table = DiffractionTable(
         coefficients=np.zeros((0, 0, 0, 0, 0), np.float32),
-        order_0=_numbers(
-            fields["order_0"],
-            "order_0",
-            (expansion.intervals, _COMPONENTS[expansion.kind], expansion.series_terms),
-        ),
+        order_0=_numbers(fields["order_0"], "order_0", (expansion.intervals, *components)),
         scale=_number(fields["scale"], "scale", 1e-30, 1e30),
         expansion=expansion,
-        grid=grid,
-        spacing=spacing,
+        grid=_grid(_mapping(fields["grid"], "grid")),
+        spacing=_pair(fields["spacing"], "spacing", 1e-9, 1e9),
         settings=settings,
         error=_error(fields["error"]),
         roughness=_roughness(_mapping(fields["roughness"], "roughness")),
@@ -143,12 +130,9 @@ def parse_document(document: Any) -> TableDescription:
     with np.errstate(over="ignore"):
         largest = np.abs(table.order_0_at(kappa)).max()
     _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
-    size = 4 * math.prod(TableDescription({"expansion": expansion, "grid": grid}).shape)
+    size = 4 * math.prod(shape_of(table))
     _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
-    values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
-    return TableDescription(
-        {name: value for name, value in values.items() if name != "coefficients"}
-    )
+    return table
 
 
 def _check_agreement(table: DiffractionTable) -> None:
@@ -193,19 +177,14 @@ def _expansion(fields: Mapping[str, Any]) -> Expansion:
     if expansion.basis == "taylor":
         _require(expansion.kind == "amplitude" and expansion.intervals == 1, "basis='taylor'")
     _require((expansion.basis == "svd") == ("functions" in fields), "functions beside basis")
-    if "functions" not in fields:
-        return _resolved(expansion)
-    functions = _numbers(
-        fields["functions"], "functions", (expansion.intervals, None, expansion.terms)
-    )
-    _require(1 <= functions.shape[1] <= _LONGEST_SERIES, f"{functions.shape[1]} series terms")
-    return _resolved(dataclasses.replace(expansion, functions=functions))
-
-
-def _resolved(expansion: Expansion) -> Expansion:
-    """Return the series if it can follow the phases of its heights; few terms are a radian each."""
+    if "functions" in fields:
+        shape = (expansion.intervals, None, expansion.terms)
+        functions = _numbers(fields["functions"], "functions", shape)
+        _require(1 <= functions.shape[1] <= _LONGEST_SERIES, f"{functions.shape[1]} series terms")
+        expansion = dataclasses.replace(expansion, functions=functions)
     terms = expansion.series_terms
     _require(expansion.intervals * terms <= _MOST_SERIES, f"{expansion.intervals}×{terms} terms")
+    # it has to follow the phases of its heights; few terms are a radian each
     phase = expansion.half_range * expansion.length
     _require(phase <= 4.0 * terms + 8.0, f"half_range={expansion.half_range:g} beside terms")
     return expansion
@@ -216,10 +195,10 @@ def _grid(fields: Mapping[str, Any]) -> Grid:
     _names(fields, required, required)
     _require(isinstance(fields["coherent"], bool), "coherent")
     grid = Grid(
-        last=_whole_pair(fields["last"], "last", 1, 1 << 20),
+        last=_pair(fields["last"], "last", 1, 1 << 20, _whole),
         steps=_pair(fields["steps"], "steps", 1e-9, 1e9),
         radius=_pair(fields["radius"], "radius", 1e-9, 1e9),
-        taps=_whole_pair(fields["taps"], "taps", 1, MAX_TAPS),
+        taps=_pair(fields["taps"], "taps", 1, MAX_TAPS, _whole),
         coherent=fields["coherent"],
         trims=tuple(_whole(n, "trims", 0, MAX_TAPS) for n in _list(fields["trims"], "trims")),
     )
@@ -332,13 +311,10 @@ def _two(value: Any, name: str) -> list[Any]:
     return pair
 
 
-def _pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
-    x, y = (_number(number, name, low, high) for number in _two(value, name))
-    return x, y
-
-
-def _whole_pair(value: Any, name: str, low: int, high: int) -> tuple[int, int]:
-    x, y = (_whole(number, name, low, high) for number in _two(value, name))
+def _pair(
+    value: Any, name: str, low: float, high: float, number: Callable[..., Any] = _number
+) -> tuple[Any, Any]:
+    x, y = (number(part, name, low, high) for part in _two(value, name))
     return x, y
 
 

@@ -86,7 +86,7 @@ class Expansion:
 
     def order_0_offset(self, interval: ArrayLike) -> NDArray[np.float64]:
         """Return the part of δ_j0 that is added to the series: 1 where it was taken out, else 0."""
-        return np.where(self._factored(interval), 1.0, 0.0)
+        return np.where((np.asarray(interval) == 0) | (self.basis == "taylor"), 1.0, 0.0)
 
     def weights(self, kappa: ArrayLike) -> NDArray[np.float64]:
         """Return the factor of each coefficient of a bin, shape κ.shape + (terms,)."""
@@ -139,10 +139,6 @@ class Expansion:
         angle = np.pi * (order + 0.5) / count
         cosines = np.cos(np.outer(angle, order)) * np.where(order == 0, 1.0, 2.0) / count
         return cosines / self.fading(nodes)[:, None]
-
-    def _factored(self, interval: ArrayLike) -> NDArray[np.bool_]:
-        first = np.asarray(interval) == 0
-        return np.ones_like(first) if self.basis == "taylor" else first
 
     def fading(self, kappa: ArrayLike) -> NDArray[np.float64]:
         """The factor κ̂² or κ̂ of the first interval, 1 in all others; not for Taylor's series."""

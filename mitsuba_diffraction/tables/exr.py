@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import TABLE_ATTRIBUTE, readable_file
 from ..streams import without_chatter
-from .document import TableDescription, document_of, parse_document, plain
+from .document import document_of, parse_document, plain, shape_of, with_coefficients
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -70,10 +70,16 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     Raises a DiffractionError if the file is missing, no table, damaged, or of another format
     version.
     """
-    headers = _headers(path)
+    headers = _read(path, header_only=True)
     text = headers[0].get(TABLE_ATTRIBUTE)
-    document = _parsed(text, path)
-    if document is None:
+    try:
+        document = json.loads(text) if isinstance(text, str) else None
+    except (ValueError, RecursionError) as error:
+        raise DiffractionError(
+            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
+            "again with DiffractionTable.build"
+        ) from error
+    if not isinstance(document, dict):
         raise DiffractionError(
             f"'{path}' is an EXR image but no table; make one of it with "
             "DiffractionTable.build, or give it as heightfield"
@@ -85,12 +91,19 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"{FORMAT_VERSION}; build it again with DiffractionTable.build"
         )
     try:
-        description = parse_document(document)
-        _check_headers(headers, description, os.path.getsize(path))
-        planes = _planes(_read(path, lambda file: file.channels()), description)
+        table = parse_document(document)
+        _check_headers(headers, table, os.path.getsize(path))
+        channels = _read(path)
+        planes = {name: channels[name].pixels for name, _ in _channels(table.expansion)}
+        kinds = {plane.dtype for plane in planes.values()}
+        if len(kinds) > 1 or not kinds <= {np.dtype(np.float16), np.dtype(np.float32)}:
+            raise ValueError(f"channels of {', '.join(sorted(map(str, kinds)))}")
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
             raise ValueError("its checksum is of another one")
-        return description.table(_coefficients(planes, description))
+        coefficients = np.empty(shape_of(table), *kinds)
+        for name, index in _channels(table.expansion):
+            coefficients[index] = planes[name]
+        return with_coefficients(table, coefficients)
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
@@ -98,66 +111,22 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         ) from error
 
 
-def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    """Return the JSON attribute of a table's file; None for an EXR image without one.
-
-    Raises a DiffractionError if the file is missing, a folder, or cannot be read as EXR.
-    """
-    return _parsed(_headers(path)[0].get(TABLE_ATTRIBUTE), path)
-
-
-def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    if not isinstance(text, str):
-        return None
-    try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise DiffractionError(
-            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
-            "again with DiffractionTable.build"
-        ) from error
-    return document if isinstance(document, dict) else None
-
-
-def _check_headers(headers: list[dict[str, Any]], expected: TableDescription, size: int) -> None:
+def _check_headers(headers: list[dict[str, Any]], table: DiffractionTable, size: int) -> None:
     """Refuse a file that is not one image as described, before its pixels are read."""
     if len(headers) != 1:
         raise ValueError(f"{len(headers)} parts, expected one")
     header = headers[0]
-    _, rows, columns, _, _ = expected.shape
+    rows, columns = table.grid.shape
     low, high = header["dataWindow"]
     window = [*low.tolist(), *high.tolist()]
     if window != [0, 0, columns - 1, rows - 1] or header["type"] != OpenEXR.scanlineimage:
         raise ValueError(f"pixels {window}, expected {columns} x {rows}")
     names = sorted((c.name, c.xSampling, c.ySampling) for c in header["channels"])
-    if names != sorted((name, 1, 1) for name, _ in _channels(expected.fields["expansion"])):
+    if names != sorted((name, 1, 1) for name, _ in _channels(table.expansion)):
         raise ValueError(f"{len(names)} channels other than those of its terms")
-    claimed = 2 * int(np.prod(expected.shape))
+    claimed = 2 * int(np.prod(shape_of(table)))
     if claimed > max(_SMALL, _BEST_COMPRESSION * size):
         raise ValueError(f"{size} bytes that claim to hold {claimed:.2g}")
-
-
-def _planes(
-    channels: Mapping[str, Any], expected: TableDescription
-) -> dict[str, NDArray[np.floating]]:
-    """Return the pixels of each channel, in the order of `_channels`."""
-    expansion = expected.fields["expansion"]
-    planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
-    kinds = {plane.dtype for plane in planes.values()}
-    if len(kinds) > 1 or not kinds <= {np.dtype(np.float16), np.dtype(np.float32)}:
-        raise ValueError(f"channels of {', '.join(sorted(map(str, kinds)))}")
-    return planes
-
-
-def _coefficients(
-    planes: Mapping[str, NDArray[np.floating]], expected: TableDescription
-) -> NDArray[np.floating]:
-    """Return coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
-    names = list(_channels(expected.fields["expansion"]))
-    result = np.empty(expected.shape, planes[names[0][0]].dtype)
-    for name, index in names:
-        result[index] = planes[name]
-    return result
 
 
 def _checksum(text: str, planes: Mapping[str, NDArray[np.floating]]) -> str:
@@ -169,29 +138,22 @@ def _checksum(text: str, planes: Mapping[str, NDArray[np.floating]]) -> str:
 
 def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Yield channel names, and the index of each in the coefficients."""
-    for interval in range(expansion.intervals):
-        for component, prefix in enumerate(_PREFIXES[expansion.kind]):
-            for term in range(expansion.terms):
-                everywhere = slice(None)
-                index = (interval, everywhere, everywhere, component, term)
-                yield f"{prefix}.{interval}.{term}", index
+    prefixes, everywhere = _PREFIXES[expansion.kind], slice(None)
+    sizes = expansion.intervals, len(prefixes), expansion.terms
+    for interval, component, term in np.ndindex(sizes):
+        index = (interval, everywhere, everywhere, component, term)
+        yield f"{prefixes[component]}.{interval}.{term}", index
 
 
-def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Read the headers of all parts of an EXR file; a table has one."""
-    return _read(
-        path, lambda file: [file.header(n) for n in range(len(file.parts))], header_only=True
-    )
-
-
-def _read(
-    path: str | os.PathLike[str], read: Callable[[OpenEXR.File], Any], header_only: bool = False
-) -> Any:
-    """Read a part of an EXR file."""
+def _read(path: str | os.PathLike[str], header_only: bool = False) -> Any:
+    """Read the channels of an EXR file, or the headers of all its parts; a table has one."""
     readable_file(path)
     try:
         with without_chatter():
-            return read(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+            file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+            if header_only:
+                return [file.header(n) for n in range(len(file.parts))]
+            return file.channels()
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "

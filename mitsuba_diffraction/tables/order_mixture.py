@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .powers import order_0_power
 from .table import DiffractionTable
 from .window import tap_matrix
 
@@ -106,14 +107,8 @@ def order_mixture(
             density[n] -= chosen_splats.toarray()
     np.maximum(density, 0.0, out=density)
     frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
-    return OrderMixture(
-        kappa_step=float(kappas[1]) / height_scale,
-        frequency=frequency,
-        powers=powers,
-        central=central,
-        density=density,
-        pitch=pitch,
-    )
+    step = float(kappas[1]) / height_scale
+    return OrderMixture(step, frequency, powers, central, density, pitch)
 
 
 class _Axis:
@@ -161,10 +156,10 @@ class _Powers:
             self._interval, self._coefficients = interval, flat.astype(np.float32)
         scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
         parts = (self._coefficients @ scaled).reshape(ny, nx, components)
-        centre = table.order_0_at(kappa)
+        centre = float(order_0_power(table, kappa))
         if table.grid.coherent:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
-            amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
+            amplitude[table.grid.last[1], table.grid.last[0]] = complex(*table.order_0_at(kappa))
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
             weight = axes[0].weight * axes[1].weight
             power = np.abs(field).astype(np.float32) ** 2 * weight
@@ -172,17 +167,15 @@ class _Powers:
                 return power, 0.0
             # order 0 is the mean's lobe, or all light where the speckle is darker than that
             x, y = (axis.lobe for axis in axes)
-            order_0 = np.minimum(float(np.sum(centre**2)) * weight * y[:, None] * x, power)
+            order_0 = np.minimum(centre * weight * y[:, None] * x, power)
             return power - order_0, float(order_0.sum())
-        if expansion.kind == "power":
-            power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
-        else:
-            power, order_0 = np.sum(parts**2, axis=-1), float(np.sum(centre**2))
+        of_power = expansion.kind == "power"
+        power = np.maximum(parts[..., 0], 0.0) if of_power else np.sum(parts**2, axis=-1)
         if len(axes[0].frequency) < nx:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:
             power = axes[1].matrix @ power
-        return power, order_0
+        return power, centre
 
 
 def _splat(

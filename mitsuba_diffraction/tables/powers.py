@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .expansion import Expansion
 from .table import DiffractionTable
@@ -43,7 +43,7 @@ def powers_of(
     return result
 
 
-def order_0_power(table: DiffractionTable, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
+def order_0_power(table: DiffractionTable, kappa: ArrayLike) -> NDArray[np.float64]:
     """|a_0(κ)|², the shape of κ."""
     parts = table.order_0_at(kappa)
     if table.expansion.kind == "power":

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse, special
 
+from .powers import order_0_power
 from .table import DiffractionTable
 from .window import apply_window
 
@@ -128,9 +129,7 @@ def density_of(levels: NDArray[np.uint8] | np.uint8) -> NDArray[np.float64]:
 def _order_0(table: DiffractionTable) -> NDArray[np.float32]:
     """Power of order 0 at κs close enough together for a share of the samples."""
     kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
-    parts = table.order_0_at(kappas)
-    power = parts[:, 0] if parts.shape[1] == 1 else np.sum(np.square(parts), axis=1)
-    return np.clip(power, 0.0, 1.0).astype(np.float32)
+    return np.clip(order_0_power(table, kappas), 0.0, 1.0).astype(np.float32)
 
 
 def _cell_power(

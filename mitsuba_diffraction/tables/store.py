@@ -30,7 +30,7 @@ from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
 from .directional import DirectionalTable
-from .document import document_of, parse_document, plain
+from .document import document_of, parse_document, plain, shape_of, with_coefficients
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -270,13 +270,11 @@ def _table_record(table: DiffractionTable) -> Record:
 
 
 def _table_of(record: Record) -> DiffractionTable:
-    description = parse_document(record.document)
+    table = parse_document(record.document)
     (coefficients,) = record.arrays
-    if coefficients.shape != description.shape:
-        raise ValueError(
-            f"coefficients have shape {coefficients.shape}; expected {description.shape}"
-        )
-    return description.table(coefficients)
+    if coefficients.shape != (shape := shape_of(table)):
+        raise ValueError(f"coefficients have shape {coefficients.shape}; expected {shape}")
+    return with_coefficients(table, coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

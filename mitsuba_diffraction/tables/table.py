@@ -221,6 +221,7 @@ class DiffractionTable:
     def summary(self) -> dict[str, Any]:
         """Plain numbers and strings for people and for JSON."""
         intervals, ny, nx, components, terms = self.coefficients.shape
+        ratios = self.slope_ratios
         return {
             "basis": self.expansion.basis,
             "stores": self.expansion.kind,
@@ -239,20 +240,16 @@ class DiffractionTable:
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
             **({"frequency_limit": list(self.frequency_limit)} if self.limited else {}),
-            "second_order": self._second_order(),
+            "second_order": ratios is not None
+            and {
+                "asked": self.settings.second_order,
+                "applied": applies(self.settings.second_order, ratios),
+                "changes_colours_by": ratios.change,
+            },
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),
             "source": dict(self.source),
-        }
-
-    def _second_order(self) -> dict[str, Any] | bool:
-        if self.slope_ratios is None:
-            return False
-        return {
-            "asked": self.settings.second_order,
-            "applied": applies(self.settings.second_order, self.slope_ratios),
-            "changes_colours_by": self.slope_ratios.change,
         }
 
     def __repr__(self) -> str:

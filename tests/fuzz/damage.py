@@ -18,11 +18,11 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
-from mitsuba_diffraction.tables.document import parse_document
-from mitsuba_diffraction.tables.exr import read_document
+from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
 from tests.support.looked_up import look_up_in_plugin, use_table
+from tests.support.table_files import document_in
 
 _MOST = 500  # characters of a message
 _MOST_NUMBERS = 10**6  # of a table
@@ -128,9 +128,10 @@ def check_document(rng: np.random.Generator) -> None:
     try:
         found = parse_document(document)
         # as many numbers as it declares, which `exr` compares with the file's size
-        if int(np.prod(found.shape)) > _MOST_NUMBERS:
+        if int(np.prod(shape_of(found))) > _MOST_NUMBERS:
             return
-        table = found.table(rng.normal(0.0, 1e-3, found.shape).astype(np.float32))
+        coefficients = rng.normal(0.0, 1e-3, shape_of(found)).astype(np.float32)
+        table = with_coefficients(found, coefficients)
     except (md.DiffractionError, ValueError, MemoryError):  # what `load_table` makes one line of
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -148,7 +149,7 @@ def documents() -> dict[str, str]:
             if name.endswith(".exr"):
                 path = Path(folder, name)
                 path.write_bytes(content)
-                document = read_document(path) or {}
+                document = document_in(path)
                 document.pop("version")
                 found[name] = json.dumps(document)
         return found

@@ -13,10 +13,10 @@ import pytest
 from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.tables.exr import read_document
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
 from tests.support import ROOT
 from tests.support.directions import rough_patch
+from tests.support.table_files import document_in
 
 PAGE = (ROOT / "docs" / "table-format.md").read_text("utf-8")
 WRITER, READER = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
@@ -70,7 +70,7 @@ def test_the_page_s_rules_of_a_look_up_are_ours(examples, tmp_path, tolerance):
     power, file = examples[0]["power"], str(tmp_path / "table.exr")
     table = DiffractionTable.build(PATCH, coherence_width=1.8, tolerance=tolerance)
     table.save(file)
-    document = read_document(file)
+    document = document_in(file)
     grid, spacing = document["grid"], np.array(document["spacing"])
     taps, steps = np.array(grid["taps"]), np.array(grid["steps"])
     assert tolerance < 1e-2 or any(taps % 2)  # odd and even numbers of taps have their own rule
@@ -113,7 +113,7 @@ def test_the_plugin_takes_what_the_page_s_writer_wrote(examples, some_variant):
 def test_the_page_describes_every_field(tmp_path):
     file = tmp_path / "table.exr"
     DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["limited"]).save(file)
-    document = read_document(file)
+    document = document_in(file)
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.M)
     described = set(re.findall(r"\w+", " ".join(rows)))
     fields = {*document, *document["expansion"], *document["grid"]}

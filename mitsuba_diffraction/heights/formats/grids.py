@@ -7,7 +7,6 @@ import re
 import tokenize
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -98,8 +97,7 @@ def read_text(path: Path) -> RawHeights:
     pixel_size: tuple[float, float] | None
     if np.isnan(values[:, -1]).all():
         values = values[:, :-1]  # a separator at the end of every line, not a column
-    header_values = _read_header(header, shown)
-    size = header_values.size
+    unit, stated, size = _read_header(header, shown)
     ny, nx = values.shape
     if nx < 2 or ny < 2:
         raise DiffractionError(
@@ -109,9 +107,7 @@ def read_text(path: Path) -> RawHeights:
         values, pixel_size = _from_points(values, shown)
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
-    return RawHeights(
-        values[::-1], pixel_size, unit=header_values.unit, stated=header_values.stated
-    )
+    return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
 
 
 def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[str]]:
@@ -167,16 +163,8 @@ def _number(cell: str, line: int, shown: str) -> float:
         ) from error
 
 
-class _Header(NamedTuple):
-    """Unit of the heights and size of the patch that a text file's header states."""
-
-    unit: float = 1.0  # µm per unit of the heights
-    stated: str = ""  # name of the unit
-    size: tuple[float, float] | None = None  # (width, height), µm
-
-
-def _read_header(header: list[str], shown: str) -> _Header:
-    """Read the unit of the heights and the size of the patch from the header's lines."""
+def _read_header(header: list[str], shown: str) -> tuple[float, str, tuple[float, float] | None]:
+    """Return µm per unit of the heights, the unit's name, and the patch's size, µm, if stated."""
     unit, stated = 1.0, ""
     sizes: dict[str, float] = {}
     for line in header:
@@ -188,11 +176,11 @@ def _read_header(header: list[str], shown: str) -> _Header:
             except ValueError as error:
                 raise DiffractionError(f"{shown}: {line.strip()!r} is not a size") from error
     if len(sizes) < 2:
-        return _Header(unit, stated)
+        return unit, stated, None
     size = sizes["width"], sizes["height"]
     if not all(math.isfinite(s) and s > 0 for s in size):
         raise DiffractionError(f"{shown} states a size of {size[0]:g} x {size[1]:g} µm")
-    return _Header(unit, stated, size)
+    return unit, stated, size
 
 
 def _factor(unit: str, shown: str) -> float:
@@ -218,20 +206,15 @@ def _from_points(
         f"{shown} has three columns, which are read as x, y and height, but its points do not "
         "form a uniform grid; interpolate them to one first"
     )
-    if not np.isfinite(points[:, :2]).all():
-        raise uneven
     xs, ix = np.unique(points[:, 0], return_inverse=True)
     ys, iy = np.unique(points[:, 1], return_inverse=True)
-    if min(xs.size, ys.size) < 2 or xs.size * ys.size != len(points):
+    every = np.unique(iy * xs.size + ix).size == xs.size * ys.size == len(points)
+    if not every or min(xs.size, ys.size) < 2 or not np.isfinite(points[:, :2]).all():
         raise uneven
     steps = np.diff(xs), np.diff(ys)
     # coordinates printed with few digits are rounded: up to 1 % of a step is uniform
     if any(np.ptp(step) > 0.01 * step.mean() for step in steps):
         raise uneven
-    grid = np.full((ys.size, xs.size), np.nan)
-    occupied = np.zeros(grid.shape, dtype=bool)
-    occupied[iy, ix] = True
-    if not occupied.all():
-        raise uneven
+    grid = np.empty((ys.size, xs.size))
     grid[iy, ix] = points[:, 2]
     return grid[::-1], (float(steps[0].mean()), float(steps[1].mean()))

@@ -6,7 +6,6 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -119,7 +118,13 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     """
     shown = repr(str(path))
     try:
-        header = _only_header(path, shown)
+        with without_chatter():
+            file = OpenEXR.File(str(path), header_only=True)
+        if len(file.parts) > 1:
+            raise DiffractionError(
+                f"{shown} has {len(file.parts)} parts; save the one with the heights alone"
+            )
+        header = file.header()
         low, high = header["dataWindow"]
         names = [str(entry.name) for entry in header["channels"]]
         height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
@@ -136,18 +141,6 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     if pixels is None or pixels.ndim != 2:
         raise DiffractionError(f"{shown}: channel {chosen!r} has no two-dimensional pixels")
     return RawHeights(np.asarray(pixels, dtype=np.float64)[::-1])
-
-
-def _only_header(path: Path, shown: str) -> dict[str, Any]:
-    """Read the header of an EXR that has one part."""
-    with without_chatter():
-        file = OpenEXR.File(str(path), header_only=True)
-    if len(file.parts) > 1:
-        raise DiffractionError(
-            f"{shown} has {len(file.parts)} parts; save the one with the heights alone"
-        )
-    header: dict[str, Any] = file.header()
-    return header
 
 
 def _choose_channel(names: list[str], channel: str | None, shown: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -64,8 +64,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         except Exception as error:
             raise DiffractionError(f"{shown} cannot be read: {first_line(error)}") from error
         try:
-            choice = _choose(list(reader.channels), channel, shown)
-            raw = _read_channel(reader, choice.channel, shown)
+            chosen, note = _choose(list(reader.channels), channel, shown)
+            raw = _read_channel(reader, chosen, shown)
         except DiffractionError:
             raise
         except Exception as error:
@@ -74,25 +74,18 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
             ) from error
         finally:
             reader.close()
-    raw.notes = (choice.note,)
+    raw.notes = (note,)
     return raw
 
 
-class _Choice(NamedTuple):
-    """Channel to read, and its line in the history."""
-
-    channel: Any
-    note: str
-
-
-def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Choice:
-    """Choose the requested channel, or the first that holds heights."""
+def _choose(channels: list[Any], requested: str | int | None, shown: str) -> tuple[Any, str]:
+    """Choose the requested channel, or the first that holds heights; say so in a line."""
     if not channels:
         raise DiffractionError(f"{shown} has no channel")
     listed = _list(channels)
     if requested is not None:
         channel = _named(channels, requested, shown)
-        return _Choice(channel, f"channel {channel.name!r}, chosen among {listed}")
+        return channel, f"channel {channel.name!r}, chosen among {listed}"
     heights = [c for c in channels if _is_height(c) and not _NOT_HEIGHT.search(c.name)]
     if not heights:  # without units, which the user may know
         heights = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
@@ -103,7 +96,7 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Ch
         note += f", the {'first' if len(heights) > 1 else 'only'} height channel among {listed}"
     if len(heights) > 1:
         note += "; channel chooses another"
-    return _Choice(heights[0], note)
+    return heights[0], note
 
 
 def _list(channels: list[Any]) -> str:

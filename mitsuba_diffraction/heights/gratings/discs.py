@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -142,18 +141,17 @@ def _disc(
     return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=name)
 
 
-class _NearestPit(NamedTuple):
-    """Stadium-shaped pit nearest to each x of a track, µm, arrays (nx,)."""
-
-    ahead: FloatArray  # distance along the track to the stadium's axis
-    aside: FloatArray  # position of the axis across the track
-    half: FloatArray  # radius of the stadium
-
-
 def _track(
     rng: Rng, disc: Format, length: float, x: FloatArray, irregularity: float
-) -> _NearestPit:
-    """Draw the pits of one track of `length` µm, which is closed, and return the nearest ones."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Draw the pits of one track of `length` µm, which is closed.
+
+    Returns
+    -------
+    ahead, aside, half
+        Of the stadium-shaped pit nearest to each x, µm, (nx,): distance along the track to the
+        stadium's axis, position of the axis across the track, and radius.
+    """
     runs = _runs(rng, round(length / disc.bit))
     bit = length / runs.sum()
     ends = np.cumsum(runs) * bit + length * rng.random()
@@ -169,7 +167,7 @@ def _track(
     ahead = np.maximum(np.abs(offset) - axis, 0)
     nearest = (ahead - half).argmin(axis=1)
     aside = irregularity * disc.wander * rng.standard_normal(n)
-    return _NearestPit(ahead[np.arange(x.size), nearest], aside[nearest], half[nearest])
+    return ahead[np.arange(x.size), nearest], aside[nearest], half[nearest]
 
 
 def _runs(rng: Rng, bits: int) -> npt.NDArray[np.int64]:

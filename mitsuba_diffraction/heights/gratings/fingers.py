@@ -240,9 +240,7 @@ def _lay(
         # values of one finger hold around its axis; half way to the next they change smoothly
         s = ramp(0.2, 0.8, f)
         a, b = left % n, (left + 1) % n
-        length = row.length[a] + s * (row.length[b] - row.length[a])
-        tip = row.y[a] + s * (row.y[b] - row.y[a])
-        rise = row.rise[a] + s * (row.rise[b] - row.rise[a])
+        length, tip, rise = (v[a] + s * (v[b] - v[a]) for v in (row.length, row.y, row.rise))
         u = np.minimum(f, 1 - f)
         z, gap = _profile(u, (tip - y) / length, pitch, length, serration[iy, columns], blade)
         distance[iy, columns] += gap

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 import scipy
+from scipy.interpolate import CubicSpline
 
 FloatArray = npt.NDArray[np.float64]
 Rng = np.random.Generator
@@ -51,26 +52,12 @@ def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) 
 
 def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
     """Interpolate a periodic `field` (my, mx) on (ny, nx) pixels, by cubic splines."""
-    my, mx = field.shape
-    rows = _spline_rows(field, np.arange(ny) * (my / ny))
-    return np.ascontiguousarray(_spline_rows(rows.T, np.arange(nx) * (mx / nx)).T)
-
-
-def _spline_rows(field: FloatArray, indices: FloatArray) -> FloatArray:
-    """Interpolate rows of a periodic `field` (m, n) at fractional `indices` (k,): shape (k, n)."""
-    spline = scipy.ndimage.spline_filter1d(field, order=3, axis=0, mode="grid-wrap")
-    base = np.floor(indices).astype(np.intp)
-    f = (indices - base)[:, None]
-    weights = (  # uniform cubic B-spline
-        (1 - f) ** 3 / 6,
-        (4 - 6 * f**2 + 3 * f**3) / 6,
-        (1 + 3 * f + 3 * f**2 - 3 * f**3) / 6,
-        f**3 / 6,
-    )
-    result = np.zeros((indices.size, field.shape[1]))
-    for offset, weight in zip((-1, 0, 1, 2), weights, strict=True):
-        result += weight * spline[(base + offset) % field.shape[0]]
-    return result
+    for axis, count in enumerate((ny, nx)):
+        nodes = field.shape[axis]
+        closed = np.take(field, np.arange(nodes + 1) % nodes, axis)
+        spline = CubicSpline(np.arange(nodes + 1), closed, axis=axis, bc_type="periodic")
+        field = spline(np.arange(count) * (nodes / count))
+    return field
 
 
 def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:

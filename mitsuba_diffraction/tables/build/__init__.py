@@ -10,6 +10,5 @@ powers        the mean power of several patches, by batches, on workers if given
 spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients  of the series, from transforms of the heights; as half floats
 error         the one error measure of the project
-slope_ratios  what tells hills from pits, for the second order
-describe      statistics of the heights that a table stores
+describe      statistics of the heights that a table stores, and what tells hills from pits
 """

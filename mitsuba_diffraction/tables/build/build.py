@@ -35,16 +35,14 @@ from .checks import (
 from .choose import (
     MAX_INTERVALS,
     PACKET,
-    chebyshev_expansion,
-    svd_expansion,
+    series_expansion,
     taylor_expansion,
     too_many_intervals,
 )
 from .coefficients import coefficients_of, half_precision
-from .describe import describe, roughness_of
+from .describe import describe, roughness_of, slope_ratios
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .powers import Spectra
-from .slope_ratios import slope_ratios
 from .windows import Run, shape_of, windows_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
@@ -56,10 +54,7 @@ class Attempt:
 
     Parameters
     ----------
-    patches, grid, expansion : heights, orders and series of the table.
-    functions : number of functions of basis "svd", or None.
-    half : store half floats.
-    tolerance : of the table; the finest take transforms in double precision.
+    wanted, setting : of the table; the least tolerances take transforms in double precision.
     tell : called as tell(done, total, text).
 
     Attributes
@@ -68,18 +63,11 @@ class Attempt:
     measured : the error last measured, see `tables.build.error.worst`.
     """
 
-    def __init__(
-        self,
-        patches: Sequence[HeightField],
-        grid: Grid,
-        expansion: Expansion,
-        functions: int | None,
-        half: bool,
-        tolerance: float,
-        tell: Progress,
-    ) -> None:
+    def __init__(self, wanted: _Wanted, setting: _Setting, tell: Progress) -> None:
+        patches, expansion, functions = wanted.patches, setting.expansion, setting.functions
+        self.grid = grid = _grid(wanted, setting.taps)
         check_size(grid, expansion, functions)
-        double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
+        double = expansion.basis == "taylor" or wanted.settings.tolerance < DOUBLE_BELOW
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
         self._tick = _Ticks(tell)
@@ -88,7 +76,6 @@ class Attempt:
         transforms = expansion.intervals * expansion.series_terms * self._spectra.count
         self._tick.transforms = transforms
         self._tick.total = transforms + sum(map(len, self._checks)) * self._spectra.count
-        self.grid = grid
         self.measured: dict[str, float] = {}
         self._parts: list[Parts] = []
         self._trims: tuple[int, ...] | None = None
@@ -97,7 +84,7 @@ class Attempt:
             self._spectra, grid, expansion, functions
         )
         self.scale = 1.0
-        if half:
+        if setting.half:
             self.coefficients, self.scale = half_precision(self.coefficients)
 
     def error(self, trims: tuple[int, ...] = ()) -> float:
@@ -265,13 +252,9 @@ def build_with(
 
 def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
     """Try settings until one meets the tolerance."""
-    patches, tolerance = wanted.patches, wanted.settings.tolerance
-    setting = _first(wanted)
+    setting, tolerance = _first(wanted), wanted.settings.tolerance
     for _ in range(_ATTEMPTS):
-        grid, expansion = _grid(wanted, setting.taps), setting.expansion
-        attempt = Attempt(
-            patches, grid, expansion, setting.functions, setting.half, tolerance, tell
-        )
+        attempt = Attempt(wanted, setting, tell)
         if setting.trims and attempt.error(setting.trims) > tolerance:
             setting = replace(setting, trims=())
         if attempt.error(setting.trims) <= tolerance:
@@ -303,10 +286,8 @@ def _first(wanted: _Wanted) -> _Setting:
     if settings.basis == "taylor":
         expansion = taylor_expansion(*asked)
         check_taylor(wanted.deepest, expansion, tolerance)
-    elif settings.basis == "chebyshev":
-        expansion = chebyshev_expansion(*asked)
     else:
-        expansion, functions = svd_expansion(*asked)
+        expansion, functions = series_expansion(*asked, settings.basis)
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     return _Setting(expansion, functions, half, taps, trims)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -96,9 +97,7 @@ def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[s
     """
     settings, first = resolved(settings, scans), scans[0]
     if settings.windows is not None:  # levelled and tapered: tilt and edges do not show
-        scans = [
-            HeightField(s.heights, s.pixel_size, name=s.name, periodic=s.periodic) for s in scans
-        ]
+        scans = [replace(scan, history=(), cut_out=False) for scan in scans]
     lines = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
     try:
         check_units(scans)

@@ -33,90 +33,66 @@ _FINE, _LONGEST = 0.15, 200
 _Maker = Callable[[int, int], Expansion]
 
 
-def chebyshev_expansion(
-    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
-) -> Expansion:
-    """The Chebyshev series whose error on a cut-out of the patch is at most `budget`.
-
-    The exact measure on the whole patch has the last word (`tables.build`).
-    """
-    make = _maker(heights, coherence, kappa_max)
-    if heights.range == 0.0:
-        return make(terms or SMALL_PACKET, 1)
-    trial = _Trial(heights, kappa_max)
-    if terms is None and trial.error(make(SMALL_PACKET, 1)) <= budget:
-        return make(SMALL_PACKET, 1)
-    chosen = terms or PACKET
-    return make(chosen, _fewest_intervals(partial(make, chosen), trial.error, chosen, budget))
-
-
-def svd_expansion(
-    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+def series_expansion(
+    heights: HeightField,
+    coherence: str,
+    kappa_max: float,
+    budget: float,
+    terms: int | None,
+    basis: str,
 ) -> tuple[Expansion, int | None]:
     """Return the initial Chebyshev series, and the number of `svd` functions, if any.
 
-    Their error on a cut-out of the patch is at most `budget`. Unless the user says how many
-    functions, there are as many as make the smallest table, the fewer if that makes no difference.
+    Their error on a cut-out of the patch is at most `budget`; the exact measure on the whole patch
+    has the last word (`tables.build`). Unless the user says how many functions, there are as many
+    as make the smallest table, the fewer if that makes no difference.
     """
-    make = _maker(heights, coherence, kappa_max)
-    if heights.range == 0.0:
-        return make(terms or SMALL_PACKET, 1), None
-    trial = _Trial(heights, kappa_max)
-
-    def series(count: int, intervals: int) -> Expansion:
-        return make(max(count + 2, trial.length(make, intervals, budget)), intervals)
-
-    def suffices(count: int, intervals: int) -> bool:
-        return trial.error(series(count, intervals), count) <= budget
-
-    if terms is None and suffices(SMALL_PACKET, 1):
-        return series(SMALL_PACKET, 1), SMALL_PACKET
-    count = terms or PACKET
-    intervals = _fewest_intervals(
-        partial(series, count), lambda expansion: trial.error(expansion, count), count, budget
-    )
-    if terms is None and intervals == 1 and suffices(SMALL_PACKET, 2):
-        return series(SMALL_PACKET, 2), SMALL_PACKET
-    return series(count, intervals), count
-
-
-def _maker(heights: HeightField, coherence: str, kappa_max: float) -> _Maker:
     kind = "power" if coherence == "ensemble" else "amplitude"
-    half_range = 0.5 * heights.range
 
     def make(terms: int, intervals: int) -> Expansion:
-        return Expansion("chebyshev", kind, terms, intervals, kappa_max, half_range)
+        return Expansion("chebyshev", kind, terms, intervals, kappa_max, 0.5 * heights.range)
 
-    return make
+    if heights.range == 0.0:
+        return make(terms or SMALL_PACKET, 1), None
+    trial, svd = _Trial(heights, kappa_max), basis != "chebyshev"
+
+    def series(count: int, intervals: int) -> Expansion:
+        length = max(count + 2, trial.length(make, intervals, budget)) if svd else count
+        return make(length, intervals)
+
+    def error(count: int, intervals: int) -> float:
+        return trial.error(series(count, intervals), count if svd else None)
+
+    count, intervals = SMALL_PACKET, 1
+    if terms is not None or error(count, intervals) > budget:
+        count = terms or PACKET
+        intervals = _fewest_intervals(partial(series, count), partial(error, count), count, budget)
+        if svd and terms is None and intervals == 1 and error(SMALL_PACKET, 2) <= budget:
+            count, intervals = SMALL_PACKET, 2
+    return series(count, intervals), count if svd else None
 
 
 def _fewest_intervals(
-    make: Callable[[int], Expansion],
-    error: Callable[[Expansion], float],
-    terms: int,
-    budget: float,
+    make: Callable[[int], Expansion], error: Callable[[int], float], terms: int, budget: float
 ) -> int:
     """About the smallest number of intervals whose error is at most `budget`."""
     # An interval's worth of phase that so many terms resolve, as a first guess
     first = make(1)
     guess = max(1, round(first.kappa_max * first.half_range / 8.0))
-    if error(make(guess)) <= budget:
+    if error(guess) <= budget:
         good = guess
-        while good > 1 and error(make(good // 2)) <= budget:
+        while good > 1 and error(good // 2) <= budget:
             good //= 2
         bad = good // 2
     else:
         bad, good = guess, 2 * guess
-        while (smallest := error(make(good))) > budget:
+        while (smallest := error(good)) > budget:
             if good >= MAX_INTERVALS:
                 raise too_many_intervals(make(good), terms, smallest)
             bad, good = good, 2 * good
     while good - bad > max(1, good // 16):
         middle = (good + bad) // 2
-        if error(make(middle)) <= budget:
-            good = middle
-        else:
-            bad = middle
+        good, bad = (middle, bad) if error(middle) <= budget else (good, middle)
     return good
 
 
@@ -157,8 +133,7 @@ def taylor_rounding(heights: HeightField, kappa_max: float, terms: int) -> float
     log_x, log_moment = _log_moments(heights, kappa_max, terms)
     n = np.arange(1, terms + 1)
     log_squares = 2.0 * (n * log_x - gammaln(n + 1)) + log_moment
-    largest = float(log_squares.max())
-    log_sum = largest + math.log(float(np.exp(log_squares - largest).sum()))
+    log_sum = float(np.logaddexp.reduce(log_squares))
     return _exp(math.log(2.0 * _SINGLE_ROUNDING) + 0.5 * log_sum)
 
 

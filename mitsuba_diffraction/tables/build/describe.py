@@ -1,9 +1,10 @@
-"""Description of the heights in a table: statistics, digest and roughness."""
+"""Description of the heights in a table: statistics, digest, roughness and slope ratios."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,10 @@ from ...heights.coherence import repeats, width_reason
 from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
+from ...optics.second_order_change import colour_change
+from ...optics.slope_ratios import CellGrid, CellSums, SlopeRatios
 from ...settings import TableSettings
+from ..table import q_limit_of
 from .spectrum import Spectrum
 from .windows import Windows
 
@@ -76,6 +80,28 @@ def sections(
             yield patch, np.ones((1, 1))
         else:
             yield from sections(Windows([patch], math.inf))
+
+
+def slope_ratios(
+    patches: Sequence[HeightField], settings: TableSettings, roughness: RoughnessTable
+) -> SlopeRatios:
+    """Return the slope ratios as far as the table has orders, and by how much they change colours.
+
+    roughness : of the patches, as in the table.
+    """
+    q_limit = q_limit_of(settings.wavelength_range)
+    x, y = settings.frequency_limit or (q_limit, q_limit)
+    grid = CellGrid.for_patches(
+        next(sections(patches))[0].extent,
+        max(patch.rms_height for patch in patches),
+        q_limit,
+        (min(x, q_limit), min(y, q_limit)),
+        q_limit * settings.height_scale_max,
+    )
+    sums = CellSums.of_patches(sections(patches), grid)
+    ratios = sums.ratios()
+    change = colour_change(sums, ratios, roughness, settings.wavelength_range)
+    return replace(ratios, change=change)
 
 
 def _parts(windows: Windows) -> Windows:

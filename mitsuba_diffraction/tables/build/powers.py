@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,9 +110,8 @@ class Spectra:
 
     def _of_windows(self, kappas: tuple[float, ...]) -> Iterator[Power]:
         assert isinstance(self._patches, Windows)
-        tasks = (_Task(batch, *self._of, kappas) for batch in self._batches)
         total: list[Power] = []
-        for powers in self._patches.run(_Task.sums, tasks):
+        for powers in self._patches.run(partial(_batch_sums, *self._of, kappas), self._batches):
             _add(total, powers)
             for _ in kappas:
                 self.tick()
@@ -119,19 +119,11 @@ class Spectra:
             yield power.over(len(self._patches))
 
 
-@dataclass(frozen=True)
-class _Task:
-    """Some windows, and the κ at which their powers are summed."""
-
-    windows: Windows
-    last: tuple[int, int]
-    double: bool
-    kappas: tuple[float, ...]
-
-    def sums(self) -> list[Power]:
-        numbers = range(len(self.windows))
-        spectra = (self.windows.spectrum(n, self.last, self.double) for n in numbers)
-        return _sums(spectra, self.kappas)
+def _batch_sums(
+    last: tuple[int, int], double: bool, kappas: tuple[float, ...], windows: Windows
+) -> list[Power]:
+    """Sums over some windows, one for every κ."""
+    return _sums((windows.spectrum(n, last, double) for n in range(len(windows))), kappas)
 
 
 def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:

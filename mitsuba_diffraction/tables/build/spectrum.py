@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -106,14 +107,10 @@ class Spectrum:
             result[self._rows.target[0] : self._rows.target[-1] + 1, columns] = wanted
 
         blocks = range(0, ny, _ROWS), range(0, half.shape[1], _ROWS)
-        if self.heights.size < _SMALL:  # threads would take longer to start
+        small = self.heights.size < _SMALL  # threads would take longer to start
+        with nullcontext() if small else ThreadPoolExecutor(os.cpu_count()) as pool:
             for work, starts in zip((along_x, along_y), blocks, strict=True):
-                for start in starts:
-                    work(start)
-            return self._mean_apart(result, sums)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for work, starts in zip((along_x, along_y), blocks, strict=True):
-                list(pool.map(work, starts))
+                list((pool.map if pool else map)(work, starts))
         return self._mean_apart(result, sums)
 
     def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any, overload
 
@@ -189,9 +190,9 @@ class Windows(Sequence[HeightField]):
         bins = [2.0 * math.pi / (n * d) for n, d in zip(self.shape, self._pixels, strict=True)]
         last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.shape, strict=True)]
         lobe = [1.0 / (math.sqrt(2.0) * sigma * q) for q in bins]
-        tasks = ((batch, (last[1], last[0]), kappa, lobe) for batch in self.batches())
+        scatter = partial(_scatter, (last[1], last[0]), kappa, lobe)
         count, mean, squares = 0, np.zeros(1), np.zeros(1)
-        for more, their_mean, their_squares in self.run(_scatter, tasks):
+        for more, their_mean, their_squares in self.run(scatter, self.batches()):
             # Chan, Golub & LeVeque (1983, The American Statistician 37, 242), equation 2.1
             change, count = their_mean - mean, count + more
             mean = mean + change * (more / count)
@@ -229,10 +230,9 @@ class Windows(Sequence[HeightField]):
 
 
 def _scatter(
-    task: tuple[Windows, tuple[int, int], float, Sequence[float]],
+    last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Windows
 ) -> tuple[int, Reals, Reals]:
     """Number of windows, mean and sum of squared deviations of what look-ups find in them."""
-    windows, last, kappa, lobe = task
     mean, squares = np.zeros(1), np.zeros(1)
     for n in range(len(windows)):
         power = np.abs(windows.spectrum(n, last).of_phase(kappa)) ** 2

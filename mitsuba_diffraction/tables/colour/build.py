@@ -27,7 +27,7 @@ from scipy import sparse
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion
-from ..powers import order_0_power, power_expansion, powers_of
+from ..powers import order_0_power, power_expansion, power_series
 from ..table import DiffractionTable
 from ..window import taps_at
 
@@ -148,11 +148,25 @@ def order_0_colour(
 
 
 class OtherOrders:
-    """All orders but order 0 as a series in z, wherever a polar grid has bins."""
+    """All orders but order 0 as a series in z, wherever a polar grid has bins.
+
+    The table's series in κ, of the *power* whatever it stores, is summed under the window.
+    """
 
     def __init__(self, table: DiffractionTable) -> None:
         self._lobe = lobe_of(table)
-        self._source = _Source(table)
+        self._table, bins = table, table.coefficients
+        self._shape = bins.shape[1:3]
+        self._scale, self._expansion = table.scale, power_expansion(table)
+        if not table.grid.coherent:
+            powers, _, self._scale, self._expansion = power_series(table)
+            bins = powers[:, :, :, None]
+        flat = np.ascontiguousarray(np.moveaxis(bins, 0, 2), np.float32)
+        self._bins = flat.reshape(self._shape[0] * self._shape[1], -1)
+        taps_x, taps_y = table.grid.taps
+        self._smooth = taps_x * taps_y > _MOST_TAPS
+        if self._smooth:
+            self._bins = _smoothed(self._bins, self._shape, table.grid.exponents)
 
     def blocks(
         self, grid: PolarGrid, band: range, azimuths: NDArray[np.int64], expansion: Expansion
@@ -163,20 +177,21 @@ class OtherOrders:
         ------
         ring, azimuths, and coefficients (azimuths, intervals, 3, terms) in 1/µm².
         """
-        source = self._source
         # Neither the lobes nor the observer's curves may slip between two wavelengths
         lobe = self._lobe / min(grid.radius(band.stop - 1), RESOLVED_RADIUS)
         per_ring = math.ceil(grid.step / min(1.2 * lobe, 0.5 * grid.step))
         lam, weights = wavelength_weights(grid.step / per_ring)
         lam, weights = lam[::-1], weights[::-1]  # the frequency falls with λ
-        parts = _parts(source.expansion, expansion, lam, weights)
+        parts = _parts(self._expansion, expansion, lam, weights)
         count = (len(band) - 1) * per_ring + len(lam)
         first = 2 * np.pi * grid.radius(band.start) / lam[0]
         frequency = first * np.exp(grid.step / per_ring * np.arange(count))
-        size = max(1, _BLOCK // (count * max(16, source.width)))
+        # coefficients looked up at one point, or weights of its series
+        width = max(self._bins.shape[1], self._expansion.intervals * self._expansion.terms)
+        size = max(1, _BLOCK // (count * max(16, width)))
         for start in range(0, len(azimuths), size):
             block = azimuths[start : start + size]
-            sums = source.at(frequency, 2 * np.pi / grid.counts[band.start] * block)
+            sums = self._sums(frequency, 2 * np.pi / grid.counts[band.start] * block)
             for n, ring in enumerate(band):
                 result = np.zeros((len(block), expansion.intervals, 3, expansion.terms), np.float32)
                 for part in parts:
@@ -185,6 +200,69 @@ class OtherOrders:
                     added = term.reshape(len(block), -1) @ part.matrix
                     result[:, part.targets] += added.reshape(len(block), -1, 3, expansion.terms)
                 yield ring, block, result
+
+    def _sums(
+        self, frequency: NDArray[np.floating], azimuth: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """Coefficients (azimuths, intervals, frequencies, terms) of the power's series."""
+        table = self._table
+        qx = np.outer(np.cos(azimuth), frequency).ravel()
+        qy = np.outer(np.sin(azimuth), frequency).ravel()
+        sums = self._taps(qx, qy) @ self._bins
+        if table.grid.coherent:
+            sums = self._coherent(sums, qx, qy)
+        sums *= np.float32(1.0 / self._scale)
+        shape = (len(azimuth), len(frequency), self._expansion.intervals, self._expansion.terms)
+        return np.ascontiguousarray(sums.reshape(shape).transpose(0, 2, 1, 3))
+
+    def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> sparse.csr_array:
+        """Weights from bins to points, a sparse (points, ny·nx) matrix."""
+        grid, spacing = self._table.grid, self._table.spacing
+        columns, weights_x = self._axis(qx / spacing[0], grid.last[0], grid.taps[0], 0)
+        rows, weights_y = self._axis(qy / spacing[1], grid.last[1], grid.taps[1], 1)
+        index = rows[:, :, None] * np.int32(self._shape[1]) + columns[:, None, :]
+        weights = weights_y[:, :, None] * weights_x[:, None, :]
+        each = index.shape[1] * index.shape[2]
+        return sparse.csr_array(
+            (weights.ravel(), index.ravel(), np.arange(0, index.size + 1, each, dtype=np.int32)),
+            shape=(len(qx), self._shape[0] * self._shape[1]),
+        )
+
+    def _axis(
+        self, position: NDArray[np.float64], last: int, taps: int, axis: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Array indices and weights of the taps along one axis, both (points, taps)."""
+        if self._smooth:
+            taps = 4
+        lowest, distance = taps_at(position, last, taps)
+        if self._smooth:
+            weights = _cubic(distance[:, 1])
+        else:
+            weights = np.exp(-self._table.grid.exponents[axis] * distance**2)
+        weights[np.abs(position) > last + taps] = 0.0
+        index = np.asarray(lowest[:, None] + np.arange(taps), np.int32)
+        return index, weights.astype(np.float32)
+
+    def _coherent(
+        self, amplitudes: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """The power's series of a sum of amplitudes, less the power of order 0 alone."""
+        table = self._table
+        old, new = table.expansion, self._expansion
+        parts = amplitudes.reshape(len(amplitudes), old.intervals, 2, old.terms)
+        x, y = qx / table.spacing[0], qy / table.spacing[1]
+        lobe = np.exp(-table.grid.exponents[0] * x * x - table.grid.exponents[1] * y * y)
+        result = np.empty((len(amplitudes), new.intervals, new.terms), np.float32)
+        for interval in range(new.intervals):
+            values = np.empty((len(amplitudes), new.terms), np.float32)
+            for n, kappa in enumerate(new.nodes(interval)):
+                source, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
+                amplitude = parts[:, source] @ weights * np.float32(1.0 / table.scale)
+                centre = table.order_0_at(kappa)
+                # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
+                values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
+            result[:, interval] = values @ new.fit(interval).astype(np.float32)
+        return result.reshape(len(amplitudes), -1) * np.float32(self._scale)
 
 
 @dataclass(frozen=True)
@@ -238,109 +316,6 @@ def _run(used: NDArray[np.bool_]) -> slice:
     """Slice from the first to the last that is True."""
     indices = np.flatnonzero(used)
     return slice(int(indices[0]), int(indices[-1]) + 1)
-
-
-class _Source:
-    """Window sums of a table's series in κ at any spatial frequency, without order 0.
-
-    expansion : the series of the *power* in κ, whatever the table stores.
-    """
-
-    def __init__(self, table: DiffractionTable) -> None:
-        self._table = table
-        self.expansion = table.expansion
-        coefficients = table.coefficients
-        if table.expansion.kind == "amplitude":
-            self.expansion = power_expansion(table)
-        if table.expansion.kind == "amplitude" and not table.grid.coherent:
-            powers = powers_of(coefficients.astype(np.float32), table.expansion, self.expansion)
-            self._scale = table.scale**2
-            self._bins = _flat(powers[:, :, :, None])
-        else:
-            self._scale = table.scale
-            self._bins = _flat(coefficients)
-        self._shape = coefficients.shape[1:3]
-        taps_x, taps_y = table.grid.taps
-        self._smooth = taps_x * taps_y > _MOST_TAPS
-        if self._smooth:
-            self._bins = _smoothed(self._bins, self._shape, table.grid.exponents)
-
-    @property
-    def width(self) -> int:
-        """Most coefficients looked up at one point, or weights of its series."""
-        return max(self._bins.shape[1], self.expansion.intervals * self.expansion.terms)
-
-    def at(
-        self, frequency: NDArray[np.floating], azimuth: NDArray[np.floating]
-    ) -> NDArray[np.float32]:
-        """Coefficients (azimuths, intervals, frequencies, terms) of the power's series."""
-        table = self._table
-        qx = np.outer(np.cos(azimuth), frequency).ravel()
-        qy = np.outer(np.sin(azimuth), frequency).ravel()
-        sums = self._taps(qx, qy) @ self._bins
-        if table.grid.coherent:
-            sums = self._coherent(sums, qx, qy)
-        sums *= np.float32(1.0 / self._scale)
-        shape = (len(azimuth), len(frequency), self.expansion.intervals, self.expansion.terms)
-        return np.ascontiguousarray(sums.reshape(shape).transpose(0, 2, 1, 3))
-
-    def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> sparse.csr_array:
-        """Weights from bins to points, a sparse (points, ny·nx) matrix."""
-        grid, spacing = self._table.grid, self._table.spacing
-        columns, weights_x = self._axis(qx / spacing[0], grid.last[0], grid.taps[0], 0)
-        rows, weights_y = self._axis(qy / spacing[1], grid.last[1], grid.taps[1], 1)
-        index = rows[:, :, None] * np.int32(self._shape[1]) + columns[:, None, :]
-        weights = weights_y[:, :, None] * weights_x[:, None, :]
-        each = index.shape[1] * index.shape[2]
-        return sparse.csr_array(
-            (weights.ravel(), index.ravel(), np.arange(0, index.size + 1, each, dtype=np.int32)),
-            shape=(len(qx), self._shape[0] * self._shape[1]),
-        )
-
-    def _axis(
-        self, position: NDArray[np.float64], last: int, taps: int, axis: int
-    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Array indices and weights of the taps along one axis, both (points, taps)."""
-        if self._smooth:
-            taps = 4
-        lowest, distance = taps_at(position, last, taps)
-        if self._smooth:
-            weights = _cubic(distance[:, 1])
-        else:
-            weights = np.exp(-self._table.grid.exponents[axis] * distance**2)
-        weights[np.abs(position) > last + taps] = 0.0
-        index = np.asarray(lowest[:, None] + np.arange(taps), np.int32)
-        return index, weights.astype(np.float32)
-
-    def _coherent(
-        self, amplitudes: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
-        """The power's series of a sum of amplitudes, less the power of order 0 alone."""
-        table = self._table
-        old, new = table.expansion, self.expansion
-        parts = amplitudes.reshape(len(amplitudes), old.intervals, 2, old.terms)
-        x, y = qx / table.spacing[0], qy / table.spacing[1]
-        lobe = np.exp(-table.grid.exponents[0] * x * x - table.grid.exponents[1] * y * y)
-        result = np.empty((len(amplitudes), new.intervals, new.terms), np.float32)
-        for interval in range(new.intervals):
-            values = np.empty((len(amplitudes), new.terms), np.float32)
-            for n, kappa in enumerate(new.nodes(interval)):
-                source, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
-                amplitude = parts[:, source] @ weights * np.float32(1.0 / table.scale)
-                centre = table.order_0_at(kappa)
-                # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
-                values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
-            result[:, interval] = values @ new.fit(interval).astype(np.float32)
-        return result.reshape(len(amplitudes), -1) * np.float32(self._scale)
-
-
-def _flat(coefficients: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(intervals, ny, nx, components, terms) to (ny·nx, intervals·components·terms)."""
-    intervals, ny, nx, components, terms = coefficients.shape
-    flat = np.empty((ny, nx, intervals, components, terms), np.float32)
-    for interval in range(intervals):
-        flat[:, :, interval] = coefficients[interval]
-    return flat.reshape(ny * nx, -1)
 
 
 def _smoothed(

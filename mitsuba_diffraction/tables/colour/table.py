@@ -230,7 +230,7 @@ _STEP = 2.0  # nm
 
 def colour_difference(table: ColourTable, other: ColourTable) -> NDArray[np.float64]:
     """ΔE2000 (n,) between two colour tables, over random pairs of directions."""
-    u, v, z, factor = _pairs(_PAIRS)
+    u, v, z, factor = _pairs()
     return _loss(table.colour(u, v, z), other.colour(u, v, z), factor)
 
 
@@ -238,7 +238,7 @@ def power_colour_difference(
     table: DiffractionTable, other: DiffractionTable
 ) -> NDArray[np.float64]:
     """ΔE2000 (n,) between two tables of powers, summed over daylight's wavelengths."""
-    u, v, z, factor = _pairs(_PAIRS // 3)
+    u, v, z, factor = _pairs()
     lam = np.arange(*VISIBLE, _STEP)[:, None]
     weights = linear_srgb(response(lam[:, 0])) / lam**2
     k = 2e3 * np.pi / lam
@@ -246,7 +246,7 @@ def power_colour_difference(
     return _loss(exact, colours, factor)
 
 
-def _pairs(count: int) -> tuple[NDArray[np.float64], ...]:
+def _pairs() -> tuple[NDArray[np.float64], ...]:
     """u, v, z of random pairs of directions away from the specular one, and w² to divide by.
 
     Half of them in the planes of the axes, out of which gratings with one period send nothing.

@@ -20,7 +20,6 @@ from scipy.ndimage import median_filter
 from ...optics import mean_second_order
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
-from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
@@ -35,6 +34,12 @@ MIN_ORDER_0 = 1e-4
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
 GRAZING = np.radians([89.8, 89.9])
+#: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
+#: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
+_PHASE = 0.8
+_FEWEST_STEPS = 4
+#: As good as no heights at all.
+_FLAT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -222,25 +227,41 @@ def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) ->
 
 
 @dataclass(frozen=True)
-class Energy(HeightScales):
+class Energy:
     """Conserved energy of a table of a material, at any height scale.
 
     Attributes
     ----------
+    table : of the surface.
     material : a reflector, or a dielectric that lets light through.
     wavelength_range : nm; its ends may be one.
     stretch : least factor on lengths. A patch stretched by it is looked up with heights divided by
         it, in light of wavelengths divided by it.
     """
 
+    table: DiffractionTable
     material: Reflector | Dielectric
     wavelength_range: tuple[float, float]
     stretch: float = 1.0
 
-    @property
-    def most(self) -> float:
-        """Largest height scale: κ of a stretched patch stays within the table."""
-        return super().most / self.stretch
+    def nodes(self, height_scale: float, *, interval: bool = False) -> tuple[float, float]:
+        """Return the two height scales around one, for which something is made; equal at a node.
+
+        They lie evenly, 1 among them, so close that an order's power bends little in between. An
+        optimisation of the heights thus sees a continuous scale with derivatives, and waits only
+        where it enters an interval that nobody has been in before.
+
+        interval : two nodes even if the scale is at one, for derivatives.
+        """
+        steps, most = self._lattice
+
+        def node(n: int) -> float:
+            return min(max(n / steps, _FLAT), most)
+
+        position = height_scale * steps  # of a scale in single precision
+        lower = min(math.floor(position + 1e-4), math.ceil(most * steps - 1e-4) - 1)
+        at_node = abs(position - lower) < 1e-4
+        return node(lower), node(lower if at_node and not interval else lower + 1)
 
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""
@@ -254,3 +275,19 @@ class Energy(HeightScales):
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
         return Conservation(**cached_directions("energy", self.table, made_of, make))
+
+    @property
+    def _lattice(self) -> tuple[int, float]:
+        """Height scales a unit, and the largest."""
+        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
+        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter;
+        # κ of a stretched patch stays within the table
+        most = max(self.table.height_scale_max / self.stretch, _FLAT)
+        return max(_FEWEST_STEPS, math.ceil(phase / _PHASE)), most
+
+    def between(self, low: float, high: float) -> list[float]:
+        """Height scales at even distances, as close together, for all between two."""
+        steps, most = self._lattice
+        first = max(math.floor(low * steps) / steps, _FLAT)
+        last = min(math.ceil(high * steps) / steps, most)
+        return np.linspace(first, last, 1 + max(1, math.ceil((last - first) * steps))).tolist()

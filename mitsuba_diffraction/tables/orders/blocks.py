@@ -19,13 +19,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from ...optics.coat import face_transmittance
 from ...optics.orders import port_power
 from . import cells
-from .cells import Array
+from .cells import Array, Whole
 from .table import Band, OrderTable
 
 #: Least normal parts, within over n and above, from which on reduced efficiencies are known at a
@@ -86,49 +86,31 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     return np.asarray(divided)
 
 
-def efficiency(
+def restored(
     table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    from_below: bool,
-    transmitted: bool,
+    rows: Array,
+    x: Array,
+    y: Array,
+    wavelength: Array,
+    channel: Whole,
+    came: Whole,
 ) -> Array:
-    """Return the unpolarised efficiency of an order; arguments as for `lookup.efficiency`."""
+    """Return the efficiencies (n, q, 1) of reduced ones.
+
+    came : (n,) port of the light, at x and y over 2π/λ in a channel.
+    """
     assert table.block is not None
-    light = np.broadcast_arrays(*(np.asarray(part) for part in (x, y, wavelength, order)))
-    shape = light[0].shape
-    x, y, lam = (part.astype(np.float64).ravel() for part in light[:3])
-    m = light[3].astype(np.int64).ravel()
-    lam = np.maximum(lam, table.wavelengths[0])  # shorter light may have orders beyond all bands
-    cell = cells.to_cell(x / table.block, y / table.block, lam, table.optical_period)
-    w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
-    q = cell.channel - m
-    comes = (cell.channel >= 0) & (from_below | (x * x + y * y < 1.0))
-    comes &= (q >= 0) & (q < cell.channels)
-    result = np.zeros(len(x))
-    for k, kind in {*zip(cell.band[comes].tolist(), cell.kind[comes].tolist(), strict=True)}:
-        here = np.flatnonzero(comes & (cell.band == k) & (cell.kind == kind))
-        count = k + 1 - kind
-        step = lam[here, None] / (1e3 * table.period)
-        along = x[here, None] + (cell.channel[here, None] - np.arange(count)) * step
-        port = cell.channel[here] + (0 if from_below else count)
-        scale = factors(along, y[here, None], table.block).scale
-        lane = np.arange(len(here))
-        nodes = reduced(table, table.bands[k], kind)
-        places = zip(nodes.shape, (cell.tau, cell.rho, w), strict=False)
-        weights = [_linear(n, at[here]) for n, at in places]
-        rows = np.einsum("na,nb,nc,abcjq->njq", *weights, nodes, optimize=True)[lane, port]
-        rows *= scale[lane, port]
-        total = rows.sum(axis=-1, keepdims=True)
-        rows /= np.maximum(total, 1.0)
-        rows[lane, port] = np.maximum(1.0 - total[:, 0], 0.0)
-        leaves = q[here] + (0 if from_below != transmitted else count)
-        result[here] = rows[lane, leaves]
-    return result.reshape(shape)
+    count = rows.shape[1] // 2
+    step = wavelength[:, None] / (1e3 * table.period)
+    along = x[:, None] + (channel[:, None] - np.arange(count)) * step
+    lane = np.arange(len(rows))
+    efficiencies = rows[..., 0] * factors(along, y[:, None], table.block).scale[lane, came]
+    total = efficiencies.sum(axis=-1, keepdims=True)
+    efficiencies /= np.maximum(total, 1.0)
+    efficiencies[lane, came] = np.maximum(1.0 - total[:, 0], 0.0)
+    return efficiencies[..., None]
 
 
-def _linear(count: int, at: Array) -> Array:
+def linear(count: int, at: Array) -> Array:
     """Return the matrix of linear interpolation between even nodes, (n, count)."""
     return np.asarray(np.maximum(1.0 - np.abs(at[:, None] * (count - 1) - np.arange(count)), 0.0))

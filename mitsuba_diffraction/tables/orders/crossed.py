@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from ...errors import DiffractionError
 from ...optics.orders import crossed_square, wavelength_coordinate
@@ -131,32 +132,23 @@ class CrossedTable:
         x, y, lam, m, n = np.broadcast_arrays(
             *(np.asarray(part, np.float64) for part in (x, y, wavelength, order_x, order_y))
         )
-        count, low, high = len(self.values) - 1, *self.wavelengths
+        share = wavelength_coordinate(lam, *self.wavelengths, 1e-3)
         places = [
-            _place(wavelength_coordinate(lam, low, high, 1e-3), count),
-            *(_place(np.clip(0.5 * (part + 1.0), 0.0, 1.0), NODES - 1) for part in (y, x)),
+            share * (len(self.values) - 1),
+            *(0.5 * (at + 1.0) * (NODES - 1) for at in (y, x)),
         ]
         m_x, m_y = self.last_orders
         lit = (lam >= self.reach[0]) & (lam <= self.reach[1]) & (np.abs(m) <= m_x)
         lit &= (np.abs(n) <= m_y) & propagates(x, y, lam, m, n, self.periods)
-        orders = np.where(lit, n, 0).astype(int) + m_y, np.where(lit, m, 0).astype(int) + m_x
-        total = np.zeros(x.shape)
-        for corner in itertools.product((0, 1), repeat=3):
-            nodes = tuple(lower + c for (lower, _), c in zip(places, corner, strict=True))
-            shares = [s if c else 1.0 - s for (_, s), c in zip(places, corner, strict=True)]
-            total += self.values[nodes + orders] * np.prod(shares, axis=0)
-        return np.where(lit, total, 0.0)
+        orders = np.where(lit, n, 0.0) + m_y, np.where(lit, m, 0.0) + m_x
+        at = np.stack([*places, *orders]).reshape(5, -1)
+        found = map_coordinates(self.values, at, np.float64, 1, mode="nearest")
+        return np.where(lit, found.reshape(x.shape), 0.0)
 
     def records(self) -> Records:
         """Return the table as a kernel reads it."""
         values = self.values.reshape(*self.values.shape[:3], -1)
-        whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
-        cells = tuple(count - 1 for count in whole.shape[:3])
-        corners = [
-            whole[tuple(slice(c, c + count) for c, count in zip(corner, cells, strict=True))]
-            for corner in itertools.product((0, 1), repeat=3)
-        ]
-        return Records(cells, np.stack(corners, axis=-1).astype(np.float16).reshape(-1, 8))
+        return Records(tuple(n - 1 for n in values.shape[:3]), corner_records(values))
 
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of the header."""
@@ -217,7 +209,11 @@ def propagates(
     return np.asarray(crossed_square(x, y, shift_x, shift_y) > 0.0)
 
 
-def _place(coordinate: Array, cells: int) -> tuple[NDArray[np.int64], Array]:
-    """Return the cell of a coordinate from 0 to 1, and the place in it."""
-    lower = np.minimum(np.floor(coordinate * cells), cells - 1)
-    return lower.astype(np.int64), coordinate * cells - lower
+def corner_records(values: Array | NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return efficiencies (…, orders), then their sum, at the corners of all cells, (n, 8).
+
+    Cells lie along the first three axes; corners are 000, 001, 010 … 111.
+    """
+    whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+    pairs = itertools.product((slice(-1), slice(1, None)), repeat=3)
+    return np.stack([whole.astype(np.float16)[pair] for pair in pairs], axis=-1).reshape(-1, 8)

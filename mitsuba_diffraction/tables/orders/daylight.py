@@ -19,11 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
+from ..colour.proposals import IMPORTANCE
 
 #: Ends of the sum, nm: beyond, the observer sees less than 1e-4 of the light.
 ENDS = (380.0, 780.0)
-#: Weights of the channels in the density of wavelengths to draw.
-IMPORTANCE = (0.25, 0.55, 0.2)
 #: Channels of a weight: red, green, blue, and the density of drawn wavelengths.
 CHANNELS = 4
 

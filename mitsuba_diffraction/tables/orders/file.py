@@ -13,11 +13,13 @@ of these and the numbers.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
 import os
 import shlex
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,50 +50,29 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 
     Raises a DiffractionError if it cannot be written; no half-written file is left.
     """
-    _check_suffix(path)
     packed = {
         (band.k, kind + part): np.rint(values / _STEP).astype(">i2")
         for band in table.bands
         for part, arrays in (("", band.kinds), (_MUELLER, band.mueller or ()))
         for kind, values in zip("ab", arrays, strict=False)
     }
-    header = json.dumps(dict(table.header), sort_keys=True)
-    content = io.BytesIO()
-    with netcdf_file(content, "w") as file:
-        file.title = "Efficiencies of the orders of a grating"
-        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
+    with _written(path, "Efficiencies of the orders of a grating", table) as file:
         file.period, file.period_units = np.float64(table.period), "um"
-        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
         file.superstrate = np.float64(table.superstrate)
-        file.header = header
         if table.thin:
             file.thin = np.int32(1)
         if table.block:
             file.block = np.float64(table.block)
         if table.components != GROOVES:
             file.components = table.components
-        outline = (table.period, tuple(table.wavelengths), table.superstrate, header)
-        file.sha256 = _checksum(outline, table.thin, table.components, table.block, packed)
-        file.createDimension("polarisation", 2)
-        if table.polarised:
-            file.createDimension("row", 4)
-            file.createDimension("column", 4)
+        file.sha256 = _checksum(_outline(file), packed)
         for (k, part), numbers in packed.items():
             kind, matrices = part[0], part.endswith(_MUELLER)
             names = [f"{axis}_{k}" for axis in ("tau", "rho", "w")]
             names += [f"{axis}_{kind}_{k}" for axis in ("j", "q")]
-            for name, size in zip(names, numbers.shape, strict=False):
-                if name not in file.dimensions:
-                    file.createDimension(name, size)
             names += ["row", "column"] if matrices else ["polarisation"]
             first = "mueller" if matrices else "kind"
-            variable = file.createVariable(f"{first}_{kind}_{k}", ">i2", names)
-            variable[:] = numbers
-            variable.scale_factor, variable.units = np.float64(_STEP), "1"
-        file.flush()
-        data = content.getvalue()
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(data)
+            _add(file, f"{first}_{kind}_{k}", names, numbers)
 
 
 def save_crossed(table: CrossedTable, path: str | os.PathLike[str]) -> None:
@@ -99,34 +80,43 @@ def save_crossed(table: CrossedTable, path: str | os.PathLike[str]) -> None:
 
     Rounding and errors as of `save_orders`.
     """
-    _check_suffix(path)
-    content = io.BytesIO()
-    with netcdf_file(content, "w") as file:
-        file.title = "Efficiencies of the orders of a crossed grating"
-        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
+    with _written(path, "Efficiencies of the orders of a crossed grating", table) as file:
         setattr(file, _CROSSED, np.int32(1))
         file.periods, file.periods_units = np.array(table.periods), "um"
-        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
-        file.header = json.dumps(dict(table.header), sort_keys=True)
-        axes = ("wavelength", "y", "x", "order_y", "order_x")
-        for name, size in zip(axes, table.values.shape, strict=True):
-            file.createDimension(name, size)
         numbers = np.rint(table.values / _STEP).astype(">i2")
-        variable = file.createVariable("efficiency", ">i2", axes)
-        variable[:] = numbers
-        variable.scale_factor, variable.units = np.float64(_STEP), "1"
+        _add(file, "efficiency", ("wavelength", "y", "x", "order_y", "order_x"), numbers)
         file.sha256 = _crossed_checksum(file, numbers)
+
+
+@contextlib.contextmanager
+def _written(
+    path: str | os.PathLike[str], title: str, table: OrderTable | CrossedTable
+) -> Iterator[Any]:
+    """Give a file with what all tables have, and write it in one piece at the end."""
+    if Path(path).suffix.lower() != SUFFIX:
+        raise DiffractionError(
+            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
+        )
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        file.title, file.header = title, json.dumps(dict(table.header), sort_keys=True)
+        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
+        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
+        yield file
         file.flush()
         data = content.getvalue()
     with atomic_path(path) as temporary:
         temporary.write_bytes(data)
 
 
-def _check_suffix(path: str | os.PathLike[str]) -> None:
-    if Path(path).suffix.lower() != SUFFIX:
-        raise DiffractionError(
-            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
-        )
+def _add(file: Any, name: str, axes: Sequence[str], numbers: NDArray[np.int16]) -> None:
+    """Add packed efficiencies, and those of their dimensions that the file lacks."""
+    for axis, size in zip(axes, numbers.shape, strict=True):
+        if axis not in file.dimensions:
+            file.createDimension(axis, size)
+    variable = file.createVariable(name, ">i2", axes)
+    variable[:] = numbers
+    variable.scale_factor, variable.units = np.float64(_STEP), "1"
 
 
 def load_orders(path: str | os.PathLike[str]) -> OrderTable:
@@ -194,31 +184,23 @@ def _advice(path: Path) -> str:
 
 def _table(file: Any) -> OrderTable:
     """Return the table of an open file."""
-    period, superstrate = float(file.period), float(file.superstrate)
-    low, high = (float(number) for number in file.wavelengths)
-    header, thin = file.header.decode("utf-8"), bool(getattr(file, "thin", 0))
-    block = float(file.block) if hasattr(file, "block") else None
-    if not isinstance(content := json.loads(header), dict):
+    outline = _outline(file)
+    if not isinstance(header := json.loads(outline["header"]), dict):
         raise ValueError("its header is no JSON object")
-    components = getattr(file, "components", GROOVES.encode()).decode("utf-8")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
+    unpacked: dict[tuple[int, str], NDArray[np.float32]] = {}
     for name, variable in file.variables.items():
         first, kind, k = name.split("_")
         if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
             raise ValueError(f"{name} claims {variable.shape} numbers")
-        packed[int(k), kind + (_MUELLER if first == "mueller" else "")] = variable[:]
-    outline = (period, (low, high), superstrate, header)
-    checksum = _checksum(outline, thin, components, block, packed)
-    if file.sha256 != checksum.encode():
+        key = int(k), kind + (_MUELLER if first == "mueller" else "")
+        packed[key] = variable[:]
+        scale = file.variables[f"kind_{kind}_{k}"].scale_factor
+        unpacked[key] = (packed[key] * scale).astype(np.float32)
+    if file.sha256 != _checksum(outline, packed).encode():
         raise ValueError("its checksum is of another one")
-    unpacked = {
-        key: (numbers * file.variables[f"kind_{key[1][0]}_{key[0]}"].scale_factor).astype(
-            np.float32
-        )
-        for key, numbers in packed.items()
-    }
     bands = tuple(_band(k, unpacked) for k in sorted({k for k, _ in unpacked}))
-    return OrderTable(period, (low, high), bands, superstrate, content, thin, components, block)
+    return OrderTable(**{**outline, "bands": bands, "header": header})
 
 
 def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
@@ -226,15 +208,28 @@ def _band(k: int, arrays: dict[tuple[int, str], NDArray[np.float32]]) -> Band:
     return Band(k, arrays[k, "a"], arrays.get((k, "b")), mueller=tuple(matrices) or None)
 
 
-def _checksum(
-    outline: tuple[float, tuple[float, ...], float, str],
-    thin: bool,
-    components: str,
-    block: float | None,
-    packed: dict[tuple[int, str], NDArray[np.int16]],
-) -> str:
-    """Return the checksum of period, wavelengths, superstrate and header, and the numbers."""
-    content = hashlib.sha256(repr(outline).encode())
+def _outline(file: Any) -> dict[str, Any]:
+    """Return the attributes of an open file as arguments of `OrderTable`; the header as text."""
+    return {
+        "period": float(file.period),
+        "wavelengths": tuple(map(float, file.wavelengths)),
+        "superstrate": float(file.superstrate),
+        "header": _text(file.header),
+        "thin": bool(getattr(file, "thin", False)),
+        "components": _text(getattr(file, "components", GROOVES)),
+        "block": float(file.block) if hasattr(file, "block") else None,
+    }
+
+
+def _text(attribute: str | bytes) -> str:
+    """Return an attribute of a file that is written, or read: bytes then."""
+    return attribute if isinstance(attribute, str) else attribute.decode("utf-8")
+
+
+def _checksum(outline: dict[str, Any], packed: dict[tuple[int, str], NDArray[np.int16]]) -> str:
+    """Return the checksum of a file's outline and numbers."""
+    *always, thin, components, block = outline.values()
+    content = hashlib.sha256(repr(tuple(always)).encode())
     if thin:
         content.update(b"thin")
     if components != GROOVES:
@@ -260,8 +255,7 @@ def _crossed(file: Any) -> CrossedTable:
 
 
 def _crossed_checksum(file: Any, numbers: NDArray[Any]) -> str:
-    header = file.header.encode() if isinstance(file.header, str) else file.header
-    content = hashlib.sha256(header)
+    content = hashlib.sha256(_text(file.header).encode())
     for part in (file.periods, file.wavelengths):
         content.update(np.asarray(part, ">f8").tobytes())
     content.update(np.ascontiguousarray(numbers, ">i2").data)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from ...optics.coat import face_transmittance
 from ...optics.orders import least_c
 from . import blocks, cells
 from .cells import Array
+from .crossed import corner_records
 from .lookup import clamped
 from .polarised import smooth_elements
 from .table import Band, Counts, OrderTable
@@ -82,15 +83,13 @@ def corners(table: OrderTable) -> Corners:
     if table.block:
         within = Counts(*(n - 1 for n in table.bands[0].counts))
         reduced = functools.partial(blocks.reduced, table)
-        return Corners(within, *_stacked(table, lambda *of: _records(reduced(*of), within)))
+        return Corners(within, *_stacked(table, lambda *of: corner_records(reduced(*of))))
     counts = _cells(table)
 
     def records(band: Band, kind: int) -> NDArray[np.float16]:
         of_kind = rows(table, band, kind, counts)
-        parts = [_records(of_kind.within, counts)]
-        if table.superstrate != 1.0:
-            parts.append(_records(of_kind.through, counts))
-        return np.concatenate(parts, axis=-1)
+        parts = of_kind if table.superstrate != 1.0 else of_kind[:1]
+        return np.concatenate([corner_records(part) for part in parts], axis=-1)
 
     return Corners(counts, *_stacked(table, records))
 
@@ -110,14 +109,11 @@ def _stacked(
     table: OrderTable, records: Callable[[Band, int], NDArray[np.float16]]
 ) -> tuple[NDArray[np.uint32], NDArray[np.float16]]:
     """Return the first record of each kind of each band, and all records."""
-    starts, parts, total = [], [], 0
-    for band in table.bands:
-        for kind in (cells.A, cells.B):
-            starts.append(total)
-            if kind == cells.A or band.b is not None:
-                parts.append(records(band, kind))
-                total += len(parts[-1])
-    return np.array(starts, np.uint32), np.concatenate(parts)
+    kinds = [(band, kind) for band in table.bands for kind in range(len(band.kinds))]
+    parts = [records(band, kind) for band, kind in kinds]
+    parts[1:1] = [parts[0][:0]]  # kind B of band 0 has none
+    starts = np.cumsum([0, *map(len, parts[:-1])])
+    return starts.astype(np.uint32), np.concatenate(parts)
 
 
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
@@ -189,25 +185,8 @@ def _cells(table: OrderTable) -> Counts:
     counts, size = (CELLS, 16) if table.superstrate == 1.0 else (CELLS_UNDER_COAT, 32)
     if table.superstrate == 1.0 and all(band.counts == (1, 1, 1) for band in table.bands):
         counts = Counts(1, 1, 1)
-    records = sum(n * (n + 1) for n in _channels(table))
+    ports = (kind.shape[3] for band in table.bands for kind in band.kinds)
+    records = sum(n * (n + 1) for n in ports)
     while size * records * math.prod(counts) > MOST_BYTES and max(counts) > 4:
         counts = Counts(*(max(min(n, 4), 3 * n // 4) for n in counts))
     return counts
-
-
-def _channels(table: OrderTable) -> Iterator[int]:
-    for band in table.bands:
-        yield from (kind.shape[3] for kind in band.kinds)
-
-
-def _records(values: Array, counts: Counts) -> NDArray[np.float16]:
-    """Return records (n, 8) of a grid (τ, ρ, w, j, q)."""
-    whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
-    whole = whole.astype(np.float16)
-    eighths = [
-        whole[i : i + counts.tau, j : j + counts.rho, n : n + counts.w]
-        for i in (0, 1)
-        for j in (0, 1)
-        for n in (0, 1)
-    ]
-    return np.stack(eighths, axis=-1).reshape(-1, 8)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError, warn
 from . import blocks, cells
-from .cells import Array, Cell
+from .cells import Array
 from .polarised import ODD, nearest_pure, smooth_elements
 from .table import GROOVES, S_AND_P, Band, OrderTable
 
@@ -19,6 +19,21 @@ from .table import GROOVES, S_AND_P, Band, OrderTable
 _IN_PLANE = 1e-7
 #: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
 MIN_ANGLE = 1e-4
+
+_OfKind = Callable[[Band, int], NDArray[Any]]
+_Finish = Callable[..., Array]
+
+
+class _Light(NamedTuple):
+    """Light and the order that is looked up, as the parameters of `efficiency`."""
+
+    table: OrderTable
+    x: ArrayLike
+    y: ArrayLike
+    wavelength: ArrayLike
+    order: ArrayLike
+    from_below: bool = False
+    transmitted: bool = False
 
 
 def efficiency(
@@ -49,11 +64,8 @@ def efficiency(
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
     """
-    light = (table, x, y, wavelength, order, from_below, transmitted)
-    if table.block:
-        lit = _lit(table, np.asarray(wavelength, np.float64))
-        return np.asarray(np.where(lit, blocks.efficiency(*light), 0.0))
-    return np.asarray(_stored(*light).mean(axis=-1))
+    light = _Light(table, x, y, wavelength, order, from_below, transmitted)
+    return np.asarray(_values(light, *_ways(table)).mean(axis=-1))
 
 
 def polarised_efficiency(
@@ -74,21 +86,16 @@ def polarised_efficiency(
     coherent sums of the table's components, if a solved table has no Mueller matrices; or as
     `efficiency` does.
     """
-    stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
-    if table.components == S_AND_P:
-        return stored
-    turned = turned_axes(x, y)
-    mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
-    difference = half * turned.cosine
-    conical = np.abs(turned.sine) > _IN_PLANE
-    if np.any(conical & (mean > 0.0)):
+    light = _Light(table, x, y, wavelength, order, from_below, transmitted)
+    mean, difference, sine = _split(light, S_AND_P)
+    if np.any((np.abs(sine) > _IN_PLANE) & (mean > 0.0)):
         if not table.polarised:
             raise DiffractionError(
                 "s and p of light off the plane across the grooves need Mueller matrices; solve "
                 "the profile with polarised=True, or take groove_efficiency: E or B along the "
                 "grooves"
             )
-        difference = difference + turned.sine * mueller(table, x, y, wavelength, order)[..., 0, 2]
+        difference = difference + sine * mueller(table, x, y, wavelength, order)[..., 0, 2]
     difference = np.clip(difference, -mean, mean)
     return np.stack([mean + difference, mean - difference], axis=-1)
 
@@ -111,17 +118,14 @@ def groove_efficiency(
     Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
     p; or as for `efficiency`.
     """
-    stored = _stored(table, x, y, wavelength, order, from_below, transmitted)
-    if table.components == GROOVES:
-        return stored
-    turned = turned_axes(x, y)
-    mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
-    if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
+    light = _Light(table, x, y, wavelength, order, from_below, transmitted)
+    mean, difference, sine = _split(light, GROOVES)
+    if np.any((np.abs(sine) > _IN_PLANE) & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
             "E and B along the grooves would follow"
         )
-    return np.stack([mean + half * turned.cosine, mean - half * turned.cosine], axis=-1)
+    return np.stack([mean + difference, mean - difference], axis=-1)
 
 
 class TurnedAxes(NamedTuple):
@@ -145,22 +149,22 @@ def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
     return TurnedAxes(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
 
 
-def _stored(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    from_below: bool,
-    transmitted: bool,
-) -> Array:
-    """Return the efficiencies of the table's two components, (…, 2)."""
+def _split(light: _Light, components: str) -> tuple[Array, Array, Array]:
+    """Return mean and half difference of an order's efficiencies for two components of the light.
+
+    The difference lacks what phases would add, in proportion to the sine of 2ψ, the last result.
+
+    components : `GROOVES` or `S_AND_P`.
+    """
+    table = light.table
     if table.block:
         raise DiffractionError("a table of a block has unpolarised efficiencies; take efficiency")
-    return _values(
-        table, x, y, wavelength, order, from_below, transmitted, lambda band, kind: band.kind(kind),
-        clamped,
-    )  # fmt: skip
+    stored = _values(light, *_ways(table))
+    mean, half = stored.mean(axis=-1), 0.5 * (stored[..., 0] - stored[..., 1])
+    if table.components == components:
+        return mean, half, np.zeros(())
+    turned = turned_axes(light.x, light.y)
+    return mean, half * turned.cosine, turned.sine
 
 
 def mueller(
@@ -177,31 +181,30 @@ def mueller(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    light = (table, x, y, wavelength, order)
-    elements = _values(*light, False, False, functools.partial(smooth_elements, table), np.asarray)
+    light = _Light(table, x, y, wavelength, order)
+    elements = _values(light, functools.partial(smooth_elements, table), lambda rows, *_: rows)
     factors = np.where(ODD.ravel(), np.asarray(y)[..., None], 1.0)
-    return nearest_pure(
-        (elements * factors).reshape(*elements.shape[:-1], 4, 4), efficiency(*light)
-    )
+    matrices = (elements * factors).reshape(*elements.shape[:-1], 4, 4)
+    return nearest_pure(matrices, efficiency(table, x, y, wavelength, order))
 
 
-def _values(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    from_below: bool,
-    transmitted: bool,
-    of_kind: Callable[[Band, int], NDArray[Any]],
-    finish: Callable[[Array], Array],
-) -> Array:
+def _ways(table: OrderTable) -> tuple[_OfKind, _Finish]:
+    """Return how efficiencies are interpolated, as `_values` takes it."""
+    if table.block:
+        reduced = functools.partial(blocks.reduced, table)
+        return lambda *of: reduced(*of)[..., None], functools.partial(blocks.restored, table)
+    return Band.kind, lambda rows, *_: clamped(rows)
+
+
+def _values(light: _Light, of_kind: _OfKind, finish: _Finish) -> Array:
     """Interpolate values of an order, (…, n), 0 where it does not propagate.
 
     of_kind : values (τ, ρ, w, j, q, n) of a band's kind.
-    finish : applied to the rows (lanes, q, n) of all ports.
+    finish : applied to the rows (lanes, q, n) of all ports; takes their x, y, wavelength, channel
+        and port of incidence, too.
     """
-    if (from_below or transmitted) and not table.thin:
+    table, x, y, wavelength, order, from_below, transmitted = light
+    if (from_below or transmitted) and table.sides == 1:
         raise DiffractionError(
             "this table has reflected light alone; solve the profile with thin for that below"
         )
@@ -210,20 +213,27 @@ def _values(
     x, y, lam = (part.astype(np.float64).ravel() for part in (x, y, lam))
     lit = _lit(table, lam)
     lam = np.maximum(lam, table.wavelengths[0])  # shorter light may have orders beyond all bands
-    cell = cells.to_cell(x, y, lam, table.optical_period)
+    index = table.block or 1.0
+    cell = cells.to_cell(x / index, y / index, lam, table.optical_period)
     w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
     q = cell.channel - m.ravel().astype(np.int64)
     propagates = lit & (cell.channel >= 0) & (q >= 0) & (q < cell.channels)
+    if table.block and not from_below:
+        propagates &= x * x + y * y < 1.0
+    second = from_below != bool(table.block)  # whether the light's ports are the second half
     result = np.zeros((len(x), of_kind(table.bands[0], cells.A).shape[-1]))
-    for k in np.unique(cell.band):
-        for kind in (cells.A, cells.B):
-            here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
-            if len(here):
-                channels = int(k) + 1 - kind
-                values = of_kind(table.bands[k], kind)
-                rows = _polynomial(values, cell, w, here, channels * from_below)
-                port = q[here] + channels * (from_below != transmitted)
-                result[here] = finish(rows)[np.arange(len(here)), port]
+    weights_of = blocks.linear if table.block else cells.interpolation
+    kinds = zip(cell.band[propagates].tolist(), cell.kind[propagates].tolist(), strict=True)
+    for k, kind in sorted({*kinds}):
+        here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
+        channels = k + 1 - kind
+        came = cell.channel[here] + channels * second
+        nodes, places = of_kind(table.bands[k], kind), (cell.tau[here], cell.rho[here], w[here])
+        weights = [weights_of(*pair) for pair in zip(nodes.shape, places, strict=False)]
+        rows = _between(nodes, weights, came)
+        rows = finish(rows, x[here], y[here], lam[here], cell.channel[here], came)
+        left = q[here] + channels * (second != transmitted)
+        result[here] = rows[np.arange(len(here)), left]
     return result.reshape(*shape, result.shape[-1])
 
 
@@ -241,19 +251,13 @@ def _lit(table: OrderTable, wavelength: Array) -> NDArray[np.bool_]:
     return np.asarray(lit)
 
 
-def _polynomial(
-    nodes: NDArray[Any], cell: Cell, w: Array, here: NDArray[np.int64], first: int
-) -> Array:
-    """Return the rows of all ports of some lanes, (lanes, q, n); first : port of channel 0."""
-    weights = [
-        cells.interpolation(count, places[here])
-        for count, places in zip(nodes.shape, (cell.tau, cell.rho, w), strict=False)
-    ]
-    rows = np.empty((len(here), *nodes.shape[4:]))
-    for j in np.unique(cell.channel[here]):
-        lanes = np.flatnonzero(cell.channel[here] == j)
+def _between(nodes: NDArray[Any], weights: list[Array], came: NDArray[np.int64]) -> Array:
+    """Return the rows of all ports (lanes, q, n) for light that came through a port each."""
+    rows = np.empty((len(came), *nodes.shape[4:]))
+    for port in np.unique(came):
+        lanes = np.flatnonzero(came == port)
         of_lanes = [matrix[lanes] for matrix in weights]
-        values = nodes[:, :, :, first + j].astype(np.float64)
+        values = nodes[:, :, :, port].astype(np.float64)
         rows[lanes] = np.einsum("na,nb,nc,abcqs->nqs", *of_lanes, values, optimize=True)
     return rows
 

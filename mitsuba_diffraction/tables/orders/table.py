@@ -74,9 +74,7 @@ class Band:
         """
         if kind == B and self.b is None:
             raise DiffractionError("kind B of band 0 has no propagating order; ask for kind A")
-        values = self.b if kind == B else self.a
-        assert values is not None
-        return values
+        return self.kinds[kind]
 
     @property
     def kinds(self) -> tuple[NDArray[np.float32], ...]:

@@ -11,8 +11,7 @@ from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.slope_ratios import SlopeRatios, Slopes, along
 from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables.build.describe import roughness_of
-from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
+from mitsuba_diffraction.tables.build.describe import roughness_of, slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
 from mitsuba_diffraction.tables.document import document_of, parse_document, plain
 from tests.support.directions import rough_patch

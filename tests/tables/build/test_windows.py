@@ -7,7 +7,6 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
-from mitsuba_diffraction.heights import preprocess, seams
 from mitsuba_diffraction.heights.validity import edge_lines
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
@@ -136,8 +135,6 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     np.testing.assert_array_equal(parts.heights, heights)
     assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
     assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
-    monkeypatch.setattr(preprocess, "LARGE", 1)
-    monkeypatch.setattr(seams, "LARGE", 1)
     level = parts.treated(level="plane")
     assert "RMS change" in level.history[-1]
     lines = edge_lines(parts, 0.4)
