@@ -6,6 +6,7 @@ against `flss`, both compiled by Dr.Jit.
 
 from __future__ import annotations
 
+import functools
 import tempfile
 import time
 from collections.abc import Sequence
@@ -128,7 +129,7 @@ def sweep(
     common: dict[str, Any] = {
         "resolution": resolution, "samples": samples, "gain": gain, "progress": progress,
     }  # fmt: skip
-    maps = [timed_map(s.method, s.light, step=s.step, **common) for s in setups]
+    maps = [timed_map(one, towards, step=step, **common) for one, towards, step in setups]
     return _compare_all(kind, chosen, maps)
 
 
@@ -146,46 +147,31 @@ def timed_map(method: Method, light: LightDirection, **arguments: Any) -> TimedM
     return TimedMap(brdf_map, time.perf_counter() - start)
 
 
-class _Setup(NamedTuple):
-    """Parameters of the map of one value."""
-
-    method: Method
-    light: LightDirection
-    step: float  # between wavelengths, nm
-
-
 def _setups(
     kind: str, values: Sequence[Any], heights: HeightField, light: LightDirection, method: str,
     progress: Progress | None, settings: dict[str, Any],
-) -> list[_Setup]:  # fmt: skip
-    """Return the setup of each value; setups share tables where the parameter allows."""
+) -> list[tuple[Method, LightDirection, float]]:  # fmt: skip
+    """Return method, light and step (nm) of each value; tables are shared where it allows that."""
     step = float(settings.get("step", 5.0))
+    settings = {"build": functools.cache(DiffractionTable.build), "progress": progress} | settings
 
     def build(**changes: Any) -> Method:
         """Build the method with the settings and these changes."""
-        return make(method, heights, progress=progress, **(settings | changes))
+        return make(method, heights, **(settings | changes))
 
     if kind == "method":
         # one coherence for all, so that only the methods differ
-        by_name = make_all(
-            values, heights, progress=progress, **({"coherence": "patch"} | settings)
-        )
-        return [_Setup(by_name[name], light, step) for name in values]
+        settings.setdefault("coherence", "patch")
+        by_name = make_all(values, heights, **settings)
+        return [(by_name[name], light, step) for name in values]
     if kind == "light-angle":
         lights = [LightDirection(float(value), light.phi) for value in values]
         shared = build()
-        return [_Setup(shared, direction, step) for direction in lights]
+        return [(shared, direction, step) for direction in lights]
     if kind == "wavelength-step":
-        finest = build(step=float(min(values)))
-        # the table does not depend on the step
-        if isinstance(finest, FullSpectrum):
-            table, span = finest.table, finest.wavelength_range
-            return [
-                _Setup(FullSpectrum(method, table, span, float(v)), light, float(v)) for v in values
-            ]
-        return [_Setup(build(step=float(v)), light, float(v)) for v in values]
+        return [(build(step=float(v)), light, float(v)) for v in values]
     if kind == "coherence-width":
-        return [_Setup(build(coherence_width=float(v)), light, step) for v in values]
+        return [(build(coherence_width=float(v)), light, step) for v in values]
     if method != "flss":
         raise DiffractionError(
             f"a sweep over terms needs method 'flss', whose series is Taylor's; not '{method}'"
@@ -194,8 +180,7 @@ def _setups(
     assert isinstance(full, FullSpectrum)
     span = full.wavelength_range
     return [
-        _Setup(FullSpectrum("flss", truncated(full.table, v), span, step), light, step)
-        for v in values
+        (FullSpectrum("flss", truncated(full.table, v), span, step), light, step) for v in values
     ]
 
 
@@ -215,12 +200,10 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
 def _compare_all(kind: str, values: Sequence[Any], maps: Sequence[TimedMap]) -> Sweep:
     """Compare all maps with the map of the reference value, if the sweep has one."""
     rule = SWEEPS[kind].reference
-    reference: int | None
-    if rule is None or (rule == "flss" and "flss" not in values):
-        reference = None
-    elif rule == "flss":
-        reference = list(values).index("flss")
-    else:
+    reference: int | None = None
+    if rule in values:
+        reference = values.index(rule)
+    elif rule in ("smallest", "largest"):
         reference = int(np.argmin(values) if rule == "smallest" else np.argmax(values))
     base = None if reference is None else maps[reference].map
     steps = tuple(

@@ -23,7 +23,7 @@ from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated
-from .periods import check_period, estimate_periods, required_period
+from .periods import check_period, required_periods
 
 #: Function that builds a table of a patch, like `DiffractionTable.build`.
 Build = Callable[..., DiffractionTable]
@@ -108,7 +108,7 @@ def make_all(
     def table(**changes: Any) -> DiffractionTable:
         arguments = {
             "coherence_width": width, "tolerance": common.tolerance, "height_scale_max": 1.0,
-            "wavelength_range": common.wavelength_range, "progress": progress,
+            "wavelength_range": tuple(common.wavelength_range), "progress": progress,
             "second_order": False, **changes,
         }  # fmt: skip
         return (build or DiffractionTable.build)(heights, **arguments)
@@ -142,9 +142,11 @@ def _flss(patch: _Patch, name: str) -> FullSpectrum:
 
 def _nmm(patch: _Patch, name: str) -> OrdersOnly:
     settings = patch.settings
+    found = required_periods(patch.heights, name, settings.period)
+    lengths = {period.axis: period.length for period in found}
     return OrdersOnly(
-        _flss(patch, "flss"), _periods(patch.heights, name, settings.period),
-        weights=settings.nmm_weights, specular=settings.specular, name=name,
+        _flss(patch, "flss"), (lengths.get("x"), lengths.get("y")),
+        weights=settings.nmm_weights, specular=settings.specular,
     )  # fmt: skip
 
 
@@ -166,10 +168,8 @@ def _pq(patch: _Patch, name: str) -> Repeated:
 
 def _rainbow(patch: _Patch, name: str) -> Rainbow:
     settings = patch.settings
-    period = required_period(patch.heights, name, settings.period)
-    return Rainbow(
-        period, coherence_width=patch.width, wavelength_range=settings.wavelength_range, name=name
-    )
+    period = required_periods(patch.heights, name, settings.period)[0]
+    return Rainbow(period, coherence_width=patch.width, wavelength_range=settings.wavelength_range)
 
 
 _MAKERS: dict[str, Callable[[_Patch, str], Method]] = {
@@ -177,17 +177,6 @@ _MAKERS: dict[str, Callable[[_Patch, str], Method]] = {
     "rainbow": _rainbow,
 }  # fmt: skip
 NAMES = tuple(_MAKERS)
-
-
-def _periods(
-    heights: HeightField, method: str, period: float | None
-) -> tuple[float | None, float | None]:
-    """Return the periods along x and y, or `None` along an axis without a reliable one."""
-    main = required_period(heights, method, period)
-    if period is None:
-        x, y = (p.length if p.reliable else None for p in estimate_periods(heights))
-        return x, y
-    return (main.length, None) if main.axis == "x" else (None, main.length)
 
 
 def method_map(
