@@ -20,7 +20,7 @@ from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.progressive import pack_solid, pack_surroundings
 from ..glsl.scene import RealtimeScene
 from ..glsl.shader_materials import Diffracting
-from ..glsl.source import plain_source, vertex_source
+from ..glsl.source import plain_source
 from ..glsl.surroundings import flat_shapes
 from ..glsl.texels import Packed, shortened
 from .sections import Sections, converted, packed_array, packed_mesh, packed_parts
@@ -129,7 +129,6 @@ def packed_surroundings(
         ],
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
-        "whole": vertex_source("web", "whole.vert"),
     }, definitions  # fmt: skip
 
 

@@ -49,11 +49,6 @@ class WebTable:
     sections: dict[str, Section]  # compressed textures, by name
     loss: tuple[float, float]  # mean and 99th percentile of ΔE2000 from the exact table
 
-    @property
-    def nbytes(self) -> int:
-        """Number of bytes of the sections."""
-        return sum(len(section.data) for section in self.sections.values())
-
 
 def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
@@ -164,7 +159,11 @@ def fitting_tables(
                 digits = DIGITS - fewer
                 progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
                 rounded_tables[method, number] = web_table(method, table, digits)
-        needed = sum(web.nbytes for web in rounded_tables.values())
+        needed = sum(
+            len(section.data)
+            for web in rounded_tables.values()
+            for section in web.sections.values()
+        )
         if needed <= room:
             return rounded_tables
     return needed

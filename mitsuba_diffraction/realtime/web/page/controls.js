@@ -285,10 +285,9 @@ class Controls {
     const { header } = viewer;
     Object.assign(viewer.camera, new Camera(header.camera, header.subject, header.box));
     viewer.lights.reset();
-    viewer.exposure = 1;
-    viewer.shadows = true;
-    viewer.undress();
-    this.change({ wavelength: null, coherence: 1, material: null, kind: viewer.lights.kinds[0] });
+    const { wavelength, coherence, material, ...others } = PLAIN; // the first need other programs
+    Object.assign(viewer, others);
+    this.change({ wavelength, coherence, material, kind: viewer.lights.kinds[0] });
     this.all();
     this.moved();
   }

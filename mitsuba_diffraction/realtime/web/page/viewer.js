@@ -12,18 +12,25 @@ const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\
 // uniforms of a light without shadows
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
+// The scene as it is: the state that the panel changes.
+const PLAIN = {
+  wavelength: null, // of monochromatic light, nm
+  coherence: 1,     // factor on the coherence width
+  material: null,   // number in the header's materials
+  shadows: true,
+  exposure: 1,
+  heights: 1,
+  turn: 0,          // degrees by which patches are turned
+  pigment: null,    // linear sRGB in place of the pigments beneath
+};
+
 class Viewer {
   constructor(canvas, drawing, header) {
     Object.assign(this, { canvas, drawing, header });
     this.camera = new Camera(header.camera, header.subject, header.box);
     this.lights = new Lights(header, this.camera);
     this.method = header.methods[0];
-    this.wavelength = null; // wavelength of monochromatic light, nm
-    this.shadows = true;
-    this.exposure = 1;
-    this.coherence = 1;   // factor on the coherence width
-    this.material = null; // number in the header's materials
-    this.undress();
+    Object.assign(this, PLAIN);
     this.free = 1;        // share of the width beside the panel
     this.lift = 0;        // share of the height that the panel covers as a sheet below
     this.most = undefined; // number of samples instead of the default
@@ -36,13 +43,6 @@ class Viewer {
     this.dirty = true;
     this.waiting = [];
     this.report = () => {};
-  }
-
-  // Show the scene's surfaces, but for changes that need other programs.
-  undress() {
-    this.heights = 1;
-    this.turn = 0;        // degrees by which patches are turned
-    this.pigment = null;  // linear sRGB in place of the pigments beneath
   }
 
   get enough() {
