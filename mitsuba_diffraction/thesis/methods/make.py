@@ -125,19 +125,14 @@ class _Patch(NamedTuple):
     table: Build
 
 
-def _spectral(patch: _Patch, name: str) -> FullSpectrum:
+def _full(patch: _Patch, name: str) -> FullSpectrum:
     settings = patch.settings
-    powers = patch.table(coherence=settings.coherence or "ensemble")
-    return FullSpectrum(name, powers, settings.wavelength_range, settings.step)
-
-
-def _flss(patch: _Patch, name: str) -> FullSpectrum:
-    settings = patch.settings
-    taylor = patch.table(
-        coherence=settings.coherence or "patch", basis="taylor", terms=settings.terms,
-        taps=settings.taps,
-    )  # fmt: skip
-    return FullSpectrum(name, taylor, settings.wavelength_range, settings.step)
+    coherence, series = "ensemble", {}
+    if name == "flss":
+        coherence = "patch"
+        series = {"basis": "taylor", "terms": settings.terms, "taps": settings.taps}
+    table = patch.table(coherence=settings.coherence or coherence, **series)
+    return FullSpectrum(name, table, settings.wavelength_range, settings.step)
 
 
 def _nmm(patch: _Patch, name: str) -> OrdersOnly:
@@ -145,7 +140,7 @@ def _nmm(patch: _Patch, name: str) -> OrdersOnly:
     found = required_periods(patch.heights, name, settings.period)
     lengths = {period.axis: period.length for period in found}
     return OrdersOnly(
-        _flss(patch, "flss"), (lengths.get("x"), lengths.get("y")),
+        _full(patch, "flss"), (lengths.get("x"), lengths.get("y")),
         weights=settings.nmm_weights, specular=settings.specular,
     )  # fmt: skip
 
@@ -173,7 +168,7 @@ def _rainbow(patch: _Patch, name: str) -> Rainbow:
 
 
 _MAKERS: dict[str, Callable[[_Patch, str], Method]] = {
-    "spectral": _spectral, "flss": _flss, "nmm": _nmm, "pq": _pq, "pq-sinc": _pq,
+    "spectral": _full, "flss": _full, "nmm": _nmm, "pq": _pq, "pq-sinc": _pq,
     "rainbow": _rainbow,
 }  # fmt: skip
 NAMES = tuple(_MAKERS)
