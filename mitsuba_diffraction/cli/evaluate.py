@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
         f"{time.perf_counter() - start:.1f} s"
     )
-    if distance := _distance(args, experiment, result.followed.ridge):
+    if distance := _distance(args, result.followed.ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
@@ -217,22 +217,21 @@ def _write(
     period = more["fitted_period"] if args.period is None else args.period
     with atomic_path(written[0]) as path:
         figure(
-            response, ridge if fit else None, fit, None if math.isnan(period) else period,
+            response, ridge if fit else None, None if math.isnan(period) else period,
             order=args.order, title=experiment.patch.name,
             notes="\n".join(f"{name}: {text}" for name, text in report),
         ).savefig(path, format="png")  # fmt: skip
-    save_csv(written[1], response, ridge, period, args.order)
-    save_npz(written[2], response, ridge, period, args.order, more)
+    save_csv(written[1], ridge, period)
+    save_npz(written[2], ridge, period, more)
 
 
-def _distance(args: argparse.Namespace, experiment: _Experiment, ridge: Ridge) -> str:
+def _distance(args: argparse.Namespace, ridge: Ridge) -> str:
     """Describe how far the ridge is from the period that is given; "" without either."""
     import numpy as np
 
     if args.period is None:
         return ""
-    expected = experiment.beam.grating_angles(experiment.steps, args.period, args.order)
-    apart = np.abs(ridge.angles - expected)
+    apart = np.abs(ridge.angles - ridge.grating_angles(args.period))
     if not np.isfinite(apart).any():
         return ""
     return f"{1e3 * args.period:.6g} nm, the ridge is within {np.nanmax(apart):.2g}° of it"

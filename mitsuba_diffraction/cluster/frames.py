@@ -144,21 +144,18 @@ class Film:
                 Task(files, variant, sensor, preview, film, number, Span(0, len(passes)),
                      tuple(passes), kind, threads)
             )  # fmt: skip
-        self.needed = BYTES_A_PROCESS + self._bytes_of_pass() + self._bytes_of_sums()
+        self.needed = BYTES_A_PROCESS + self._bytes_of_films()
         for line in memory_warnings(client, self.needed):
             warn(line)
 
-    def _bytes_of_pass(self) -> float:
-        pixels = int(np.prod(self.sensor.film().crop_size()))
-        largest = max(each.spp for frame in self.frames for each in frame.passes)
-        return BYTES_A_SAMPLE * pixels * largest
-
-    def _bytes_of_sums(self) -> float:
+    def _bytes_of_films(self) -> float:
+        """Estimate the memory of a pass, and of the sums that a worker holds."""
         film = self.sensor.film()
         channels = film.prepare(integrator_of(self.scene).aov_names())
-        passes = sum(frame.span.count for frame in self.frames)
-        sums = sums_in_worker(passes, len(self.frames))
-        return 4.0 * channels * int(np.prod(film.crop_size())) * sums
+        sums = sums_in_worker(sum(frame.span.count for frame in self.frames), len(self.frames))
+        largest = max(each.spp for frame in self.frames for each in frame.passes)
+        pixels = int(np.prod(film.crop_size()))
+        return pixels * (BYTES_A_SAMPLE * largest + 4.0 * channels * sums)
 
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
         """Yield frame after frame; end early once asked to stop.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
@@ -15,7 +16,7 @@ from ..progress import Progress
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.table import DiffractionTable
-from .tasks import Failed, MissingFiles, SceneFiles, check_versions, failures, versions
+from .tasks import Failed, MissingFiles, check_versions, failures, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
@@ -66,16 +67,8 @@ def build_on_workers(
     return build_with(heights, settings, progress, run), run
 
 
-class HasFiles(Protocol):
-    """Job that needs files."""
-
-    @property
-    def files(self) -> SceneFiles:
-        """Files of the job, known by content."""
-
-
 def run_jobs(
-    client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles]
+    client: Any, work: Callable[..., Any], jobs: Sequence[Any]
 ) -> Iterator[tuple[int, Any]]:
     """Do `work(job, contents)` for each job, and yield its number and result.
 
@@ -85,7 +78,7 @@ def run_jobs(
     ----------
     client : `distributed.Client`, or None to do all here.
     work : raises `MissingFiles` for files that it needs by content.
-    jobs : any.
+    jobs : have `files`, `SceneFiles` that are known by content.
 
     Returns
     -------
@@ -104,19 +97,15 @@ def run_jobs(
                     wait_for_scheduler(client)
                     waiting[client.submit(work, jobs[n], pure=False)] = n
                 elif isinstance(result, MissingFiles):
-                    again = client.submit(work, jobs[n], _contents(jobs[n], result), pure=False)
-                    waiting[again] = n
+                    files, wanted = jobs[n].files.files, set(result.digests)
+                    contents = {d: Path(path).read_bytes() for path, d in files if d in wanted}
+                    waiting[client.submit(work, jobs[n], contents, pure=False)] = n
                 else:
                     yield n, result
             time.sleep(_POLL)
     finally:
         for future in waiting:
             future.cancel()
-
-
-def _contents(job: HasFiles, lacking: MissingFiles) -> Mapping[str, bytes]:
-    wanted = set(lacking.digests)
-    return {d: Path(path).read_bytes() for path, d in job.files.files if d in wanted}
 
 
 class OrderedMap:
@@ -146,12 +135,9 @@ class OrderedMap:
         left = iter(arguments)
         try:
             while True:
-                while len(waiting) < _AHEAD * max(1, len(workers_of(self._client))):
-                    try:
-                        call = work, next(left)
-                    except StopIteration:
-                        break
-                    waiting.append((call, self._submitted(call)))
+                room = _AHEAD * max(1, len(workers_of(self._client))) - len(waiting)
+                for argument in itertools.islice(left, max(0, room)):
+                    waiting.append(((work, argument), self._submitted((work, argument))))
                 if not waiting:
                     return
                 yield self._result(waiting)

@@ -23,6 +23,10 @@ VARIABLE = "DASK_SCHEDULER_ADDRESS"
 PATIENCE = 60.0
 #: Seconds between counts of the workers.
 COUNT_EVERY = 2.0
+_DIED = (
+    "died, as did those before that had the same task; a worker may lack memory, see "
+    "docs/cluster.md"
+)
 GONE = (
     "the scheduler is gone; start it and its workers, and run the same command again, which goes "
     "on from the stored results"
@@ -142,10 +146,7 @@ def executor_of(client: Any) -> Iterator[Executor]:
     try:
         yield client.get_executor()
     except distributed.scheduler.KilledWorker as error:
-        raise DiffractionError(
-            f"worker {error.last_worker.address} died, as did those before that had the same task; "
-            "a worker may lack memory, see docs/cluster.md"
-        ) from error
+        raise DiffractionError(f"worker {error.last_worker.address} {_DIED}") from error
     except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
         raise DiffractionError(GONE) from error
 
@@ -185,11 +186,7 @@ def outcome(future: Any) -> Any:
     except (Failed, MissingFiles) as error:
         return error
     except distributed.scheduler.KilledWorker as error:
-        return Failed(
-            "it died, as did those before that had the same task; a worker may lack memory, see "
-            "docs/cluster.md",
-            error.last_worker.address,
-        )
+        return Failed(f"it {_DIED}", error.last_worker.address)
     except (CancelledError, distributed.client.FutureCancelledError, OSError):
         return None
 

@@ -30,14 +30,7 @@ from .patch import (
     patch_error,
     patch_textures,
 )
-from .sockets import (
-    Socket,
-    array_parameter,
-    common_sockets,
-    height_socket,
-    stretch_socket,
-    window_socket,
-)
+from .sockets import Socket, array_parameter, sockets_of
 from .solved import interpolation_error, order_constants, order_texture
 from .spectrum import NODES, drawn_spectrum
 
@@ -200,10 +193,11 @@ def check_name(name: str, shader: Shader) -> None:
 def shader_of(described: Surface) -> Shader:
     """Return the shader of a surface that `OSL` shows."""
     orders = described.orders
-    return _patch(described) if orders is None else _orders(described, orders)
+    placed = {"Rotation": described.orientation.number, "Pigment": pigment_of(described)}
+    return _patch(described, placed) if orders is None else _orders(described, orders, placed)
 
 
-def _orders(described: Surface, table: OrderTable) -> Shader:
+def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> Shader:
     texture = order_texture(table)
     error = interpolation_error(table, texture)
     return Shader(
@@ -211,17 +205,14 @@ def _orders(described: Surface, table: OrderTable) -> Shader:
         order_formulas(),
         order_constants(table, texture),
         [array_parameter("int", "Starts", texture.starts)],
-        [
-            window_socket(described.coherence_width),
-            *common_sockets(described.orientation.number, pigment_of(described)),
-        ],
+        sockets_of({"CoherenceWidth": described.coherence_width, **placed}),
         {"OrdersFile": texture.pixels},
         str(table),
         {"mean": error.mean, "largest of 99.9 %": error.worst},
     )
 
 
-def _patch(described: Surface) -> Shader:
+def _patch(described: Surface, placed: Mapping[str, Any]) -> Shader:
     table, material = described.patch, described.material
     textures = patch_textures(table)
     index = None
@@ -251,12 +242,15 @@ def _patch(described: Surface) -> Shader:
         patch_formulas(model, described.coat is not None),
         constants,
         [array_parameter("float", name, values) for name, values in arrays.items()],
-        [
-            window_socket(table.coherence_width),
-            height_socket(described.height_scale.number, table.height_scale_max),
-            stretch_socket(described.lateral_scale.number),
-            *common_sockets(described.orientation.number, pigment_of(described)),
-        ],
+        sockets_of(
+            {
+                "CoherenceWidth": table.coherence_width,
+                "HeightScale": described.height_scale.number,
+                "Stretch": described.lateral_scale.number,
+                **placed,
+            },
+            table.height_scale_max,
+        ),
         files,
         f"patch of {table.source.get('name', 'heights')}, {described.text}",
         patch_error(table, textures),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 #: Blender's socket class of each kind of socket, and the type in OSL.
@@ -77,54 +77,53 @@ def array_parameter(kind: str, name: str, rows: Iterable[Any]) -> str:
     return f"{kind} {name}[{len(items)}] = {{{', '.join(items)}}}"
 
 
-def window_socket(coherence_width: float) -> Socket:
-    """Return the socket of the coherence width, µm."""
-    return Socket(
-        "CoherenceWidth", "Coherence Width (µm)", "float", coherence_width,
+#: Sockets of some shaders, with the defaults of sunlight on the heights as they are.
+_SOCKETS = (
+    Socket(
+        "CoherenceWidth", "Coherence Width (µm)", "float", 65.0,
         "Width over which light is coherent, 65 in sunlight. Narrower windows blur the mirror and "
         "the orders: the roughness of their lobes. A small scan limits the orders' width",
-    )  # fmt: skip
-
-
-def height_socket(scale: float, most: float) -> Socket:
-    """Return the socket of the factor on the heights."""
-    return Socket(
-        "HeightScale", "Height Scale", "float", scale,
-        f"Factor on the heights, 0 to {most:g}: the table has no deeper surface",
-    )  # fmt: skip
-
-
-def stretch_socket(scale: float) -> Socket:
-    """Return the socket of the factor on lengths in the patch's plane."""
-    return Socket(
-        "Stretch", "Stretch", "float", scale,
+    ),
+    Socket(
+        "HeightScale", "Height Scale", "float", 1.0,
+        "Factor on the heights, 0 to {most:g}: the table has no deeper surface",
+    ),
+    Socket(
+        "Stretch", "Stretch", "float", 1.0,
         "Factor on the lengths of the patch: colours come nearer to the mirror direction above 1, "
         "and go away from it below",
-    )  # fmt: skip
+    ),
+    Socket(
+        "Rotation", "Rotation (°)", "float", 0.0,
+        "Angle in degrees from the tangent to the x axis of the patch, across the grooves",
+    ),
+    Socket(
+        "Pigment", "Pigment", "color", (0.0, 0.0, 0.0),
+        "Colour beneath, which receives the light that is not reflected; black for metals",
+    ),
+    Socket(
+        "WorkingSpace", "Working Space", "string", "Linear Rec.709",
+        "Working space of the file, Blender's name; Linear Rec.2020 has less noise than Linear "
+        "Rec.709",
+    ),
+    Socket("Normal", "Normal", "normal", "N", "Normal of the surface"),
+    Socket("Tangent", "Tangent", "vector", "dPdu", "Direction of u; link a Tangent node, UV Map"),
+)  # fmt: skip
+#: Sockets that all shaders have.
+_COMMON = ("WorkingSpace", "Normal", "Tangent")
 
 
-def common_sockets(orientation: float, pigment: tuple[float, float, float]) -> list[Socket]:
-    """Return the sockets that all shaders have.
+def sockets_of(defaults: Mapping[str, Any], most: float = 1.0) -> list[Socket]:
+    """Return the sockets with these defaults, by identifier, and those that all shaders have.
 
-    orientation : degrees from the tangent to the patch's x axis.
-    pigment : colour beneath, linear sRGB.
+    most : largest height scale.
     """
     return [
-        Socket(
-            "Rotation", "Rotation (°)", "float", orientation,
-            "Angle in degrees from the tangent to the x axis of the patch, across the grooves",
-        ),
-        Socket(
-            "Pigment", "Pigment", "color", pigment,
-            "Colour beneath, which receives the light that is not reflected; black for metals",
-        ),
-        Socket(
-            "WorkingSpace", "Working Space", "string", "Linear Rec.709",
-            "Working space of the file, Blender's name; Linear Rec.2020 has less noise than Linear "
-            "Rec.709",
-        ),
-        Socket("Normal", "Normal", "normal", "N", "Normal of the surface"),
-        Socket(
-            "Tangent", "Tangent", "vector", "dPdu", "Direction of u; link a Tangent node, UV Map"
-        ),
-    ]  # fmt: skip
+        replace(
+            socket,
+            default=defaults.get(socket.identifier, socket.default),
+            help=socket.help.format(most=most),
+        )
+        for socket in _SOCKETS
+        if socket.identifier in (*defaults, *_COMMON)
+    ]

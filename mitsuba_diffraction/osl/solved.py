@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..optics.orders import least_c
 from ..tables.orders import OrderTable, cells
-from ..tables.orders.grids import leaving_transmittance, rows
+from ..tables.orders.grids import leaving_transmittance, middles, rows
 from ..tables.orders.table import Counts
 from .spectrum import NODES, drawn_spectrum
 
@@ -89,15 +89,11 @@ def interpolation_error(table: OrderTable, texture: OrderTexture) -> Error:
         for kind, _ in enumerate(band.kinds):
             exact = rows(table, band, kind, finer)
             corners = exact.within[::2, ::2, ::2].astype(np.float16).astype(np.float64)
-            for axis in range(3):
-                low, high = (np.take(corners, range(n, corners.shape[axis] - 1 + n), axis)
-                             for n in (0, 1))  # fmt: skip
-                corners = 0.5 * (low + high)
             centre, through = (part[1::2, 1::2, 1::2] for part in exact)
             # transmittance of the face for light of a channel; what cannot leave is never seen
             face = (through / np.maximum(centre, 1e-30)).max(axis=-2)
             face = np.where(face > _TRAPPED, face, 0.0)
-            error = np.abs(corners - centre) * face[..., :, None] * face[..., None, :]
+            error = np.abs(middles(corners) - centre) * face[..., :, None] * face[..., None, :]
             differences.append(error[np.broadcast_to(face[..., :, None] > 0.0, error.shape)])
     joined = np.concatenate(differences)
     return Error(float(joined.mean()), float(np.quantile(joined, 0.999)))

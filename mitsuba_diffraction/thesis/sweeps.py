@@ -6,10 +6,11 @@ against `flss`, both compiled by Dr.Jit.
 
 from __future__ import annotations
 
+import functools
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,17 +55,6 @@ SWEEPS: dict[str, _Kind] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
-    """Map of one value of the parameter, and its difference from the reference."""
-
-    value: Any
-    label: str  # the value with its unit
-    map: BrdfMap
-    seconds: float  # time of the map, without that of tables
-    difference: Difference
-
-
 class Difference(NamedTuple):
     """Difference of a map from the reference over the pixels that the reference lights.
 
@@ -77,6 +67,21 @@ class Difference(NamedTuple):
     delta_e_own_exposure: float = np.nan
     # ΣZ/ΣX over that of the reference, away from the mirror direction's lobe; above 1 is bluer
     blueness: float = np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Map of one value of the parameter, and its difference from the reference."""
+
+    value: Any
+    label: str  # the value with its unit
+    map: BrdfMap
+    seconds: float  # time of the map, without that of tables
+    difference: Difference = field(default_factory=Difference)
+
+    def compared(self, reference: BrdfMap) -> Step:
+        """Return the step with its difference from the map `reference`."""
+        return replace(self, difference=_difference(reference, self.map))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,64 +133,49 @@ def sweep(
     common: dict[str, Any] = {
         "resolution": resolution, "samples": samples, "gain": gain, "progress": progress,
     }  # fmt: skip
-    maps = [timed_map(s.method, s.light, step=s.step, **common) for s in setups]
-    return _compare_all(kind, chosen, maps)
+    steps = [
+        Step(value, label_of(kind, value), *timed_map(one, towards, step=step, **common))
+        for value, (one, towards, step) in zip(chosen, setups, strict=True)
+    ]
+    reference = _reference(SWEEPS[kind].reference, chosen)
+    if reference is None:
+        return Sweep(kind, tuple(steps), None)
+    base = steps[reference]
+    return Sweep(kind, tuple(step.compared(base.map) for step in steps), base.label)
 
 
-class TimedMap(NamedTuple):
-    """A BRDF map and the seconds that it took."""
-
-    map: BrdfMap
-    seconds: float
-
-
-def timed_map(method: Method, light: LightDirection, **arguments: Any) -> TimedMap:
-    """Evaluate a map (arguments as in `methods.method_map`) and time it."""
+def timed_map(method: Method, light: LightDirection, **arguments: Any) -> tuple[BrdfMap, float]:
+    """Evaluate a map (arguments as in `methods.method_map`); return it, and its seconds."""
     start = time.perf_counter()
     brdf_map = method_map(method, light, **arguments)
-    return TimedMap(brdf_map, time.perf_counter() - start)
-
-
-class _Setup(NamedTuple):
-    """Parameters of the map of one value."""
-
-    method: Method
-    light: LightDirection
-    step: float  # between wavelengths, nm
+    return brdf_map, time.perf_counter() - start
 
 
 def _setups(
     kind: str, values: Sequence[Any], heights: HeightField, light: LightDirection, method: str,
     progress: Progress | None, settings: dict[str, Any],
-) -> list[_Setup]:  # fmt: skip
-    """Return the setup of each value; setups share tables where the parameter allows."""
+) -> list[tuple[Method, LightDirection, float]]:  # fmt: skip
+    """Return method, light and step (nm) of each value; tables are shared where it allows that."""
     step = float(settings.get("step", 5.0))
+    settings = {"build": functools.cache(DiffractionTable.build), "progress": progress} | settings
 
     def build(**changes: Any) -> Method:
         """Build the method with the settings and these changes."""
-        return make(method, heights, progress=progress, **(settings | changes))
+        return make(method, heights, **(settings | changes))
 
     if kind == "method":
         # one coherence for all, so that only the methods differ
-        by_name = make_all(
-            values, heights, progress=progress, **({"coherence": "patch"} | settings)
-        )
-        return [_Setup(by_name[name], light, step) for name in values]
+        settings.setdefault("coherence", "patch")
+        by_name = make_all(values, heights, **settings)
+        return [(by_name[name], light, step) for name in values]
     if kind == "light-angle":
         lights = [LightDirection(float(value), light.phi) for value in values]
         shared = build()
-        return [_Setup(shared, direction, step) for direction in lights]
+        return [(shared, direction, step) for direction in lights]
     if kind == "wavelength-step":
-        finest = build(step=float(min(values)))
-        # the table does not depend on the step
-        if isinstance(finest, FullSpectrum):
-            table, span = finest.table, finest.wavelength_range
-            return [
-                _Setup(FullSpectrum(method, table, span, float(v)), light, float(v)) for v in values
-            ]
-        return [_Setup(build(step=float(v)), light, float(v)) for v in values]
+        return [(build(step=float(v)), light, float(v)) for v in values]
     if kind == "coherence-width":
-        return [_Setup(build(coherence_width=float(v)), light, step) for v in values]
+        return [(build(coherence_width=float(v)), light, step) for v in values]
     if method != "flss":
         raise DiffractionError(
             f"a sweep over terms needs method 'flss', whose series is Taylor's; not '{method}'"
@@ -194,8 +184,7 @@ def _setups(
     assert isinstance(full, FullSpectrum)
     span = full.wavelength_range
     return [
-        _Setup(FullSpectrum("flss", truncated(full.table, v), span, step), light, step)
-        for v in values
+        (FullSpectrum("flss", truncated(full.table, v), span, step), light, step) for v in values
     ]
 
 
@@ -212,28 +201,11 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
     )
 
 
-def _compare_all(kind: str, values: Sequence[Any], maps: Sequence[TimedMap]) -> Sweep:
-    """Compare all maps with the map of the reference value, if the sweep has one."""
-    rule = SWEEPS[kind].reference
-    reference: int | None
-    if rule is None or (rule == "flss" and "flss" not in values):
-        reference = None
-    elif rule == "flss":
-        reference = list(values).index("flss")
-    else:
-        reference = int(np.argmin(values) if rule == "smallest" else np.argmax(values))
-    base = None if reference is None else maps[reference].map
-    steps = tuple(
-        compare(value, label_of(kind, value), base, timed)
-        for value, timed in zip(values, maps, strict=True)
-    )
-    return Sweep(kind, steps, None if reference is None else steps[reference].label)
-
-
-def compare(value: Any, label: str, reference: BrdfMap | None, timed: TimedMap) -> Step:
-    """Return the step of a value, compared with the map `reference` if there is one."""
-    difference = Difference() if reference is None else _difference(reference, timed.map)
-    return Step(value, label, timed.map, timed.seconds, difference)
+def _reference(rule: str | None, values: Sequence[Any]) -> int | None:
+    """Return the index of the reference value, if the sweep has one."""
+    if rule in ("smallest", "largest"):
+        return int(np.argmin(values) if rule == "smallest" else np.argmax(values))
+    return values.index(rule) if rule in values else None
 
 
 def label_of(kind: str, value: Any) -> str:

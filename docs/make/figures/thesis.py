@@ -31,7 +31,6 @@ from mitsuba_diffraction.thesis.sweeps import (
     Compiled,
     Step,
     Sweep,
-    compare,
     sweep,
     time_compiled,
     timed_map,
@@ -96,7 +95,7 @@ def _steps(
     result = {}
     for name, method in by_name.items():
         timed = timed_map(method, _LIGHT, step=step, resolution=resolution, samples=samples)
-        result[name] = compare(name, name, reference, timed)
+        result[name] = Step(name, name, *timed).compared(reference)
     return result
 
 

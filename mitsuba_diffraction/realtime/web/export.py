@@ -8,7 +8,7 @@ import html
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from ...optics.display import VIEWS
 from ...progress import Progress, silent
 from ..glsl.emitters import Emitters
 from ..glsl.methods import CONSUMERS
+from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene, Surface, load, read_scene
 from ..glsl.shader_materials import (
     Diffracting,
@@ -33,10 +34,9 @@ from ..glsl.shader_materials import (
 )
 from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
 from ..glsl.texels import Packed
-from .header import Header, SurfaceEntry
 from .light import packed_light, packed_surroundings
 from .material_choices import changeable, named_definitions, packed_materials
-from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
+from .sections import Sections, packed_array, packed_mesh, packed_parts
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
 #: Largest size of a page, bytes.
@@ -114,7 +114,7 @@ def make_page(
             f"the page would have {len(text.encode()) / 1e6:.1f} MB, more than "
             f"{MAX_BYTES / 1e6:.0f}; use fewer triangles or a smaller coherence_width"
         )
-    return Page(text, header.loss, header.left_out, tuple(header.omissions))
+    return Page(text, header["loss"], header["left_out"], tuple(header["omissions"]))
 
 
 def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> Page:
@@ -146,12 +146,14 @@ class Viewer:
         )
 
 
-def _filled(header: Header, data: bytes) -> str:
+def _filled(header: dict[str, Any], data: bytes) -> str:
     """Fill the template of the page."""
+    # "</script" would end the element of the header, and "<!--<script" its end
+    text = json.dumps(header, ensure_ascii=False).replace("<", "\\u003c")
     parts: dict[str, Callable[[], str]] = {
         "style": lambda: _asset("style.css"),
         "script": lambda: "\n".join(_asset(name) for name in _SCRIPTS),
-        "header": header.json,
+        "header": lambda: text,
         "data": lambda: base64.b64encode(data).decode(),
     }
     pieces = []
@@ -174,10 +176,30 @@ def _packed(
     view: str,
     bounces: bool,
     progress: Progress,
-) -> tuple[Header, bytes]:
-    """Return the page's header, and all arrays and pictures, compressed.
+) -> tuple[dict[str, Any], bytes]:
+    """Return the page's header, as JSON types, and all arrays and pictures, compressed.
 
     The last methods are left out if their tables exceed the size of the page.
+
+    The scripts of the page read the header's entries by name:
+
+    light, around : see `light.packed_light` and `light.packed_surroundings`.
+    tables : numbers of each table's sections, by method.
+    octaves, energy_pages : ends of the slider of height scales, and pages of energy scales.
+    background : radiance of the sky, linear sRGB.
+    box, subject : corners of the scene, and of what diffracts.
+    programs : section of the distinct sources; the page replaces LIGHTS_LIT by its light's
+        definitions and appends one of `mains`.
+    vertex, shadow, shown : other sources.
+    loss, left_out, omissions : see `Page`.
+    orders : brightest orders of each table.
+    materials : materials that surfaces can be given.
+    sections : position and layout of each section.
+    surfaces : of each the name; numbers of the sections of its `mesh` and `parts`; whether it
+        `emits` light; the scene's `height_scale`, null where nothing diffracts; number of its
+        `table`; number of its shader's source by method, `programs`, and the same with one of the
+        materials, `named`, empty where it cannot change; number of its `coat` among the materials'
+        parts; and whether it is `pigmented`: diffracts over a diffuse base.
     """
     scene = read_scene(loaded, sensor)
     emitters = Emitters(loaded, scene.middle) if loaded.emitters() else None
@@ -191,7 +213,7 @@ def _packed(
     for n, surface in enumerate(scene.surfaces):
         progress(n, len(scene.surfaces), f"packing {surface.name}")
         common = _common(surface)
-        mesh = sections_of(packed_mesh(surface.vertices), sections.add)
+        mesh = packed_mesh(surface.vertices, sections)
         stored.append((common, mesh, packed_parts(common, sections)))
     light = packed_light(scene, emitters, sections)
     coats = sorted(
@@ -211,6 +233,10 @@ def _packed(
             sources.append(source)
         return sources.index(source)
 
+    stored_tables: dict[str, list[Any]] = {method: [] for method in shown}
+    for (method, _), table in packed.items():
+        parts = packed_parts(table.packed, sections, table.sections)
+        stored_tables[method].append(parts)
     entries = []
     for surface, (common, mesh, parts) in zip(scene.surfaces, stored, strict=True):
         diffraction = surface.material.diffraction
@@ -225,57 +251,53 @@ def _packed(
         }
         given = known if changeable(diffraction) else {}
         entries.append(
-            SurfaceEntry(
-                surface.name,
-                mesh,
-                parts,
-                surface.radiance is not None,
-                described.height_scale.number if described else None,
-                number,
-                {method: program(method, d) for method, d in known.items()},
-                {method: program(method, named_definitions(d)) for method, d in given.items()},
-                coats.index(_coat(surface.material)) if given else 0,
-                described is not None and described.nested is not None,
-            )
+            {
+                "name": surface.name,
+                "mesh": mesh,
+                "parts": parts,
+                "emits": surface.radiance is not None,
+                "height_scale": described.height_scale.number if described else None,
+                "table": number,
+                "programs": {m: program(m, d) for m, d in known.items()},
+                "named": {m: program(m, named_definitions(d)) for m, d in given.items()},
+                "coat": coats.index(_coat(surface.material)) if given else 0,
+                "pigmented": described is not None and described.nested is not None,
+            }
         )
-    count = range(len(tables))
-    header = Header(
-        title=title,
-        surfaces=entries,
-        light=light,
-        around=around,
-        tables={
-            method: [
-                packed_parts(packed[method, n].packed, sections, packed[method, n].sections)
-                for n in count
-            ]
-            for method in shown
-        },
-        methods=shown,
-        omissions=_omissions(scene, emitters),
-        background=_zenith(scene.lighting.sky),
-        camera={
+    joined = json.dumps(sources).encode()
+    programs = sections.add(packed_array(np.frombuffer(joined, np.uint8)[:, None]))
+    data, layouts = sections.joined()
+    header = {
+        "title": title,
+        "surfaces": entries,
+        "light": light,
+        "around": around,
+        "tables": stored_tables,
+        "methods": shown,
+        "omissions": _omissions(scene, emitters),
+        "background": _zenith(scene.lighting.sky),
+        "camera": {
             "to_world": scene.camera.to_world.tolist(),
             "fov": scene.camera.fov,
             "size": list(scene.camera.size),
             "offset": list(scene.camera.offset),
         },
-        box=[scene.low.tolist(), scene.high.tolist()],
-        subject=[x.tolist() for x in scene.subject],
-        programs=sections.add(
-            packed_array(np.frombuffer(json.dumps(sources).encode(), np.uint8)[:, None])
-        ),
-        shown=_display(view),
-        loss={method: _worst([packed[method, n].loss for n in count]) for method in shown},
-        left_out=left_out,
-        orders=[strongest_orders(table.described) for table in tables],
-        sections=[],
-        octaves=(OCTAVES[0], OCTAVES[-1]),
-        energy_pages=len(OCTAVES),
-        materials=materials,
-    )
-    data, layouts = sections.joined()
-    return replace(header, sections=layouts), data
+        "box": [scene.low.tolist(), scene.high.tolist()],
+        "subject": [x.tolist() for x in scene.subject],
+        "programs": programs,
+        "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
+        "vertex": vertex_source("web"),
+        "shadow": plain_source("position.frag", dialect="web"),
+        "shown": _display(view),
+        "loss": {m: _worst([packed[m, n].loss for n in range(len(tables))]) for m in shown},
+        "left_out": left_out,
+        "orders": [strongest_orders(table.described) for table in tables],
+        "sections": layouts,
+        "octaves": (OCTAVES[0], OCTAVES[-1]),
+        "energy_pages": len(OCTAVES),
+        "materials": materials,
+    }
+    return header, data
 
 
 def _coat(material: Material) -> float:

@@ -6,8 +6,7 @@ The surroundings are an environment, shapes that emit light, and data to look th
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,10 @@ from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.progressive import pack_solid, pack_surroundings
 from ..glsl.scene import RealtimeScene
 from ..glsl.shader_materials import Diffracting
-from ..glsl.source import plain_source, vertex_source
+from ..glsl.source import plain_source
 from ..glsl.surroundings import flat_shapes
 from ..glsl.texels import Packed, shortened
-from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
+from .sections import Sections, converted, packed_array, packed_mesh, packed_parts
 
 #: Number of lights in the sequence; their mean is the scene's light.
 SAMPLES = 256
@@ -44,7 +43,7 @@ def packed_light(
     """
     lights = scene.lighting.lights
     sequence = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
-    if len({id(light) for light in sequence}) < len(sequence) and _equal(sequence):
+    if len({(s.place.tobytes(), np.asarray(s.spectrum).tobytes()) for s in sequence}) == 1:
         sequence = sequence[:1]
     spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*lights, *sequence]]
     values = np.stack(spectra) if spectra else None
@@ -72,15 +71,6 @@ def _described(light: Lamp, spectrum: int) -> dict[str, Any]:
         "name": light.name, "spectrum": spectrum, "cone": list(light.cone or (0.0, 0.0)),
         **{n: np.round(getattr(light, n), 7).tolist() for n in ("place", "colour", "axis")},
     }  # fmt: skip
-
-
-def _equal(lights: Sequence[Lamp]) -> bool:
-    """Return whether all lights are equal."""
-    first = lights[0]
-    return all(
-        np.array_equal(light.place, first.place) and np.array_equal(light.spectrum, first.spectrum)
-        for light in lights
-    )
 
 
 def _owner(light: Lamp, lights: Sequence[Lamp]) -> int:
@@ -134,13 +124,11 @@ def packed_surroundings(
         "parts": packed_parts(_coarser(packed | solid), sections),
         "lobes": [packed_parts(part, sections) for part in lobes],
         "emitting": [
-            {"mesh": sections_of(packed_mesh(glow.vertices), sections.add),
-             "radiance": glow.radiance.tolist()}
+            {"mesh": packed_mesh(glow.vertices, sections), "radiance": glow.radiance.tolist()}
             for glow in scene.emitting
         ],
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
-        "whole": vertex_source("web", "whole.vert"),
     }, definitions  # fmt: skip
 
 
@@ -149,14 +137,12 @@ def _coarser(packed: Packed) -> Packed:
 
     Rays step by less than before, hence meet the same obstacles.
     """
-    textures = []
-    for texture in packed.textures:
-        if texture.name == "obstacles":
-            steps = texture.data.astype(np.int64)
-            steps -= steps % (1 << np.maximum(np.frexp(steps)[1] - 3, 0))
-            texture = replace(texture, data=steps.astype(np.uint8))
-        textures.append(texture)
-    return replace(packed, textures=tuple(textures))
+
+    def rounded(obstacles: NDArray[Any]) -> NDArray[np.uint8]:
+        steps = obstacles.astype(np.int64)
+        return (steps - steps % (1 << np.maximum(np.frexp(steps)[1] - 3, 0))).astype(np.uint8)
+
+    return converted(packed, {"obstacles": rounded})
 
 
 def _lobes(surface: Diffracting) -> Packed:
@@ -164,10 +150,4 @@ def _lobes(surface: Diffracting) -> Packed:
 
     Rounding adds no bias: shaders divide by the rounded densities.
     """
-    packed = surface.lobes()
-    rounding: dict[str, Callable[[Any], Any]] = {
-        "lobe_places": np.float16,
-        "lobe_densities": shortened,
-    }
-    textures = [replace(t, data=rounding[t.name](t.data)) for t in packed.textures]
-    return replace(packed, textures=tuple(textures))
+    return converted(surface.lobes(), {"lobe_places": np.float16, "lobe_densities": shortened})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,28 +12,12 @@ from ...plugin.conductors import tabulated_index
 from ..glsl.packing import pack_conductor
 from ..glsl.shader_materials import Diffracting
 from ..glsl.texels import Packed, Texture, as_half
-from .sections import Section, Sections, as_columns, packed_array, packed_parts
+from .sections import Sections, as_columns, packed_array, packed_parts
 
 #: Names as authors write them, by the tables' names; of two spellings the first.
 NAMES = {name: name for name in TISSUES} | {
     symbol: name for name, symbol in reversed(METALS.items())
 }
-
-
-@dataclass(frozen=True)
-class MaterialEntry:
-    """Material in the page's header.
-
-    Attributes
-    ----------
-    name : name in the vocabulary.
-    absorbs : whether light that is not reflected is absorbed, and none reaches a base beneath.
-    parts : numbers of its sections, for each index of `coats`.
-    """
-
-    name: str
-    absorbs: bool
-    parts: list[dict[str, Any]]
 
 
 def changeable(surface: Diffracting | None) -> bool:
@@ -49,10 +32,15 @@ def named_definitions(definitions: dict[str, str]) -> dict[str, str]:
     return {**others, "SURFACE_KIND": "2"}
 
 
-def packed_materials(coats: Sequence[float], sections: Sections) -> list[MaterialEntry]:
-    """Pack all materials in air.
+def packed_materials(coats: Sequence[float], sections: Sections) -> list[dict[str, Any]]:
+    """Pack all materials in air for the page's header, as JSON types.
 
     coats : indices of the layers above the structures, 1 without one.
+
+    Returns
+    -------
+    For each material its name in the vocabulary; whether it absorbs light that is not reflected, so
+    that none reaches a base beneath; and parts, the numbers of its sections for each of `coats`.
     """
     if not coats:
         return []
@@ -65,16 +53,9 @@ def packed_materials(coats: Sequence[float], sections: Sections) -> list[Materia
             packed = pack_conductor(wavelengths, index.real / coat, index.imag / coat)
             (texture,) = packed.textures
             half = Texture(texture.name, as_half(texture.data.astype(np.float32)))
-            parts.append(
-                packed_parts(
-                    Packed((half,), packed.uniforms), sections, {half.name: _section(half)}
-                )
-            )
-        entries.append(MaterialEntry(name, absorbs, parts))
+            # numbers that differ little from one texel to the next
+            bits = as_columns(half.data, half.data.shape[2]).view(np.uint16)
+            section = {half.name: packed_array(bits, differences=True)}
+            parts.append(packed_parts(Packed((half,), packed.uniforms), sections, section))
+        entries.append({"name": name, "absorbs": absorbs, "parts": parts})
     return entries
-
-
-def _section(texture: Texture) -> Section:
-    """Compress half floats that differ little from one texel to the next."""
-    bits = as_columns(texture.data, texture.data.shape[2]).view(np.uint16)
-    return packed_array(bits, differences=True)

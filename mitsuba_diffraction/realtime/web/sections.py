@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -88,18 +88,11 @@ def packed_series(rows: NDArray[np.float16 | np.uint32]) -> Section:
     return Section(section.data, {**section.layout, "series": "words" if words else "half"})
 
 
-def packed_file(data: bytes) -> Section:
-    """Return a file of a format that browsers read as a section."""
-    return Section(data, {"kind": "file"})
-
-
 def as_columns(data: Any, width: int) -> Any:
     """Arrange a texture's numbers in rows of a given width; the last row is padded with zeros."""
     flat = data.reshape(-1)
     missing = -len(flat) % width
-    if missing:
-        flat = np.concatenate([flat, np.zeros(missing, flat.dtype)])
-    return flat.reshape(-1, width)
+    return (np.pad(flat, (0, missing)) if missing else flat).reshape(-1, width)
 
 
 class Sections:
@@ -129,31 +122,24 @@ class Sections:
         return b"".join(part.data for part in self._parts), layouts
 
 
-@dataclass(frozen=True)
-class Mesh:
-    """Encoded triangles of a surface."""
+def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, Any]:
+    """Encode vertices (n, 17) with attributes of `glsl.scene.VERTEX`, three to a triangle.
 
-    # (vertices, n) sixteen-bit attributes of every distinct vertex
-    columns: NDArray[np.uint16]
-    corners: NDArray[np.uint32]  # (3 · triangles, 1) indices of vertices
-    # (triangles, 2) tangents, if each triangle has one; otherwise they are in `columns`
-    tangents: NDArray[np.int16] | None
-    # columns of each attribute, as JSON types; a constant attribute has its value instead
-    layout: dict[str, Any] = field(default_factory=dict)
+    Returns
+    -------
+    JSON types for the page's header, with numbers of sections:
 
-
-def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
-    """Encode vertices (n, 17) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
-    parts: dict[str, NDArray[np.float32]] = {}
-    start = 0
-    for name, size in VERTEX:
-        parts[name] = vertices[:, start : start + size]
-        start += size
+    columns : (vertices, n) sixteen-bit attributes of every distinct vertex.
+    corners : (3 · triangles, 1) indices of vertices.
+    tangents : (triangles, 2), if each triangle has one; otherwise they are in `columns`.
+    layout : columns of each attribute; a constant attribute has its value instead.
+    """
+    names, sizes = zip(*VERTEX, strict=True)
+    parts = dict(zip(names, np.split(vertices, np.cumsum(sizes)[:-1], axis=1), strict=True))
     tangents = octahedral(parts.pop("tangent"))
     by_triangle = tangents.reshape(-1, 3, 2)
     flat = bool(np.all(by_triangle == by_triangle[:, :1]))
-    normals = octahedral(parts.pop("normal"))
-    columns = [normals.view(np.uint16)]
+    columns = [octahedral(parts.pop("normal")).view(np.uint16)]
     layout: dict[str, Any] = {"normal": {"column": 0}}
     width = 2
     if not flat:
@@ -170,21 +156,12 @@ def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
         columns.append(np.round((values - low) / steps).astype(np.uint16))
         layout[name] = {"column": width, "low": low.tolist(), "step": steps.tolist()}
         width += values.shape[1]
-    rows = np.concatenate(columns, axis=1)
-    distinct, corners = _distinct(rows)
-    return Mesh(distinct, corners[:, None], by_triangle[:, 0] if flat else None, layout)
-
-
-def sections_of(mesh: Mesh, add: Any) -> dict[str, Any]:
-    """Return a mesh for the page's header; `add` stores a section and returns its number."""
-    return {
-        "columns": add(packed_array(mesh.columns, differences=True)),
-        "corners": add(packed_array(mesh.corners, differences=True)),
-        "tangents": None
-        if mesh.tangents is None
-        else add(packed_array(mesh.tangents, differences=True)),
-        "layout": mesh.layout,
-    }
+    distinct, corners = _distinct(np.concatenate(columns, axis=1))
+    arrays: dict[str, Any] = {"columns": distinct, "corners": corners[:, None]}
+    if flat:
+        arrays["tangents"] = by_triangle[:, 0]
+    stored = {n: sections.add(packed_array(a, differences=True)) for n, a in arrays.items()}
+    return {"tangents": None, **stored, "layout": layout}
 
 
 def octahedral(directions: NDArray[np.floating]) -> NDArray[np.int16]:
@@ -216,6 +193,13 @@ def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.
     return rows[first[order]], rank[inverse.ravel()]
 
 
+def converted(packed: Packed, functions: Mapping[str, Callable[[Any], Any]]) -> Packed:
+    """Apply functions to the data of the textures that they are named by."""
+    textures = [replace(t, data=functions[t.name](t.data)) if t.name in functions else t
+                for t in packed.textures]  # fmt: skip
+    return replace(packed, textures=tuple(textures))
+
+
 def packed_parts(
     packed: Packed, sections: Sections, compressed: Mapping[str, Section] | None = None
 ) -> dict[str, Any]:
@@ -235,17 +219,14 @@ def _texture(texture: Texture, sections: Sections, section: Section | None) -> d
         "smooth": texture.smooth,
     }  # fmt: skip
     if texture.name == "colour_map":
-        entry["kind"] = "picture"
-        entry["section"] = sections.add(packed_file(_picture(texture.data)))
-        return entry
+        picture = Section(_picture(texture.data), {"kind": "file"})
+        return entry | {"kind": "picture", "section": sections.add(picture)}
     data = texture.data
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
     if data.dtype == np.uint32:
         entry["kind"] = "words"
-    if section is None:
-        section = packed_array(as_columns(data, channels))
-    entry["section"] = sections.add(section)
-    return entry
+    section = section or packed_array(as_columns(data, channels))
+    return entry | {"section": sections.add(section)}
 
 
 def _picture(data: NDArray[np.generic]) -> bytes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from ...plugin.description import Surface
 from ...progress import Progress
 from ...tables.colour.table import colour_difference, power_colour_difference
 from ...tables.orders import OrderTable, cells
-from ...tables.orders.grids import rows, wavelength_of
+from ...tables.orders.grids import middles, rows, wavelength_of
 from ...tables.orders.table import Counts
 from ...tables.powers import power_series
 from ...tables.store import cached_colours
@@ -24,7 +23,7 @@ from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import MOST_WITHIN, cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
-from .sections import Section, as_columns, packed_array, packed_series
+from .sections import Section, as_columns, converted, packed_array, packed_series
 
 #: Methods that a page supports.
 WEB_METHODS = ("fast", "exact")
@@ -50,11 +49,6 @@ class WebTable:
     sections: dict[str, Section]  # compressed textures, by name
     loss: tuple[float, float]  # mean and 99th percentile of ΔE2000 from the exact table
 
-    @property
-    def nbytes(self) -> int:
-        """Number of bytes of the sections."""
-        return sum(len(section.data) for section in self.sections.values())
-
 
 def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
@@ -78,19 +72,9 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 
-class Rounded(NamedTuple):
-    """Table in fewer digits.
-
-    Attributes
-    ----------
-    packed : textures, uniforms and definitions.
-    loss : ΔE2000 (n,) from the exact table.
-    width : numbers in a row of large textures.
-    """
-
-    packed: Packed
-    loss: NDArray[np.float64]
-    width: int
+#: Table in fewer digits: textures, uniforms and definitions; ΔE2000 (n,) from the exact table; and
+#: numbers in a row of large textures.
+Rounded = tuple[Packed, NDArray[np.float64], int]
 
 
 def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
@@ -102,7 +86,7 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
         fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
         # a word has two numbers
         width = fewer.coefficients.shape[-1] // 2
-        return Rounded(pack_colours(fewer), colour_difference(colours, fewer), width)
+        return pack_colours(fewer), colour_difference(colours, fewer), width
     series, order_0, scale, expansion = power_series(table)
     powers = replace(
         table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
@@ -111,7 +95,7 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
     less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
     packed = pack_powers(less)
     width = 4 * int(packed.definitions["TEXELS"])
-    return Rounded(packed, power_colour_difference(powers, less), width)
+    return packed, power_colour_difference(powers, less), width
 
 
 def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounded:
@@ -119,14 +103,12 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
     packed = pack_orders(method, table, sigma, _ORDER_BYTES)
     counts = cells_within(table, _ORDER_BYTES)
     width = 4 * (counts.rho + 1)
-    textures = [
-        replace(t, data=rounded(as_columns(t.data, width), digits, FLOOR).reshape(t.data.shape))
-        if t.name == "efficiencies"
-        else t
-        for t in packed.textures
-    ]
-    loss = _solved_loss(table, counts, digits)
-    return Rounded(replace(packed, textures=tuple(textures)), loss, width)
+
+    def fewer(data: NDArray[np.floating]) -> NDArray[np.float16]:
+        return rounded(as_columns(data, width), digits, FLOOR).reshape(data.shape)
+
+    less = converted(packed, {"efficiencies": fewer})
+    return less, _solved_loss(table, counts, digits), width
 
 
 def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.float64]:
@@ -137,17 +119,12 @@ def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.f
         fine = rows(table, band, cells.A, Counts(*(2 * n for n in counts)))
         nodes = np.minimum(fine.within, MOST_WITHIN)[::2, ::2, ::2]
         lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
-        for axis in range(3):
-            lower, upper = (
-                np.moveaxis(lines, axis, 0)[part] for part in (slice(-1), slice(1, None))
-            )
-            lines = np.moveaxis(0.5 * (lower + upper), 0, axis)
         exact, face = (values[1::2, 1::2, 1::2] for values in fine)
         rho, w = ((np.arange(n) + 0.5) / n for n in (counts.rho, counts.w))
         lam = wavelength_of(table, (band.k + cells.sine_squared(rho))[:, None], w)
         colours = linear_srgb(response(lam.ravel())).reshape(*lam.shape, 1, 1, 3)
         passed = (face / np.maximum(exact, 1e-12))[..., None] * colours
-        difference = delta_e(exact[..., None] * passed, lines[..., None] * passed)
+        difference = delta_e(exact[..., None] * passed, middles(lines)[..., None] * passed)
         losses.append(difference[np.isfinite(difference)])
     return np.concatenate(losses)
 
@@ -182,7 +159,11 @@ def fitting_tables(
                 digits = DIGITS - fewer
                 progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
                 rounded_tables[method, number] = web_table(method, table, digits)
-        needed = sum(web.nbytes for web in rounded_tables.values())
+        needed = sum(
+            len(section.data)
+            for web in rounded_tables.values()
+            for section in web.sections.values()
+        )
         if needed <= room:
             return rounded_tables
     return needed

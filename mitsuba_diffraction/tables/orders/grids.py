@@ -78,6 +78,14 @@ class Rows(NamedTuple):
     through: Array
 
 
+def middles(nodes: NDArray[Any]) -> NDArray[Any]:
+    """Interpolate values at the corners of cells (τ, ρ, w, …) linearly to the cells' middles."""
+    for axis in range(3):
+        along = np.moveaxis(nodes, axis, 0)
+        nodes = np.moveaxis(0.5 * (along[:-1] + along[1:]), 0, axis)
+    return nodes
+
+
 def corners(table: OrderTable) -> Corners:
     """Resample a table for the renderer; a block's has even nodes, and reduced efficiencies."""
     if table.block:

@@ -23,7 +23,7 @@ from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated
-from .periods import check_period, estimate_periods, required_period
+from .periods import check_period, required_periods
 
 #: Function that builds a table of a patch, like `DiffractionTable.build`.
 Build = Callable[..., DiffractionTable]
@@ -108,7 +108,7 @@ def make_all(
     def table(**changes: Any) -> DiffractionTable:
         arguments = {
             "coherence_width": width, "tolerance": common.tolerance, "height_scale_max": 1.0,
-            "wavelength_range": common.wavelength_range, "progress": progress,
+            "wavelength_range": tuple(common.wavelength_range), "progress": progress,
             "second_order": False, **changes,
         }  # fmt: skip
         return (build or DiffractionTable.build)(heights, **arguments)
@@ -125,26 +125,23 @@ class _Patch(NamedTuple):
     table: Build
 
 
-def _spectral(patch: _Patch, name: str) -> FullSpectrum:
+def _full(patch: _Patch, name: str) -> FullSpectrum:
     settings = patch.settings
-    powers = patch.table(coherence=settings.coherence or "ensemble")
-    return FullSpectrum(name, powers, settings.wavelength_range, settings.step)
-
-
-def _flss(patch: _Patch, name: str) -> FullSpectrum:
-    settings = patch.settings
-    taylor = patch.table(
-        coherence=settings.coherence or "patch", basis="taylor", terms=settings.terms,
-        taps=settings.taps,
-    )  # fmt: skip
-    return FullSpectrum(name, taylor, settings.wavelength_range, settings.step)
+    coherence, series = "ensemble", {}
+    if name == "flss":
+        coherence = "patch"
+        series = {"basis": "taylor", "terms": settings.terms, "taps": settings.taps}
+    table = patch.table(coherence=settings.coherence or coherence, **series)
+    return FullSpectrum(name, table, settings.wavelength_range, settings.step)
 
 
 def _nmm(patch: _Patch, name: str) -> OrdersOnly:
     settings = patch.settings
+    found = required_periods(patch.heights, name, settings.period)
+    lengths = {period.axis: period.length for period in found}
     return OrdersOnly(
-        _flss(patch, "flss"), _periods(patch.heights, name, settings.period),
-        weights=settings.nmm_weights, specular=settings.specular, name=name,
+        _full(patch, "flss"), (lengths.get("x"), lengths.get("y")),
+        weights=settings.nmm_weights, specular=settings.specular,
     )  # fmt: skip
 
 
@@ -166,28 +163,15 @@ def _pq(patch: _Patch, name: str) -> Repeated:
 
 def _rainbow(patch: _Patch, name: str) -> Rainbow:
     settings = patch.settings
-    period = required_period(patch.heights, name, settings.period)
-    return Rainbow(
-        period, coherence_width=patch.width, wavelength_range=settings.wavelength_range, name=name
-    )
+    period = required_periods(patch.heights, name, settings.period)[0]
+    return Rainbow(period, coherence_width=patch.width, wavelength_range=settings.wavelength_range)
 
 
 _MAKERS: dict[str, Callable[[_Patch, str], Method]] = {
-    "spectral": _spectral, "flss": _flss, "nmm": _nmm, "pq": _pq, "pq-sinc": _pq,
+    "spectral": _full, "flss": _full, "nmm": _nmm, "pq": _pq, "pq-sinc": _pq,
     "rainbow": _rainbow,
 }  # fmt: skip
 NAMES = tuple(_MAKERS)
-
-
-def _periods(
-    heights: HeightField, method: str, period: float | None
-) -> tuple[float | None, float | None]:
-    """Return the periods along x and y, or `None` along an axis without a reliable one."""
-    main = required_period(heights, method, period)
-    if period is None:
-        x, y = (p.length if p.reliable else None for p in estimate_periods(heights))
-        return x, y
-    return (main.length, None) if main.axis == "x" else (None, main.length)
 
 
 def method_map(

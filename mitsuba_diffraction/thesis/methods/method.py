@@ -22,6 +22,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -168,17 +169,12 @@ class Method(ABC):
                     progress(done + 1, len(starts), f"evaluating {self.name}")
         return result
 
-    def linear_srgb(
-        self,
-        wi: ArrayLike,
-        wo: ArrayLike,
-        *,
-        gain: Gain | None = None,
-        progress: Progress | None = None,
-    ) -> Array:
-        """Return `xyz` in linear sRGB, (n, 3); components outside the gamut are negative."""
-        xyz = self.xyz(wi, wo, gain=gain, progress=progress)
-        return np.asarray(linear_srgb(xyz), np.float64)
+    def linear_srgb(self, wi: ArrayLike, wo: ArrayLike, **options: Any) -> Array:
+        """Return `xyz` in linear sRGB, (n, 3); components outside the gamut are negative.
+
+        options : of `xyz`.
+        """
+        return np.asarray(linear_srgb(self.xyz(wi, wo, **options)), np.float64)
 
     def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
         """Return X, Y, Z of pairs above the surface."""
@@ -284,11 +280,8 @@ def trapezoid_rule(
     nodes = low + step * np.arange(count + 1, dtype=np.float64)
     if high - nodes[-1] > 1e-9 * high:
         nodes = np.append(nodes, high)
-    gaps = np.diff(nodes)
-    weights = np.zeros(len(nodes))
-    weights[:-1] += 0.5 * gaps
-    weights[1:] += 0.5 * gaps
-    return nodes, weights
+    ends = np.concatenate([nodes[:1], nodes, nodes[-1:]])
+    return nodes, 0.5 * (ends[2:] - ends[:-2])
 
 
 class FullSpectrum(UniformMethod):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +55,8 @@ class OrdersOnly(Method):
     specular : ε, or `None` for the default.
     """
 
+    name = "nmm"
+
     def __init__(
         self,
         full: FullSpectrum,
@@ -63,12 +64,11 @@ class OrdersOnly(Method):
         *,
         weights: str = "step",
         specular: float | None = None,
-        name: str = "nmm",
     ) -> None:
         check_choice("weights", weights, WEIGHTS)
         if periods[0] is None and periods[1] is None:
             raise DiffractionError("method 'nmm' needs a period along x or y; give one in µm")
-        self.name, self.full, self.periods, self.weighting = name, full, periods, weights
+        self.full, self.periods, self.weighting = full, periods, weights
         self.sigma, self.wavelength_range = full.sigma, full.wavelength_range
         longest = float(wavenumber(full.wavelength_range[1]))
         self.specular = GLOSSY_RADIUS / (full.sigma * longest) if specular is None else specular
@@ -93,9 +93,8 @@ class OrdersOnly(Method):
         u, v, _ = diffraction_coordinates(wi, wo)
         for period, frequency in zip(self.periods, (u, v), strict=True):
             if period is not None:
-                for order in _orders(period, frequency, self.wavelength_range):
-                    width = self._width(order.wavelength, frequency)
-                    yield order.wavelength, np.where(order.in_range, width, 0.0)
+                for _, lam, in_range in _orders(period, frequency, self.wavelength_range):
+                    yield lam, np.where(in_range, self._width(lam, frequency), 0.0)
 
     def _sampled(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
         """Return whether a λₙ is within half a step, or the pair is near the mirror direction."""
@@ -116,24 +115,19 @@ class OrdersOnly(Method):
         return 1e-3 * wavelength**2 / (2.0 * math.sqrt(math.pi) * self.sigma * slope)
 
 
-class _Order(NamedTuple):
-    """Order n of a period, its wavelengths λₙ (n,) in nm, and whether they are in the range."""
-
-    n: int
-    wavelength: Array
-    in_range: NDArray[np.bool_]
-
-
 def _orders(
     period: float, frequency: Array, wavelength_range: tuple[float, float]
-) -> Iterator[_Order]:
-    """Yield the orders of a period in µm at frequencies (n,)."""
+) -> Iterator[tuple[int, Array, NDArray[np.bool_]]]:
+    """Yield the orders of a period in µm at frequencies (n,).
+
+    Each is the order n, its wavelengths λₙ (n,) in nm, and whether they are in the range.
+    """
     low, high = wavelength_range
     path = 1e3 * period * np.abs(frequency)  # λ₁, nm
     for n in range(1, math.floor(path.max(initial=0.0) / low) + 1):
         wavelength = path / n
         in_range = (low <= wavelength) & (wavelength <= high)
-        yield _Order(n, np.where(in_range, wavelength, high), in_range)
+        yield n, np.where(in_range, wavelength, high), in_range
 
 
 class Repeated(UniformMethod):
@@ -245,16 +239,16 @@ class Rainbow(Method):
     wavelength_range : nm.
     """
 
+    name = "rainbow"
+
     def __init__(
         self,
         period: Period,
         *,
         coherence_width: float = 65.0,
         wavelength_range: tuple[float, float] = (380.0, 780.0),
-        name: str = "rainbow",
     ) -> None:
-        self.name, self.period = name, period
-        self.sigma = sigma_of(coherence_width)
+        self.period, self.sigma = period, sigma_of(coherence_width)
         self.wavelength_range = wavelength_range
         self._density = 2.0 * math.sqrt(math.pi) * self.sigma / period.length
 
@@ -271,8 +265,8 @@ class Rainbow(Method):
     def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
         """Yield λₙ and the gaps between them, λₙ²/(d|u|)."""
         frequency = self._frequency(wi, wo)
-        for order in _orders(self.period.length, frequency, self.wavelength_range):
-            yield order.wavelength, np.where(order.in_range, order.wavelength / order.n, 0.0)
+        for n, lam, in_range in _orders(self.period.length, frequency, self.wavelength_range):
+            yield lam, np.where(in_range, lam / n, 0.0)
 
     def relative(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None

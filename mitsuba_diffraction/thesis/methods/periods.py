@@ -57,23 +57,21 @@ def estimate_periods(field: HeightField) -> tuple[Period, Period]:
     return periods[0], periods[1]
 
 
-def main_period(field: HeightField) -> Period:
-    """Return the estimate with the greater confidence; that along x if they are equal."""
-    along_x, along_y = estimate_periods(field)
-    return along_y if along_y.confidence > along_x.confidence else along_x
+def required_periods(field: HeightField, method: str, period: float | None) -> list[Period]:
+    """Return the user's period, along the axis of greater confidence, or all reliable estimates.
 
-
-def required_period(field: HeightField, method: str, period: float | None) -> Period:
-    """Return the user's period (along the main axis), or else the estimate if it is reliable."""
-    estimate = main_period(field)
+    The first is the most reliable one; that along x if both are equal.
+    """
+    estimates = estimate_periods(field)
+    best = sorted(estimates, key=lambda estimate: -estimate.confidence)
     if period is not None:
-        return Period(estimate.axis, check_period(period), 1.0)
-    if estimate.reliable:
-        return estimate
-    estimates = "; ".join(str(p) for p in estimate_periods(field))
+        return [Period(best[0].axis, check_period(period), 1.0)]
+    if best[0].reliable:
+        return [estimate for estimate in best if estimate.reliable]
     raise DiffractionError(
-        f"method '{method}' needs a period, and {field.name} has no reliable one ({estimates}; "
-        f"at least {LEAST_CONFIDENCE:g} is needed); give period in µm, or choose another method"
+        f"method '{method}' needs a period, and {field.name} has no reliable one "
+        f"({'; '.join(map(str, estimates))}; at least {LEAST_CONFIDENCE:g} is needed); give period "
+        "in µm, or choose another method"
     )
 
 

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...atomic import atomic_path
-from .ridge import Fit, Response, Ridge
+from .ridge import Response, Ridge
 
 #: Dynamic range of the picture in powers of ten.
 DECADES = 5.0
@@ -61,7 +61,7 @@ def draw(
 
 
 def figure(
-    response: Response, ridge: Ridge | None, fit: Fit | None, period: float | None, *,
+    response: Response, ridge: Ridge | None, period: float | None, *,
     order: int, title: str, notes: str,
 ) -> Figure:  # fmt: skip
     """Draw one response with both curves, and their difference in degrees below."""
@@ -74,8 +74,8 @@ def figure(
         f"{title}\nlight at θᵢ = {response.beam.theta:g}°; method {response.label}", fontsize=10
     )
     if ridge is not None and period is not None:
-        expected = response.beam.grating_angles(response.wavelengths, period, order)
-        lower.plot(response.wavelengths, ridge.angles - expected, color=_RIDGE, lw=1.2)
+        difference = ridge.angles - ridge.grating_angles(period)
+        lower.plot(response.wavelengths, difference, color=_RIDGE, lw=1.2)
     lower.axhline(0.0, color=_GRATING, lw=0.8, ls=_DASHES)
     lower.set(xlabel="wavelength  [nm]", ylabel="ridge less grating\nequation  [degrees]")
     result.supxlabel(notes, fontsize=8, x=0.02, ha="left")
@@ -85,17 +85,13 @@ def figure(
 COLUMNS = ("wavelength_nm", "ridge_deg", "grating_deg", "difference_deg", "scatter_per_sr")
 
 
-def save_csv(
-    path: str | os.PathLike[str], response: Response, ridge: Ridge, period: float, order: int
-) -> None:
+def save_csv(path: str | os.PathLike[str], ridge: Ridge, period: float) -> None:
     """Write the ridge and the grating equation for a period (µm), one line per wavelength.
 
     Fields without a maximum, or without an order at that wavelength, are empty.
     """
-    expected = response.beam.grating_angles(response.wavelengths, period, order)
-    columns = (
-        response.wavelengths, ridge.angles, expected, ridge.angles - expected, ridge.heights,
-    )  # fmt: skip
+    expected, wavelengths = ridge.grating_angles(period), ridge.response.wavelengths
+    columns = wavelengths, ridge.angles, expected, ridge.angles - expected, ridge.heights
     with (
         atomic_path(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as stream,
@@ -107,14 +103,10 @@ def save_csv(
 
 
 def save_npz(
-    path: str | os.PathLike[str],
-    response: Response,
-    ridge: Ridge,
-    period: float,
-    order: int,
-    entries: Mapping[str, object],
+    path: str | os.PathLike[str], ridge: Ridge, period: float, entries: Mapping[str, object]
 ) -> None:
     """Write the response (wavelengths, angles, f·cosθo), both curves, and further `entries`."""
+    response = ridge.response
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
             stream,
@@ -122,11 +114,11 @@ def save_npz(
             angles=response.angles,
             scatter=response.values,
             ridge=ridge.angles,
-            grating=response.beam.grating_angles(response.wavelengths, period, order),
+            grating=ridge.grating_angles(period),
             theta=response.beam.theta,
             phi=response.beam.phi,
             period=period,
-            order=order,
+            order=ridge.order,
             method=response.label,
             **entries,  # type: ignore[arg-type]
         )

@@ -150,6 +150,10 @@ class Ridge:
         """Coordinate |u| = |sinθi + sinθo| of the maxima, (L,)."""
         return np.abs(self.response.beam.sine + np.sin(np.radians(self.angles)))
 
+    def grating_angles(self, period: float) -> Array:
+        """Return the angles of the grating equation for a period in µm, (L,), degrees."""
+        return self.response.beam.grating_angles(self.response.wavelengths, period, self.order)
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -308,8 +312,7 @@ def fit_period(ridge: Ridge) -> Fit:
         x_scale=start, xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     period = float(1.0 / result.x[0])
-    expected = response.beam.grating_angles(response.wavelengths[fitted], period, ridge.order)
-    difference = ridge.angles[fitted] - expected
+    difference = ridge.angles - ridge.grating_angles(period)
     difference = difference[np.isfinite(difference)]
     return Fit(
         period=period,

@@ -66,7 +66,7 @@ def test_both_methods_draw_what_the_desktop_draws(
     opened = tab()
     assert opened.open(page_file) == "ready", opened.page.inner_text("#message")
     for method, expected in desktop.items():
-        opened.page.evaluate(f"viewer.controls.choose('{method}')")
+        opened.page.evaluate(f"viewer.controls.change({{method: '{method}'}})")
         found = picture(opened)
         inside = (found[..., 3] == 1.0) & (expected[..., 3] == 1.0)
         assert inside.mean() > 0.9

@@ -15,16 +15,19 @@ from numpy.typing import NDArray
 from mitsuba_diffraction.realtime.glsl.scene import VERTEX
 from mitsuba_diffraction.realtime.glsl.texels import paired
 from mitsuba_diffraction.realtime.web.sections import (
+    Section,
     Sections,
     octahedral,
     packed_array,
-    packed_file,
     packed_mesh,
     packed_series,
 )
 from mitsuba_diffraction.realtime.web.tables import rounded
 
-KINDS = {"Uint16Array": np.uint16, "Uint32Array": np.uint32, "Float32Array": np.float32}
+KINDS = {
+    "Int16Array": np.int16, "Uint16Array": np.uint16, "Uint32Array": np.uint32,
+    "Float32Array": np.float32,
+}  # fmt: skip
 
 
 def undone(data: bytes, layout: dict[str, Any]) -> NDArray[Any]:
@@ -53,7 +56,7 @@ def test_half_floats_are_stored_as_their_bits() -> None:
 
 def test_sections_know_where_they_lie() -> None:
     sections = Sections()
-    numbers = [sections.add(packed_file(text)) for text in (b"one", b"three", b"")]
+    numbers = [sections.add(Section(text, {"kind": "file"})) for text in (b"one", b"three", b"")]
     data, layouts = sections.joined()
     assert numbers == [0, 1, 2]
     found = [data[a["start"] : a["start"] + a["length"]] for a in layouts]
@@ -94,28 +97,35 @@ def test_triangles_come_back_within_sixteen_bits(flat: bool) -> None:
     vertices = per_vertex[corners.ravel()]
     if flat:
         vertices[:, 6:9] = np.repeat(rng.normal(size=(100, 3)), 3, axis=0)
-    mesh = packed_mesh(vertices)
-    assert len(mesh.columns) == len(np.unique(corners))
-    assert (mesh.tangents is not None) == flat
-    rows = mesh.columns[mesh.corners[:, 0]]
+    sections = Sections()
+    mesh = packed_mesh(vertices, sections)
+    data, layouts = sections.joined()
+
+    def stored(name: str) -> NDArray[Any]:
+        layout = layouts[mesh[name]]
+        return undone(data[layout["start"] : layout["start"] + layout["length"]], layout)
+
+    assert len(stored("columns")) == len(np.unique(corners))
+    assert (mesh["tangents"] is not None) == flat
+    rows = stored("columns")[stored("corners")[:, 0]]
     start = 0
     for name, size in VERTEX:
         expected = vertices[:, start : start + size]
         start += size
         if name in ("normal", "tangent"):
             if name == "tangent" and flat:
-                assert mesh.tangents is not None
-                pairs = np.repeat(mesh.tangents, 3, axis=0)
+                pairs = np.repeat(stored("tangents"), 3, axis=0)
             else:
-                first = mesh.layout[name]["column"]
+                first = mesh["layout"][name]["column"]
                 pairs = rows[:, first : first + 2].view(np.int16)
             expected = expected / np.linalg.norm(expected, axis=1, keepdims=True)
             np.testing.assert_allclose(directions_of(pairs), expected, atol=7e-5)
-        elif "value" in mesh.layout[name]:
+        elif "value" in mesh["layout"][name]:
             assert name == "colour"
-            np.testing.assert_allclose(np.tile(mesh.layout[name]["value"], (300, 1)), expected)
+            value = mesh["layout"][name]["value"]
+            np.testing.assert_allclose(np.tile(value, (300, 1)), expected)
         else:
-            place = mesh.layout[name]
+            place = mesh["layout"][name]
             whole = rows[:, place["column"] : place["column"] + size]
             found = place["low"] + np.array(place["step"]) * whole
             assert (np.abs(found - expected) <= 0.51 * np.array(place["step"])).all()

@@ -82,8 +82,7 @@ class Camera {
   projection(aspect, free, jitter, lift) {
     const toCamera = inverse(this.matrix);
     const [low, high] = this.box;
-    const depths = [0, 1, 2, 3, 4, 5, 6, 7].map(
-      (n) => [0, 1, 2].reduce((t, i) => t + toCamera[2][i] * (n & (1 << i) ? high : low)[i], toCamera[2][3]));
+    const depths = cornersOf(this.box).map((p) => dot(toCamera[2], p) + toCamera[2][3]);
     const outside = [0, 1, 2].map((i) => Math.max(low[i] - this.eye[i], this.eye[i] - high[i], 0));
     const far = Math.max(1.001 * Math.max(...depths), 1e-6, 2 * this.distance);
     const near = Math.max(0.5 * norm(outside), 0.999 * Math.min(...depths), 5e-3 * this.distance);

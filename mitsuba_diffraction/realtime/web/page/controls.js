@@ -36,7 +36,6 @@ class Controls {
     if (viewer.pigment) element("pigment").value = colourText(viewer.pigment);
     element("shadows").checked = viewer.shadows;
     element("kind").value = viewer.lights.kind;
-    this.mark();
     this.label();
     this.drawDisc();
   }
@@ -177,7 +176,7 @@ class Controls {
       button.textContent = method;
       button.title = METHODS[method];
       button.dataset.method = method;
-      button.addEventListener("click", () => this.choose(method));
+      button.addEventListener("click", () => this.change({ method }));
       element("methods").append(button);
     }
     for (const kind of viewer.lights.kinds) element("kind").add(new Option(KINDS[kind], kind));
@@ -194,14 +193,7 @@ class Controls {
       this.label();
       viewer.present();
     });
-    element("heights").addEventListener("input", () => {
-      viewer.heights = 2 ** Number(element("heights").value);
-      this.label();
-      viewer.touch();
-    });
     this.surface();
-    const [first, last] = header.octaves;
-    Object.assign(element("heights"), { min: first, max: last });
     element("reset").addEventListener("click", () => this.reset());
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
@@ -226,6 +218,9 @@ class Controls {
       viewer.touch();
       this.map.update();
     });
+    const [min, max] = header.octaves;
+    Object.assign(element("heights"), { min, max });
+    slide("heights", (value) => (viewer.heights = 2 ** Number(value)));
     slide("turn", (value) => (viewer.turn = Number(value)));
     slide("pigment", (value) => (viewer.pigment = colourOf(value)));
     element("pigment").parentElement.hidden = !header.surfaces.some(({ pigmented }) => pigmented);
@@ -248,10 +243,6 @@ class Controls {
     });
   }
 
-  choose(method) {
-    return this.change({ method });
-  }
-
   // Choose one wavelength, or all at the left end of the slider.
   scrub(nm) {
     const wavelength = nm < 380 ? null : nm;
@@ -266,7 +257,6 @@ class Controls {
   async change(change) {
     try {
       await this.viewer.change(change, busy);
-      this.mark();
       this.label();
       this.drawDisc();
       this.map.update();
@@ -276,12 +266,10 @@ class Controls {
     element("busy").hidden = true;
   }
 
-  mark() {
+  // Mark the method, and write the values beside the sliders.
+  label() {
     for (const button of element("methods").children)
       button.setAttribute("aria-pressed", button.dataset.method === this.viewer.method);
-  }
-
-  label() {
     const stops = Number(element("exposure").value);
     element("exposure_value").textContent = `${stops > 0 ? "+" : stops < 0 ? "−" : ""}${Math.abs(stops).toFixed(1)} EV`;
     element("heights_value").textContent = `× ${this.viewer.heights.toFixed(2)}`;
@@ -297,10 +285,9 @@ class Controls {
     const { header } = viewer;
     Object.assign(viewer.camera, new Camera(header.camera, header.subject, header.box));
     viewer.lights.reset();
-    viewer.exposure = 1;
-    viewer.shadows = true;
-    viewer.undress();
-    this.change({ wavelength: null, coherence: 1, material: null, kind: viewer.lights.kinds[0] });
+    const { wavelength, coherence, material, ...others } = PLAIN; // the first need other programs
+    Object.assign(viewer, others);
+    this.change({ wavelength, coherence, material, kind: viewer.lights.kinds[0] });
     this.all();
     this.moved();
   }

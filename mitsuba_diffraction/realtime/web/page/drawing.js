@@ -73,6 +73,15 @@ class Program {
   }
 }
 
+// Texture without content; its texels are not interpolated.
+function texels(gl, format, width, height) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
+  return texture;
+}
+
 async function uploadTexture(gl, data, entry) {
   const { width, height, channels } = entry;
   const texture = gl.createTexture();
@@ -96,12 +105,9 @@ async function uploadTexture(gl, data, entry) {
     const kind = numbers instanceof Float32Array ? gl.FLOAT : type; // half floats may come as floats
     gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, kind, numbers);
   }
-  const filter = entry.smooth ? gl.LINEAR : gl.NEAREST;
-  const wrap = entry.smooth ? gl.REPEAT : gl.CLAMP_TO_EDGE;
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, wrap);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, wrap);
+  const [filter, wrap] = entry.smooth ? [gl.LINEAR, gl.REPEAT] : [gl.NEAREST, gl.CLAMP_TO_EDGE];
+  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, filter);
+  for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, axis, wrap);
   return texture;
 }
 
@@ -110,8 +116,7 @@ class Part {
   static async load(gl, data, described) {
     const part = new Part();
     part.uniforms = described.uniforms;
-    part.textures = [];
-    for (const entry of described.textures) part.textures.push([entry.name, await uploadTexture(gl, data, entry)]);
+    part.textures = await Promise.all(described.textures.map(async (entry) => [entry.name, await uploadTexture(gl, data, entry)]));
     return part;
   }
 
@@ -121,18 +126,17 @@ class Part {
   }
 }
 
-// Framebuffer of floats, with depth if surfaces are drawn into it.
+// Framebuffer, of floats by default, with depth if surfaces are drawn into it.
 class Target {
-  constructor(gl, width, height, depth = false) {
+  constructor(gl, width, height, { depth = false, format = gl.RGBA32F, textures = 1 } = {}) {
     this.gl = gl;
-    this.texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, height);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    this.textures = Array.from({ length: textures }, () => texels(gl, format, width, height));
+    this.texture = this.textures[0];
     this.frame = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
+    const places = this.textures.map((_, n) => gl.COLOR_ATTACHMENT0 + n);
+    this.textures.forEach((texture, n) => gl.framebufferTexture2D(gl.FRAMEBUFFER, places[n], gl.TEXTURE_2D, texture, 0));
+    gl.drawBuffers(places);
     if (!depth) return;
     this.depth = gl.createRenderbuffer();
     gl.bindRenderbuffer(gl.RENDERBUFFER, this.depth);
@@ -141,7 +145,7 @@ class Target {
   }
 
   release() {
-    this.gl.deleteTexture(this.texture);
+    for (const texture of this.textures) this.gl.deleteTexture(texture);
     this.gl.deleteFramebuffer(this.frame);
     if (this.depth) this.gl.deleteRenderbuffer(this.depth);
   }
@@ -172,10 +176,7 @@ class Drawing {
     const { light } = header;
     drawing.daylight = await data.array(light.daylight);
     drawing.spectra = light.spectra === null ? null : await data.array(light.spectra);
-    drawing.responses = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, drawing.responses);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, drawing.daylight.length / 4, RESPONSES);
-    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
+    drawing.responses = texels(gl, gl.RGBA32F, drawing.daylight.length / 4, RESPONSES);
     const whole = header.shown.vertex;
     drawing.add = new Program(gl, whole, ADD);
     drawing.shown = new Program(gl, whole, header.shown.fragment);
@@ -188,14 +189,13 @@ class Drawing {
   // Load a method's tables and compile its programs; lit: `viewer.lit`; material: number of a
   // material that surfaces are given, or null.
   async prepare(method, lit, progress, material = null) {
+    const loaded = (parts) => Promise.all(parts.map((part) => Part.load(this.gl, this.data, part)));
     if (!this.tables[method]) {
       await progress("Unpacking colours");
-      const tables = [];
-      for (const table of this.header.tables[method]) tables.push(await Part.load(this.gl, this.data, table));
-      this.tables[method] = tables;
+      this.tables[method] = await loaded(this.header.tables[method]);
     }
     if (material !== null && !this.materials[material])
-      this.materials[material] = await Promise.all(this.header.materials[material].parts.map((part) => Part.load(this.gl, this.data, part)));
+      this.materials[material] = await loaded(this.header.materials[material].parts);
     await progress("Preparing");
     for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light, "surface", material);
   }
@@ -212,9 +212,8 @@ class Drawing {
   resize(width, height) {
     for (const target of [this.sample, this.held, ...(this.sums ?? [])]) target?.release();
     Object.assign(this, { width, height });
-    this.sample = new Target(this.gl, width, height, true);
-    this.held = new Target(this.gl, width, height, true);
-    this.sums = [new Target(this.gl, width, height), new Target(this.gl, width, height)];
+    [this.sample, this.held] = [0, 1].map(() => new Target(this.gl, width, height, { depth: true }));
+    this.sums = [0, 1].map(() => new Target(this.gl, width, height));
   }
 
   // Upload the lights' spectra for the method `exact`.

@@ -102,14 +102,11 @@ class Lights {
   // A few representative lights and a smooth sky, for moving pictures.
   get few() {
     if (this.kind === "scene") return { lights: this.own, sky: this.sky };
-    const only = this.kind === "sky";
-    // E/π of a plane that faces a white dome
-    const mean = ((only ? 1 : FILL) * this.level) / Math.PI;
-    const sky = [0.5, ...times(this.camera.up, 0.5)].flatMap((x) => [x, x, x].map((one) => one * mean));
-    return { lights: only ? [] : [this.made(-1)], sky };
+    const sky = [0.5, ...times(this.camera.up, 0.5)].flatMap((x) => [x, x, x].map((one) => one * this.dome));
+    return { lights: this.kind === "sky" ? [] : [this.made(-1)], sky };
   }
 
-  // Radiance of the dome of a light that replaces the scene's.
+  // Radiance of the dome of a light that replaces the scene's: E/π of a plane that faces it.
   get dome() {
     return this.kind === "scene" ? 0 : ((this.kind === "sky" ? 1 : FILL) * this.level) / Math.PI;
   }

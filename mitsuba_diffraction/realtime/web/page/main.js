@@ -2,11 +2,15 @@
 
 const state = (name) => (document.documentElement.dataset.state = name);
 
-function fail(error) {
-  element("message").textContent = error instanceof Error ? error.message : String(error);
+function show(message, name) {
+  element("message").textContent = message;
   element("message").hidden = false;
+  state(name);
+}
+
+function fail(error) {
   element("busy").hidden = true;
-  state("failed");
+  show(error instanceof Error ? error.message : String(error), "failed");
 }
 
 async function busy(text) {
@@ -68,9 +72,7 @@ async function start() {
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     viewer.lost = true;
-    element("message").textContent = "The graphics driver stopped. The picture returns when the driver restarts; otherwise reload the page.";
-    element("message").hidden = false;
-    state("lost");
+    show("The graphics driver stopped. The picture returns when the driver restarts; otherwise reload the page.", "lost");
   });
   canvas.addEventListener("webglcontextrestored", async () => {
     try {

@@ -9,31 +9,13 @@ class BrdfMap {
     this.at = null; // position on the viewer's canvas, CSS pixels
   }
 
-  // Create textures and framebuffers in the current context.
+  // Create framebuffers in the current context.
   prepare() {
     const { gl } = this.viewer.drawing;
     if (this.gl === gl) return;
     this.gl = gl;
-    const target = (format, side, places) => {
-      const frame = gl.createFramebuffer();
-      gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-      for (let n = 0; n < places; ++n) {
-        const texture = gl.createTexture();
-        gl.bindTexture(gl.TEXTURE_2D, texture);
-        gl.texStorage2D(gl.TEXTURE_2D, 1, format, side, side);
-        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
-      }
-      if (places > 1) {
-        const depth = gl.createRenderbuffer();
-        gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
-        gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT32F, side, side);
-        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-        gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
-      }
-      return frame;
-    };
-    this.picked = target(gl.RGBA32F, 1, 2);
-    this.drawn = target(gl.RGBA8, SIDE, 1);
+    this.picked = new Target(gl, 1, 1, { depth: true, textures: 2 }).frame;
+    this.drawn = new Target(gl, SIDE, SIDE, { format: gl.RGBA8 }).frame;
   }
 
   // Directions of eye and light at a pixel, in the patch's axes, and the surface; null without one.

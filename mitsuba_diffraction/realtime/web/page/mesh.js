@@ -66,7 +66,6 @@ async function uploadMesh(gl, data, mesh) {
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lists.flat()), gl.STATIC_DRAW);
   gl.bindVertexArray(null);
   return {
-    count,
     // detail: 0 draws all triangles, larger numbers fewer
     draw(detail) {
       const few = detail ? parts[detail - 1] : null;

@@ -7,11 +7,7 @@ class ShadowMap {
     Object.assign(this, { gl, size });
     const { box, subject, shadow } = header;
     this.program = new Program(gl, header.vertex, shadow);
-    this.texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT32F, size, size);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    this.texture = texels(gl, gl.DEPTH_COMPONENT32F, size, size);
     this.frame = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.texture, 0);
@@ -44,7 +40,7 @@ class ShadowMap {
       light_axis: light.axis,
       light_cone: cutoff ? [cutoff, 1 / Math.max(cutoff - beam, 1e-6)] : [0, 0],
       shadow_matrix: columnMajor(matrix),
-      shadow_planes: columnMajor(transposed(invertible(matrix))),
+      shadow_planes: columnMajor(transposed(inverse(matrix))),
       shadow_bias: BIAS * scale,
       shadow_steepest: STEEPEST * scale,
     });

@@ -7,16 +7,14 @@ const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) =>
 
 class Surroundings {
   static async load(gl, header, data) {
-    const around = new Surroundings(), { parts, lobes, emitting, glow, background, whole } = header.around;
+    const around = new Surroundings(), { parts, lobes, emitting, glow, background } = header.around;
     around.gl = gl;
     around.part = await Part.load(gl, data, parts);
     around.bounces = around.part.textures.some(([name]) => name === "bounces");
-    around.lobes = [];
-    for (const one of lobes) around.lobes.push(await Part.load(gl, data, one));
-    around.glowing = [];
-    for (const { mesh, radiance } of emitting) around.glowing.push({ mesh: await uploadMesh(gl, data, mesh), radiance });
+    around.lobes = await Promise.all(lobes.map((one) => Part.load(gl, data, one)));
+    around.glowing = await Promise.all(emitting.map(async ({ mesh, radiance }) => ({ mesh: await uploadMesh(gl, data, mesh), radiance })));
     around.glow = new Program(gl, header.vertex, glow);
-    around.background = background && new Program(gl, whole, background);
+    around.background = background && new Program(gl, header.shown.vertex, background);
     return around;
   }
 
@@ -34,7 +32,7 @@ class Surroundings {
       this.background.use();
       this.part.use(this.background);
       this.background.set({
-        ...uniforms, from_clip: columnMajor(invertible(matrix)), picture_size: [width, height],
+        ...uniforms, from_clip: columnMajor(inverse(matrix)), picture_size: [width, height],
         horizon: up, // a sky that is dark below is mirrored at the horizon
       });
       drawing.triangle();

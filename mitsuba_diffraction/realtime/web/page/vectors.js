@@ -17,21 +17,12 @@ function rotated(v, axis, angle) {
 
 const product = (a, b) => a.map((row) => [0, 1, 2, 3].map((j) => row.reduce((t, x, k) => t + x * b[k][j], 0)));
 
-// Inverse of a matrix whose last row is 0, 0, 0, 1.
-function inverse(m) {
-  const columns = [0, 1, 2].map((j) => [m[0][j], m[1][j], m[2][j]]);
-  const place = [m[0][3], m[1][3], m[2][3]];
-  const determinant = dot(columns[0], cross(columns[1], columns[2]));
-  const rows = [0, 1, 2].map((i) => times(cross(columns[(i + 1) % 3], columns[(i + 2) % 3]), 1 / determinant));
-  return [...rows.map((row) => [...row, -dot(row, place)]), [0, 0, 0, 1]];
-}
-
-const columnMajor = (m) => new Float32Array([0, 1, 2, 3].flatMap((j) => m.map((row) => row[j])));
-
 const transposed = (m) => m.map((_, i) => m.map((row) => row[i]));
 
-// Inverse of any invertible matrix, by Gauss and Jordan.
-function invertible(m) {
+const columnMajor = (m) => new Float32Array(transposed(m).flat());
+
+// Inverse of a matrix, by Gauss and Jordan.
+function inverse(m) {
   const rows = m.map((row, i) => [...row, ...row.map((_, j) => (i === j ? 1 : 0))]);
   for (let c = 0; c < rows.length; ++c) {
     let best = c;

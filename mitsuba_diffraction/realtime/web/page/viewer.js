@@ -9,13 +9,20 @@ const POOR = 0.3;   // relative size below which the number of triangles is redu
 const STILL = 200;  // ms after the last change until the picture counts as still
 const SMOOTH = 8;   // number of lights before their mean is shown
 const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
-const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n", GLANCE = "#define GLANCE\n";
-const MONOCHROME = "#define MONOCHROME\n";
 // uniforms of a light without shadows
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
-// Evenly distributed points in a pixel, from the middle on (the R₂ sequence of M. Roberts).
-const spread = (n, share) => ((0.5 + n * share) % 1) * 2 - 1;
+// The scene as it is: the state that the panel changes.
+const PLAIN = {
+  wavelength: null, // of monochromatic light, nm
+  coherence: 1,     // factor on the coherence width
+  material: null,   // number in the header's materials
+  shadows: true,
+  exposure: 1,
+  heights: 1,
+  turn: 0,          // degrees by which patches are turned
+  pigment: null,    // linear sRGB in place of the pigments beneath
+};
 
 class Viewer {
   constructor(canvas, drawing, header) {
@@ -23,12 +30,7 @@ class Viewer {
     this.camera = new Camera(header.camera, header.subject, header.box);
     this.lights = new Lights(header, this.camera);
     this.method = header.methods[0];
-    this.wavelength = null; // wavelength of monochromatic light, nm
-    this.shadows = true;
-    this.exposure = 1;
-    this.coherence = 1;   // factor on the coherence width
-    this.material = null; // number in the header's materials
-    this.undress();
+    Object.assign(this, PLAIN);
     this.free = 1;        // share of the width beside the panel
     this.lift = 0;        // share of the height that the panel covers as a sheet below
     this.most = undefined; // number of samples instead of the default
@@ -41,13 +43,6 @@ class Viewer {
     this.dirty = true;
     this.waiting = [];
     this.report = () => {};
-  }
-
-  // Show the scene's surfaces, but for changes that need other programs.
-  undress() {
-    this.heights = 1;
-    this.turn = 0;        // degrees by which patches are turned
-    this.pigment = null;  // linear sRGB in place of the pigments beneath
   }
 
   get enough() {
@@ -76,10 +71,10 @@ class Viewer {
   // Definitions of the light for programs: a few lights at once, or one.
   get lit() {
     const { lights, sky } = this.lights.few;
-    const one = this.wavelength === null ? "" : MONOCHROME;
-    const few = LIGHT.few(lights.length, sky.some((x) => x)) + one, glance = few + GLANCE;
+    const one = this.wavelength === null ? "" : "#define MONOCHROME\n";
+    const few = LIGHT.few(lights.length, sky.some((x) => x)) + one, glance = `${few}#define GLANCE\n`;
     return this.looksUp
-      ? { glance, few, one: LIGHT.one + one + WEIGHTED, lookup: LIGHT.one + one + LOOKED_UP }
+      ? { glance, few, one: `${LIGHT.one + one}#define WEIGHTED\n`, lookup: `${LIGHT.one + one}#define LOOKED_UP\n` }
       : { glance, few, one: LIGHT.one + one };
   }
 
@@ -129,7 +124,8 @@ class Viewer {
     // draw moving pictures by the faster method
     const method = moving && this.drawn === this.method && drawing.tables.fast ? "fast" : this.drawn;
     if (method === "exact") drawing.setResponses(chosen);
-    const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
+    const [x, y] = even(this.count); // in the pixel
+    const view = this.viewed([(2 * x - 1) / width, (2 * y - 1) / height]);
     const colour = this.colour();
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
     const sun = around && lights.own.find(({ name }) => name.startsWith("sun of "));
