@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,25 +11,17 @@ from . import scene_options
 from .console import say
 from .options import number_between, whole_number
 
-
-def add_animation(parser: argparse.ArgumentParser) -> None:
-    """Declare the number of frames and the parameters that change."""
-    film = parser.add_argument_group("animation")
-    count = whole_number(1)
-    film.add_argument("--frames", metavar="N", type=count, help="render N pictures, frame_0000.png")
-    film.add_argument(
-        "--animate", metavar="KEY=FROM:TO", type=scene_options.change, action="append", default=[],
-        help="change a parameter of the scene from the first frame to the last, e.g. "
-        "sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
-    )  # fmt: skip
-    film.add_argument(
-        "--turn", metavar="KEY", action="append", default=[],
-        help="turn an angle of the scene, in degrees, once around from its value on, e.g. "
-        "sun_azimuth for the light or turn for the snake; may be given several times",
-    )  # fmt: skip
-    film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
-    fps = number_between(1, 100)
-    film.add_argument("--fps", metavar="N", type=fps, help="frames a second; default: 24")
+#: The number of frames and the parameters that change.
+ANIMATION = (
+    ("--frames N", "render N pictures, frame_0000.png", whole_number(1)),
+    ("--animate KEY=FROM:TO", "change a parameter of the scene from the first frame to the last, "
+     "e.g. sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
+     [scene_options.change]),
+    ("--turn KEY", "turn an angle of the scene, in degrees, once around from its value on, e.g. "
+     "sun_azimuth for the light or turn for the snake; may be given several times", [str]),
+    ("--exr", "write a linear EXR of each frame, too", bool),
+    ("--fps N", "frames a second; default: 24", number_between(1, 100)),
+)  # fmt: skip
 
 
 def say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:

@@ -38,6 +38,34 @@ _OF_THE_BSDF = (
 )  # fmt: skip
 
 
+#: SOURCE or --preset; see `take_source`.
+SURFACE_SOURCE = (
+    ("SOURCE", "table, recipe (.toml), or heights of any format", Path, None, {"nargs": "?"}),
+    ("--preset NAME", "instead of SOURCE: a named look, which 'mitsuba-diffraction presets' lists; "
+     "options of the surface change it"),
+)  # fmt: skip
+#: Options of a surface's material and layers, by the plugin's names.
+MATERIAL = (
+    ("--material MATERIAL", f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, "
+     "gold or Au; or none for a reflectance of 1; default: a dielectric of --int-ior"),
+    ("--int-ior N", "index of the dielectric at all wavelengths, or its name; default: 1.5, as in "
+     "scenes"),
+    ("--ext-ior N", "index of the medium that light comes and goes in, or its name: water for an "
+     "animal under water; default: air"),
+    ("--coat-ior N", "index of a flat clear coat over the surface, or its name: water on a wet "
+     "animal"),
+    ("--layers TOML", "stack of thin layers on the surface; parameter layers in "
+     "docs/parameters.md"),
+    ("--pigment COLOUR|CSV", "diffuse pigment beneath a clear material: a grey from 0 to 1, "
+     "'r,g,b', sienna, or a file of wavelengths (nm) and reflectances; default: none"),
+)  # fmt: skip
+#: See `gain_of`.
+RELATIVE = (
+    "--relative", "the thesis' relative reflectance instead of the BRDF, against a mirror of the "
+    "same --int-ior (default: 1.5)", bool,
+)  # fmt: skip
+
+
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "brdf-map", run, "picture a surface's reflection in every direction",
@@ -45,63 +73,36 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
     )  # fmt: skip
-    add_surface_source(parser)
-    options.add_output(
-        parser, "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr "
-        "in the current folder", ".exr", ".png",
+    options.add_options(
+        parser,
+        *SURFACE_SOURCE,
+        ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
+         "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),
+        options.MODE,
     )  # fmt: skip
-    options.add_mode(parser)
-    _add_map_options(parser.add_argument_group("the map"))
+    group = parser.add_argument_group("the map")
+    options.add_direction(group)
+    options.add_wavelengths(group)
+    options.add_options(
+        group,
+        ("--wavelength NM", "one wavelength only, in false colours", float),
+        ("--resolution N", "pixels a side", int, 512),
+        ("--samples N", "directions in a pixel; default: enough to find every lobe", int),
+        ("--illuminant", "light for the colours, daylight or equal energy", ILLUMINANTS, "D65"),
+        ("--cosine", "map f·cosθo, the radiance of a lit surface, instead of f", bool),
+        ("--exposure EV", "exposure of the PNG in stops; default: half of the diffracted light is "
+         "darker than white", options.STOPS),
+        ("--spectral", "also write every band as a channel of the EXR", bool),
+    )  # fmt: skip
     add_surface(parser.add_argument_group("the surface"))
     group = parser.add_argument_group("methods of the 2014 thesis")
     options.add_method(
         group, None,
         "method to evaluate in NumPy, instead of the renderer's BSDF, for R = 1 and light D65",
     )  # fmt: skip
-    add_relative(group)
+    options.add_option(group, *RELATIVE)
     options.add_heights(parser)
     options.add_json(parser, "settings and statistics of the map")
-
-
-def _add_map_options(group: argparse._ArgumentGroup) -> None:
-    options.add_direction(group)
-    options.add_wavelengths(group)
-    group.add_argument(
-        "--wavelength", metavar="NM", type=float, help="one wavelength only, in false colours"
-    )
-    options.add_resolution(group, 512)
-    group.add_argument(
-        "--samples", metavar="N", type=int,
-        help="directions in a pixel; default: enough to find every lobe",
-    )  # fmt: skip
-    group.add_argument(
-        "--illuminant", choices=ILLUMINANTS, default="D65",
-        help="light for the colours, daylight or equal energy; default: D65",
-    )  # fmt: skip
-    group.add_argument(
-        "--cosine", action="store_true",
-        help="map f·cosθo, the radiance of a lit surface, instead of f",
-    )  # fmt: skip
-    options.add_exposure(
-        group, None,
-        "exposure of the PNG in stops; default: half of the diffracted light is darker than white",
-    )  # fmt: skip
-    group.add_argument(
-        "--spectral", action="store_true", help="also write every band as a channel of the EXR"
-    )
-
-
-def add_surface_source(parser: argparse.ArgumentParser) -> None:
-    """Declare SOURCE or --preset; see `take_source`."""
-    parser.add_argument(
-        "source", metavar="SOURCE", type=Path, nargs="?",
-        help="table, recipe (.toml), or heights of any format",
-    )  # fmt: skip
-    parser.add_argument(
-        "--preset", metavar="NAME",
-        help="instead of SOURCE: a named look, which 'mitsuba-diffraction presets' lists; options "
-        "of the surface change it",
-    )  # fmt: skip
 
 
 def take_source(args: argparse.Namespace) -> None:
@@ -128,57 +129,15 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
 
     turned: include its orientation.
     """
-    add_material(group)
-    group.add_argument(
-        "--model", choices=tuple(MODELS),
-        help="model of the boundary; default: small_slope for materials with an index",
-    )  # fmt: skip
-    if turned:
-        group.add_argument("--orientation", metavar="DEG", type=float, help="angle of the patch")
-    group.add_argument(
-        "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"
+    model = "model of the boundary; default: small_slope for materials with an index"
+    options.add_options(
+        group,
+        *MATERIAL,
+        ("--model", model, tuple(MODELS)),
+        *([("--orientation DEG", "angle of the patch", float)] if turned else []),
+        ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
     )
     options.add_table(group, tuple(_TABLE), **_TABLE)
-
-
-def add_material(group: argparse._ArgumentGroup) -> None:
-    """Declare the options of a surface's material and layers, by the plugin's names."""
-    group.add_argument(
-        "--material", metavar="MATERIAL",
-        help=f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, gold or Au; or "
-        "none for a reflectance of 1; default: a dielectric of --int-ior",
-    )  # fmt: skip
-    group.add_argument(
-        "--int-ior", metavar="N",
-        help="index of the dielectric at all wavelengths, or its name; default: 1.5, as in scenes",
-    )  # fmt: skip
-    group.add_argument(
-        "--ext-ior", metavar="N",
-        help="index of the medium that light comes and goes in, or its name: water for an animal "
-        "under water; default: air",
-    )  # fmt: skip
-    group.add_argument(
-        "--coat-ior", metavar="N",
-        help="index of a flat clear coat over the surface, or its name: water on a wet animal",
-    )  # fmt: skip
-    group.add_argument(
-        "--layers", metavar="TOML",
-        help="stack of thin layers on the surface; parameter layers in docs/parameters.md",
-    )  # fmt: skip
-    group.add_argument(
-        "--pigment", metavar="COLOUR|CSV",
-        help="diffuse pigment beneath a clear material: a grey from 0 to 1, 'r,g,b', sienna, or a "
-        "file of wavelengths (nm) and reflectances; default: none",
-    )  # fmt: skip
-
-
-def add_relative(group: argparse._ArgumentGroup) -> None:
-    """Declare --relative; see `gain_of`."""
-    group.add_argument(
-        "--relative", action="store_true",
-        help="the thesis' relative reflectance instead of the BRDF, against a mirror of the same "
-        "--int-ior (default: 1.5)",
-    )  # fmt: skip
 
 
 def gain_of(args: argparse.Namespace) -> Any:
@@ -315,31 +274,17 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
 
 def _refuse_contradictions(args: argparse.Namespace) -> None:
     """Refuse contradictory options that argparse does not find, with a usage error."""
-    refused: list[str] = []
     if args.wavelength is not None:
-        refused = [
-            f"argument --wavelength: not allowed with argument --{name.replace('_', '-')}"
-            for name in ("wavelength_range", "step", "exposure", "spectral")
-            if getattr(args, name) not in (None, False)
-        ]
+        many = ("wavelength_range", "step", "exposure", "spectral")
+        options.refuse(args, many, "", "argument --wavelength: not allowed with argument ")
     if args.method is None:
-        refused += [
-            f"argument --{name}: only with argument --method"
-            for name in ("period", "relative")
-            if getattr(args, name)
-        ]
-    else:
-        refused += [
-            f"argument --{name.replace('_', '-')}: not allowed with argument --method"
-            for name in (*_OF_THE_BSDF, "spectral")
-            if getattr(args, name) not in (None, False)
-        ]
-        if args.illuminant != "D65":
-            refused.append("argument --method: is under --illuminant D65 only")
-        if args.int_ior is not None and not args.relative:
-            refused.append("argument --int-ior: with argument --method, only for --relative")
-    if refused:
-        args.parser.error(refused[0])
+        options.refuse(args, ("period", "relative"), ": only with argument --method")
+        return
+    options.refuse(args, (*_OF_THE_BSDF, "spectral"), ": not allowed with argument --method")
+    if args.illuminant != "D65":
+        args.parser.error("argument --method: is under --illuminant D65 only")
+    if not args.relative:
+        options.refuse(args, ["int_ior"], ": with argument --method, only for --relative")
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
@@ -361,9 +306,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
             )
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)
-    for option in options.used_heights_options(args):
-        name = option.removeprefix("--").replace("-", "_")
-        parameters[name] = getattr(args, name)
+    parameters |= options.given(args, options.HEIGHTS)
     if args.preset is not None:
         values = preset(args.preset, **parameters)
     else:
@@ -379,7 +322,7 @@ def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
     """Return the options of `add_surface` that are parameters of the BSDF, by name."""
     if args.material is not None and args.int_ior is not None:
         args.parser.error("argument --int-ior: not allowed with argument --material")
-    return {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
+    return options.given(args, _SURFACE)
 
 
 def _surface(bsdf: Any) -> str:

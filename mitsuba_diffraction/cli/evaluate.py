@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
 from . import options
-from .brdf_map import add_material, surface_parameters
+from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
 from .report import check_outputs, save_report
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from ..heights.spectra import Periodicity
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
-_WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.
 _FEW = 20
 # A plane of incidence closer to the grooves than 78° from across them meets none of their orders.
@@ -40,12 +39,23 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
         "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
     )  # fmt: skip
-    options.add_source(parser)
-    options.add_output(
-        parser, "picture; default: SOURCE's name with -evaluation.png in the current folder",
-        ".png",
+    options.add_options(
+        parser,
+        options.SOURCE,
+        ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
+         "folder", options.path_ending_in(".png")),
     )  # fmt: skip
-    _add_beam_options(parser.add_argument_group("the beam"))
+    group = parser.add_argument_group("the beam")
+    options.add_direction(group, theta=75.0, phi=None)
+    options.add_wavelengths(group)
+    options.add_options(
+        group,
+        ("--angles LOW HIGH", "viewing angles, degrees, positive on the light's side; default: "
+         "from the mirror direction to where the order of the patch's own period ends, or to 80",
+         float),
+        ("--angle-step DEG", "", float, 0.1),
+        ("--order M", "order that is followed", int, 1),
+    )  # fmt: skip
     group = parser.add_argument_group("the model")
     options.add_method(group, "spectral", "what evaluates")
     options.add_table(
@@ -53,28 +63,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         options.TABLE_NAMES,
         coherence="ensemble for spectral, patch for the thesis' own methods",
     )
-    group.add_argument(
-        "--windows", dest="positions", metavar="N", type=whole_number(0), default=_WINDOWS,
-        help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
-        f"default: {_WINDOWS}",
+    options.add_option(
+        group, "--windows N", "window positions whose own periods are fitted, for the spread; 0 "
+        "leaves them out", whole_number(0), 32, {"dest": "positions"},
     )  # fmt: skip
-    add_material(parser.add_argument_group("the surface, by default R = 1"))
+    group = parser.add_argument_group("the surface, by default R = 1")
+    options.add_options(group, *MATERIAL)
     options.add_json(parser)
     options.add_heights(parser)
-
-
-def _add_beam_options(group: argparse._ArgumentGroup) -> None:
-    options.add_direction(group, theta=75.0, phi=None)
-    options.add_wavelengths(group)
-    group.add_argument(
-        "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
-        help="viewing angles, degrees, positive on the light's side; default: from the mirror "
-        "direction to where the order of the patch's own period ends, or to 80",
-    )  # fmt: skip
-    group.add_argument("--angle-step", metavar="DEG", type=float, default=0.1, help="default: 0.1")
-    group.add_argument(
-        "--order", metavar="M", type=int, default=1, help="order that is followed; default: 1"
-    )
 
 
 class _Experiment(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from . import options
-from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
 from .report import check_outputs, save_report
@@ -27,30 +27,24 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
         "the BiRD project. Lobes narrower than the grid become as wide as it.",
     )  # fmt: skip
-    add_surface_source(parser)
-    options.add_output(
-        parser, "the file; default: SOURCE's name with .bsdf in the current folder", ".bsdf",
-        ".json", ".brdf",
+    options.add_options(
+        parser,
+        *SURFACE_SOURCE,
+        ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
+         options.path_ending_in(".bsdf", ".json", ".brdf")),
+        options.MODE,
     )  # fmt: skip
-    options.add_mode(parser)
-    group = parser.add_argument_group("the file")
-    group.add_argument(
-        "--format", choices=tuple(_SUFFIXES),
-        help="default: rgl for .bsdf, bird for .json and .brdf",
-    )  # fmt: skip
-    for name, text in (
-        ("theta", "angles of the light from the normal, e.g. 0:80:10"),
-        ("phi", "azimuths of the light from x towards y; of zemax, the mirror direction's"),
-        ("wavelength", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default 550"),
-    ):
-        group.add_argument(
-            f"--{name}", metavar="NM" if name == "wavelength" else "DEG", type=options.numbers,
-            help=f"{text}; default: by format",
-        )  # fmt: skip
-    group.add_argument(
-        "--resolution", metavar="N", type=whole_number(8),
-        help="nodes of outgoing directions along an axis; default: 64 for rgl, 86 for zemax, 18 "
-        "for bird",
+    options.add_options(
+        parser.add_argument_group("the file"),
+        ("--format", "default: rgl for .bsdf, bird for .json and .brdf", tuple(_SUFFIXES)),
+        ("--theta DEG", "angles of the light from the normal, e.g. 0:80:10; default: by format",
+         options.numbers),
+        ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "
+         "default: by format", options.numbers),
+        ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default "
+         "550; default: by format", options.numbers),
+        ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
+         "for zemax, 18 for bird", whole_number(8)),
     )  # fmt: skip
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)

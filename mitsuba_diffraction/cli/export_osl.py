@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 from . import options
-from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in
 from .report import check_outputs, save_report
@@ -24,25 +24,20 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
         "all named looks, as an add-on that Blender installs.",
     )  # fmt: skip
-    add_surface_source(parser)
-    parser.add_argument(
-        "--addon", metavar="ZIP", type=path_ending_in(".zip"),
-        help="write this add-on for Blender, with a panel and an asset library, and no folder; "
-        "without SOURCE and --preset it has all named looks that the shaders show",
+    options.add_options(
+        parser,
+        *SURFACE_SOURCE,
+        ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
+         "folder; without SOURCE and --preset it has all named looks that the shaders show",
+         path_ending_in(".zip")),
+        ("--with FOLDER", "exported folder that the add-on has, too; may be given several times",
+         [Path], None, {"dest": "folders"}),
+        ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
+         "-osl in the current folder", Path),
+        ("--name NAME", "name of the shader and its files; default: diffraction_ and SOURCE's "
+         "name"),
+        options.MODE,
     )  # fmt: skip
-    parser.add_argument(
-        "--with", metavar="FOLDER", dest="folders", type=Path, action="append", default=[],
-        help="exported folder that the add-on has, too; may be given several times",
-    )  # fmt: skip
-    options.add_output(
-        parser, "to write into, made if it is missing; default: SOURCE's name with -osl in the "
-        "current folder",
-    )  # fmt: skip
-    parser.add_argument(
-        "--name", metavar="NAME",
-        help="name of the shader and its files; default: diffraction_ and SOURCE's name",
-    )  # fmt: skip
-    options.add_mode(parser)
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)
     options.add_json(parser, "the files and their settings")

@@ -18,36 +18,21 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "colour, and write textures and a scene with a card, or with a label on the front of a "
         "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
     )  # fmt: skip
-    parser.add_argument("picture", metavar="PICTURE", type=Path, help="PNG, JPEG, ...")
-    parser.add_argument("--mesh", metavar="FILE", type=Path, help="mesh with texture coordinates")
-    options.add_output(parser, "default: PICTURE_hologram", metavar="FOLDER")
-    parser.add_argument(
-        "--colours", metavar="N", type=whole_number(1), default=6,
-        help="largest number of colours; default: 6",
-    )  # fmt: skip
-    parser.add_argument(
-        "--dots", metavar="N", type=whole_number(16), default=512,
-        help="dots along the longer side; default: 512",
-    )  # fmt: skip
-    parser.add_argument(
-        "--keep-ground", action="store_true",
-        help="give the colour of most of the border a grating, too",
-    )  # fmt: skip
-    parser.add_argument(
-        "--width", metavar="S", type=number_between(0.01, 10), default=0.5,
-        help="of a label, as a share of the mesh's width; default: 0.5",
-    )  # fmt: skip
-    parser.add_argument(
-        "--height", metavar="S", type=number_between(0, 1), default=0.5,
-        help="of a label's middle, as a share of the mesh's height; default: 0.5",
-    )  # fmt: skip
-    parser.add_argument(
-        "--turn", metavar="DEG", type=number_between(-360, 360), default=0.0,
-        help="turn the mesh around the vertical, which puts another side to the front; default: 0",
-    )  # fmt: skip
-    parser.add_argument(
-        "--up", metavar="AXIS", default="auto", help="axis of the mesh that points upwards: x, y, "
-        "z, with a minus sign if it points downwards; default: auto",
+    options.add_options(
+        parser,
+        ("PICTURE", "PNG, JPEG, ...", Path),
+        ("--mesh FILE", "mesh with texture coordinates", Path),
+        ("-o --output FOLDER", "default: PICTURE_hologram", Path),
+        ("--colours N", "largest number of colours", whole_number(1), 6),
+        ("--dots N", "dots along the longer side", whole_number(16), 512),
+        ("--keep-ground", "give the colour of most of the border a grating, too", bool),
+        ("--width S", "of a label, as a share of the mesh's width", number_between(0.01, 10), 0.5),
+        ("--height S", "of a label's middle, as a share of the mesh's height",
+         number_between(0, 1), 0.5),
+        ("--turn DEG", "turn the mesh around the vertical, which puts another side to the front",
+         number_between(-360, 360), 0.0),
+        ("--up AXIS", "axis of the mesh that points upwards: x, y, z, with a minus sign if it "
+         "points downwards", str, "auto"),
     )  # fmt: skip
     options.add_json(parser, "colours and files")
 

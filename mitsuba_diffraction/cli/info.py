@@ -28,23 +28,16 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Describe a table, a table of orders, a file of heights, a recipe, or a mesh (PLY, OBJ, "
         "glTF, USD, serialized) and whether its tangents suit a measured patch.",
     )  # fmt: skip
-    parser.add_argument(
-        "file", metavar="FILE", type=Path, help="table, table of orders, heights, recipe or mesh"
-    )
+    plot = path_ending_in(".png", ".pdf", ".svg")
+    options.add_option(parser, "FILE", "table, table of orders, heights, recipe or mesh", Path)
     options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
-    parser.add_argument(
-        "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
-        help="plot a table's raw directional albedo against angle and azimuth",
-    )  # fmt: skip
-    parser.add_argument(
-        "--energy", action="store_true",
-        help="a table's albedo for three materials, raw and conserved, and R + T of a dielectric "
-        "and of a thin sheet",
-    )  # fmt: skip
-    parser.add_argument(
-        "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
-        help="draw heights or a recipe's: the patch, its distribution and spectrum, and the light "
-        "that it scatters",
+    options.add_options(
+        parser,
+        ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", plot),
+        ("--energy", "a table's albedo for three materials, raw and conserved, and R + T of a "
+         "dielectric and of a thin sheet", bool),
+        ("--picture OUT", "draw heights or a recipe's: the patch, its distribution and spectrum, "
+         "and the light that it scatters", plot),
     )  # fmt: skip
     options.add_heights(parser)
     options.add_table(parser.add_argument_group("the table"), _TABLE)
@@ -101,10 +94,8 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
-    refused = options.used_heights_options(args)
-    refused += [f"--{n.replace('_', '-')}" for n in _TABLE if getattr(args, n) is not None]
-    if refused:
-        args.parser.error(f"argument {refused[0]}: '{args.file}' is {kind}, not heights")
+    names = (*options.HEIGHTS, *_TABLE)
+    options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
 
 
 def _table(file: Path) -> dict[str, Any]:

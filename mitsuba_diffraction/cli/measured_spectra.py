@@ -87,12 +87,11 @@ def _of_table(
     args: argparse.Namespace, table: Any, file: Path, geometry: Any, lam: Any, bar: Bar
 ) -> Spectra:
     """Measure the spectra of a table."""
-    names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
-    names = [name for name in names if name != "--wavelength-range"]
-    names += [f"--{n.replace('_', '-')}" for n in ("crops", "ext_ior") if getattr(args, n)]
-    if refused := [*options.used_heights_options(args), *names]:
+    own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
+    if refused := options.given(args, own):
+        option = options.option_of(args, next(iter(refused)))
         raise DiffractionError(
-            f"'{file}' is a table, which has its own; leave {refused[0]} out, or give heights"
+            f"'{file}' is a table, which has its own; leave {option} out, or give heights"
         )
     if args.light_azimuth == "auto":
         raise DiffractionError(

@@ -18,19 +18,13 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
 from .report import check_writable, default_output, save_report
 
-
-def add_observer(parser: argparse.ArgumentParser) -> None:
-    """Add the animal."""
-    parser.add_argument(
-        "--observer", metavar="ANIMAL|CSV",
-        help="an eye, as in `spectrum`: the EXR has a channel for each receptor, the PNG is in "
-        "false colour with a legend; tables of heights then serve ultraviolet",
-    )  # fmt: skip
-    parser.add_argument(
-        "--illuminant", metavar="LIGHT|CSV",
-        help="with --observer: light of the scene in place of daylight, D65, e.g. leaves, shade "
-        "under leaves; as in `spectrum`",
-    )  # fmt: skip
+#: The animal.
+OBSERVER = (
+    ("--observer ANIMAL|CSV", "an eye, as in `spectrum`: the EXR has a channel for each receptor, "
+     "the PNG is in false colour with a legend; tables of heights then serve ultraviolet"),
+    ("--illuminant LIGHT|CSV", "with --observer: light of the scene in place of daylight, D65, "
+     "e.g. leaves, shade under leaves; as in `spectrum`"),
+)  # fmt: skip
 
 
 def run_observed(args: argparse.Namespace) -> int:

@@ -1,8 +1,8 @@
 """Options that several commands share, each declared once, and types of arguments.
 
-A value that does not fit is a usage error that quotes it. `add_…` functions declare options on a
-parser or a group; the functions beside them read the values. Modules of the library are imported
-where values are read, so that --help answers at once.
+A value that does not fit is a usage error that quotes it. Options are rows of tables, which
+`add_options` declares on a parser or a group; the functions beside them read the values. Modules of
+the library are imported where values are read, so that --help answers at once.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +48,8 @@ LIMITS = (
 #: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
-_HEIGHTS: dict[str, tuple[str, str]] = {
+#: Options for reading heights: the name of the value, and help.
+HEIGHTS: dict[str, tuple[str, str]] = {
     "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
     "max_height": (
         "H",
@@ -70,13 +71,33 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
         "exact: whole periods of a surface that repeats; none; default: trend if seams show",
     ),
 }
-_TABLE = (
+#: Settings of a table.
+TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
     "windows", "second_order",
 )  # fmt: skip
 
 #: The settings of a table that the evaluators of the thesis take.
 TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
+
+
+#: A patch, which `load_patch` reads.
+SOURCE = ("SOURCE", "heights of any format, or a recipe (.toml)", Path)
+#: Options for reading heights by names of files; `analysis.treatments`.
+TREATMENTS = (
+    "--treatments FILE", 'TOML: a table of options for each pattern of names, ["snakes/*.png"]; '
+    "options on the command line override it", Path,
+)  # fmt: skip
+#: Mitsuba's variant.
+MODE = (
+    "-m --mode VARIANT", "Mitsuba variant; default: cuda_ad_spectral with a GPU, else "
+    "llvm_ad_spectral",
+)  # fmt: skip
+#: View by which a picture's linear light is shown.
+VIEW = (
+    "--view", "natural keeps hues and turns bright light white; standard clips each channel by "
+    "itself", VIEWS, "natural",
+)  # fmt: skip
 
 
 def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
@@ -116,6 +137,10 @@ def _number(
     return number
 
 
+#: Type of an exposure.
+STOPS = number_between(-100, 100)
+
+
 def numbers(text: str) -> tuple[float, ...]:
     """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
     try:
@@ -147,20 +172,78 @@ def add_command(
     return parser
 
 
+def add_options(group: Group, *rows: tuple[Any, ...]) -> None:
+    """Add options or arguments: rows of the values that `add_option` takes after the group."""
+    for row in rows:
+        add_option(group, *row)
+
+
+def add_option(
+    group: Group, usage: str, text: str, kind: Any = None, default: Any = None,
+    more: Mapping[str, Any] = {},
+) -> None:  # fmt: skip
+    """Add an option, or an argument.
+
+    usage : names of the option and of its values, such as "-s --spp N"; "..." if they are many.
+    text : help; the default value is told at its end, unless the text tells a default.
+    kind : type of a value; a tuple of choices; bool of a flag; or, of an option that may be given
+        several times, a list of the type.
+    more : further keywords of `argparse.ArgumentParser.add_argument`.
+    """
+    words = usage.split()
+    names = [word for word in words if word.startswith("-")]
+    values = words[len(names) :]
+    how: dict[str, Any] = {"help": text}
+    if not names:
+        how["dest"] = values[0].lower()
+    if values[1:] == ["..."]:
+        how |= {"nargs": "+", "metavar": values[0]}
+    elif len(values) > 1:
+        how |= {"nargs": len(values), "metavar": tuple(values)}
+    elif values:
+        how["metavar"] = values[0]
+    if kind is bool:
+        how["action"] = "store_true"
+    elif isinstance(kind, list):
+        how |= {"action": "append", "type": kind[0], "default": []}
+    else:
+        how["choices" if isinstance(kind, tuple) else "type"] = kind
+    if default is not None:
+        how["default"] = default
+    if default is not None and "default:" not in text:
+        shown = f"{default:g}" if isinstance(default, (int, float)) else default
+        how["help"] = f"{text}; default: {shown}".removeprefix("; ")
+    group.add_argument(*names, **{**how, **more})
+
+
+def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Return the values of options without defaults that are on the command line, by name."""
+    values = {name: getattr(args, name, None) for name in names}
+    return {k: v for k, v in values.items() if v is not None and v is not False and v != []}
+
+
+def option_of(args: argparse.Namespace, name: str) -> str:
+    """Return the option whose value has this name in `args`."""
+    option: str = next(a.option_strings[-1] for a in args.parser._actions if a.dest == name)
+    return option
+
+
+def refuse(
+    args: argparse.Namespace, names: Iterable[str], why: str, before: str = "argument "
+) -> None:
+    """Refuse the first of the options that is on the command line, with a usage error.
+
+    why, before : the message after and before the option.
+    """
+    for name in given(args, names):
+        args.parser.error(f"{before}{option_of(args, name)}{why}")
+
+
 def add_heights(parser: argparse.ArgumentParser) -> None:
     """Add the options for reading a file of heights; `load_options` checks their values."""
     group = parser.add_argument_group("reading heights")
-    for name, (metavar, text) in _HEIGHTS.items():
-        group.add_argument(_option(name), metavar=metavar, help=text)
-
-
-def add_treatments(parser: argparse.ArgumentParser) -> None:
-    """Add a file of options for reading heights by names of files; `analysis.treatments`."""
-    parser.add_argument(
-        "--treatments", metavar="FILE", type=Path,
-        help='TOML: a table of options for each pattern of names, ["snakes/*.png"]; options on '
-        "the command line override it",
-    )  # fmt: skip
+    for name, (metavar, text) in HEIGHTS.items():
+        add_option(group, f"{_option(name)} {metavar}", text)
 
 
 def load_options(args: argparse.Namespace) -> LoadOptions:
@@ -170,71 +253,25 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     """
     from ..heights.read import LoadOptions
 
-    return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in HEIGHTS})
 
 
-def used_heights_options(args: argparse.Namespace) -> list[str]:
-    """List the options for reading heights that are on the command line."""
-    return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
+def files(kinds: str, nargs: str = "+") -> tuple[Any, ...]:
+    """Return the row of FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
+    text = f"{kinds}; folders and patterns of names, too"
+    return "FILE", text, Path, None, {"dest": "files", "nargs": nargs}
 
 
-def add_source(parser: argparse.ArgumentParser) -> None:
-    """Add the argument SOURCE, which `load_patch` reads."""
-    parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
-    )
-
-
-def add_files(parser: argparse.ArgumentParser, kinds: str, *, needed: bool = True) -> None:
-    """Add the argument FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
-    parser.add_argument(
-        "files", metavar="FILE", type=Path, nargs="+" if needed else "*",
-        help=f"{kinds}; folders and patterns of names, too",
-    )  # fmt: skip
-
-
-def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:
-    """Add `--output`: a file with one of these suffixes, or a folder."""
-    kind = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
-    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **kind, **more})
-
-
-def add_own_patch(parser: argparse.ArgumentParser) -> None:
-    """Add a patch of the user's own and the options for reading it; see `own_patch`."""
-    parser.add_argument(
-        "heights", metavar="HEIGHTS", type=Path, nargs="?",
-        help="patch to measure, from any file of heights; default: gratings.elaphe_like",
-    )  # fmt: skip
-    add_heights(parser)
-
-
-def check_own_patch(args: argparse.Namespace) -> None:
-    """Refuse options for reading heights where no file is named, with a usage error."""
-    if args.heights is None and used_heights_options(args):
-        args.parser.error(f"{used_heights_options(args)[0]} needs a file of heights")
-
-
-def own_patch(args: argparse.Namespace) -> HeightField | None:
-    """Return the patch that is named, or None."""
-    from ..heights.load import load_heights
-
-    return None if args.heights is None else load_heights(args.heights, load_options(args))
-
-
-def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> None:
+def add_table(group: Group, names: Sequence[str] = TABLE, **defaults: str) -> None:
     """Add the settings of a table. defaults: texts for the help in place of the default values."""
     for name in names:
         item = described_setting(name)
-        kind: dict[str, Any] = {"choices": item.choices}
-        if item.choices is None:
-            kind = {
-                "metavar": item.metavar,
-                "type": whole_number(1) if item.type is int else item.type,
-            }
-        if isinstance(item.metavar, tuple):
-            kind["nargs"] = len(item.metavar)
+        kind = item.choices or (whole_number(1) if item.type is int else item.type)
+        values = (item.metavar,) if isinstance(item.metavar, str) else item.metavar or ()
         default = defaults.get(name, item.default_text)
-        group.add_argument(_option(name), help=f"{item.help}; default: {default}", **kind)
+        add_option(
+            group, " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind
+        )
 
 
 def table_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -242,34 +279,26 @@ def table_options(args: argparse.Namespace) -> dict[str, Any]:
 
     Raises a DiffractionError if a value is not allowed.
     """
-    values = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
-    return {name: checked(name, value) for name, value in values.items() if value is not None}
+    values = given(args, (*TABLE, "wavelength_range"))
+    return {name: checked(name, value) for name, value in values.items()}
 
 
 def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
     """Add the direction of the light in degrees; without `phi` it is across the patch's grooves."""
-    group.add_argument(
-        "--theta", metavar="DEG", type=float, default=theta,
-        help=f"angle of the light from the normal, 0 to below 90; default: {theta:g}",
-    )  # fmt: skip
-    group.add_argument(
-        "--phi", metavar="DEG", type=float, default=phi,
-        help="azimuth of the light, from the patch's x axis towards y; default: "
-        + ("across the grooves if there are any, or 0" if phi is None else f"{phi:g}"),
-    )  # fmt: skip
-
-
-def add_wavelength_range(group: Group) -> None:
-    """Add the limits of the spectrum, nm."""
-    add_table(group, ("wavelength_range",))
+    azimuth = "azimuth of the light, from the patch's x axis towards y"
+    if phi is None:
+        azimuth += "; default: across the grooves if there are any, or 0"
+    add_options(
+        group,
+        ("--theta DEG", "angle of the light from the normal, 0 to below 90", float, theta),
+        ("--phi DEG", azimuth, float, phi),
+    )
 
 
 def add_wavelengths(group: Group) -> None:
     """Add the limits of the spectrum and its step, nm; see `wavelengths`."""
-    add_wavelength_range(group)
-    group.add_argument(
-        "--step", metavar="NM", type=float, help=f"between wavelengths; default: {STEP:g}"
-    )
+    add_table(group, ("wavelength_range",))
+    add_option(group, "--step NM", f"between wavelengths; default: {STEP:g}", float)
 
 
 def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
@@ -278,71 +307,25 @@ def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
     return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
 
 
-def add_resolution(group: Group, pixels: int) -> None:
-    """Add the size of a map."""
-    group.add_argument(
-        "--resolution", metavar="N", type=int, default=pixels,
-        help=f"pixels a side; default: {pixels}",
-    )  # fmt: skip
-
-
 def add_method(group: Group, default: str | None, text: str) -> None:
     """Add the method that sums the spectrum, and the period that some methods need."""
-    group.add_argument(
-        "--method", choices=METHODS, default=default,
-        help=text + (f"; default: {default}" if default else ""),
-    )  # fmt: skip
-    group.add_argument(
-        "--period", metavar="D", type=float,
-        help="µm, for the methods that need one; default: estimated from the heights",
-    )  # fmt: skip
+    period = "µm, for the methods that need one; default: estimated from the heights"
+    add_options(group, ("--method", text, METHODS, default), ("--period D", period, float))
 
 
-def add_exposure(group: Group, default: float | None, text: str) -> None:
-    """Add the exposure of a picture in stops."""
-    group.add_argument(
-        "--exposure", metavar="EV", type=number_between(-100, 100), default=default, help=text
+def samples(least: int, default: int | None) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Return the rows of samples per pixel and of the seed of their random numbers."""
+    own = "; default: the scene's" if default is None else ""
+    return (
+        ("-s --spp N", f"samples per pixel{own}", whole_number(least), default),
+        ("--seed N", "seed of the random numbers", whole_number(0), 0),
     )
-
-
-def add_view(group: Group) -> None:
-    """Add the view by which a picture's linear light is shown."""
-    group.add_argument(
-        "--view", choices=VIEWS, default="natural",
-        help="natural keeps hues and turns bright light white; standard clips each channel "
-        "by itself; default: natural",
-    )  # fmt: skip
-
-
-def add_mode(parser: argparse.ArgumentParser) -> None:
-    """Add Mitsuba's variant."""
-    parser.add_argument(
-        "-m", "--mode", metavar="VARIANT",
-        help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
-    )  # fmt: skip
-
-
-def add_samples(parser: argparse.ArgumentParser, least: int, default: int | None) -> None:
-    """Add samples per pixel and the seed of their random numbers."""
-    shown = "the scene's" if default is None else str(default)
-    parser.add_argument(
-        "-s", "--spp", metavar="N", type=whole_number(least), default=default,
-        help=f"samples per pixel; default: {shown}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seed", metavar="N", type=whole_number(0), default=0,
-        help="seed of the random numbers; default: 0",
-    )  # fmt: skip
 
 
 def add_json(parser: argparse.ArgumentParser, content: str = "the figures", **more: Any) -> None:
     """Add a file for the figures that are printed; `main` checks that it can be written."""
-    parser.add_argument(
-        "--json",
-        metavar="FILE",
-        type=path_ending_in(".json"),
-        help=f"write {content} as JSON",
-        **more,
+    add_option(
+        parser, "--json FILE", f"write {content} as JSON", path_ending_in(".json"), None, more
     )
 
 

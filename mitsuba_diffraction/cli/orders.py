@@ -18,41 +18,35 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "of s and of p light; a thin sheet also has the transmitted shares. "
         "'solve --import' reads the file back.",
     )  # fmt: skip
-    parser.add_argument(
-        "table",
-        metavar="TABLE",
-        type=Path,
-        help="of orders (.nc), from 'mitsuba-diffraction solve'",
-    )
-    options.add_output(
-        parser, "the CSV; default: TABLE's name with .csv in the current folder", ".csv"
-    )
+    options.add_options(
+        parser,
+        ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
+        ("-o --output OUT", "the CSV; default: TABLE's name with .csv in the current folder",
+         options.path_ending_in(".csv")),
+    )  # fmt: skip
     group = parser.add_argument_group(
         "the light", "Values, or FIRST:LAST:STEP, several joined by commas."
     )
-    group.add_argument(
-        "--theta", metavar="DEG", type=options.numbers, default=(0.0,),
-        help="angles of the light from the normal, -90 to 90; e.g. 30, or --theta=-85:85:5; "
-        "default: 0",
+    options.add_options(
+        group,
+        ("--theta DEG", "angles of the light from the normal, -90 to 90; e.g. 30, or "
+         "--theta=-85:85:5; default: 0", options.numbers, (0.0,)),
+        ("--phi DEG", "azimuths of the light, from x, across the grooves, towards y; default: 0",
+         options.numbers, (0.0,)),
     )  # fmt: skip
-    group.add_argument(
-        "--phi", metavar="DEG", type=options.numbers, default=(0.0,),
-        help="azimuths of the light, from x, across the grooves, towards y; default: 0",
-    )  # fmt: skip
-    chosen = group.add_mutually_exclusive_group()
-    chosen.add_argument(
-        "--wavelength",
-        metavar="NM",
-        type=options.numbers,
-        help="wavelengths in vacuum, e.g. 400:700:20",
+    options.add_options(
+        group.add_mutually_exclusive_group(),
+        ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20", options.numbers),
+        (
+            "--step NM",
+            "between wavelengths, over all of the table",
+            number_between(0.01, 1000),
+            5.0,
+        ),
     )
-    chosen.add_argument(
-        "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
-        help="between wavelengths, over all of the table; default: 5",
-    )  # fmt: skip
-    group.add_argument(
-        "--polarised", action="store_true",
-        help="shares of s and of p light; default: both are the share of unpolarised light",
+    options.add_option(
+        group, "--polarised", "shares of s and of p light; default: both are the share of "
+        "unpolarised light", bool,
     )  # fmt: skip
     options.add_json(parser, "the lines")
 

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
+#: How a plan is made.
+PLAN = (
+    ("--paths N", "paths to trace for a plan", whole_number(2), PATHS),
+    ("--plan-tolerance SHARE", "share of a surface's light that a plan may leave out",
+     number_between(1e-5, 0.1), TOLERANCE),
+)  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -31,25 +37,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
         "these, for `precompute` and `render --plan`.",
     )  # fmt: skip
-    scene_options.add_scene(parser)
-    add_plan_options(parser)
-    options.add_output(
-        parser, "write the recipe; those of further tables are OUT_2.toml and so on", ".toml",
-        metavar="OUT.toml",
+    options.add_options(
+        parser,
+        *scene_options.SCENE,
+        *PLAN,
+        ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
+         "on", options.path_ending_in(".toml")),
     )  # fmt: skip
     options.add_json(parser)
-
-
-def add_plan_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --paths and --plan-tolerance."""
-    parser.add_argument(
-        "--paths", metavar="N", type=whole_number(2), default=PATHS,
-        help=f"paths to trace for a plan; default: {PATHS}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--plan-tolerance", metavar="SHARE", type=number_between(1e-5, 0.1), default=TOLERANCE,
-        help=f"share of a surface's light that a plan may leave out; default: {TOLERANCE:g}",
-    )  # fmt: skip
 
 
 def planning_variant(requested: str | None) -> str:
@@ -164,5 +159,5 @@ def check_plan_options(args: argparse.Namespace) -> None:
     """Refuse options of a plan without one; a usage error."""
     for name, default in (("paths", PATHS), ("plan_tolerance", TOLERANCE)):
         if args.plan is None and getattr(args, name) != default:
-            option = name.replace("_", "-")
-            args.parser.error(f"argument --{option}: is for --plan, which is missing")
+            option = options.option_of(args, name)
+            args.parser.error(f"argument {option}: is for --plan, which is missing")

@@ -30,19 +30,18 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Build a table of diffraction orders from measured or generated heights, and measure its "
         "error. Options override the settings of a recipe.",
     )  # fmt: skip
-    parser.add_argument(
-        "sources", metavar="SOURCE", nargs="+", type=Path,
-        help="image, array, text, AFM file or recipe (.toml); several patches of one surface make "
-        "one table of their mean powers, several recipes make a table each",
-    )  # fmt: skip
-    options.add_output(
-        parser, "the table; default: where the recipe says, or else SOURCE's name with .exr in "
-        "the current folder", ".exr",
+    options.add_options(
+        parser,
+        ("SOURCE ...", "image, array, text, AFM file or recipe (.toml); several patches of one "
+         "surface make one table of their mean powers, several recipes make a table each", Path,
+         None, {"dest": "sources"}),
+        ("-o --output OUT", "the table; default: where the recipe says, or else SOURCE's name with "
+         ".exr in the current folder", options.path_ending_in(".exr")),
     )  # fmt: skip
     options.add_heights(parser)
     group = parser.add_argument_group("the table")
     options.add_table(group)
-    options.add_wavelength_range(group)
+    options.add_table(group, ("wavelength_range",))
     add_workers(parser)
     options.add_json(parser, "the table's summary")
 

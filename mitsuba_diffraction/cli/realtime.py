@@ -14,7 +14,7 @@ from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
-from .brdf_map import add_surface, add_surface_source, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
 from .report import check_outputs, check_writable, plain, save_json, save_report
@@ -29,24 +29,18 @@ def add_view(subparsers: options.Subparsers) -> None:
         "light with the right one, move with the middle one or shift, zoom with the wheel; "
         "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
     )  # fmt: skip
-    scene_options.add_scene(parser)
-    parser.add_argument(
-        "--method", choices=METHODS, default="fast", help="method of the shaders; default: fast"
-    )
-    options.add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
-    options.add_view(parser)
-    parser.add_argument(
-        "--size", metavar="WxH", type=_size, default=(1280, 800),
-        help="size of the window in pixels; default: 1280x800",
-    )  # fmt: skip
-    options.add_output(parser, "for screenshots; default: the current folder", default=Path())
-    parser.add_argument(
-        "--frames", metavar="N", type=whole_number(0), default=0,
-        help="close the window after N frames and print their time; default: 0, never",
-    )  # fmt: skip
-    parser.add_argument(
-        "--window", choices=("pyglet", "glfw", "sdl2", "headless"), default="pyglet",
-        help="toolkit of the window; glfw and sdl2 need further packages, headless opens none",
+    options.add_options(
+        parser,
+        *scene_options.SCENE,
+        ("--method", "method of the shaders", METHODS, "fast"),
+        ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
+        options.VIEW,
+        ("--size WxH", "size of the window in pixels; default: 1280x800", _size, (1280, 800)),
+        ("-o --output FOLDER", "for screenshots; default: the current folder", Path, Path()),
+        ("--frames N", "close the window after N frames and print their time; default: 0, never",
+         whole_number(0), 0),
+        ("--window", "toolkit of the window; glfw and sdl2 need further packages, headless opens "
+         "none", ("pyglet", "glfw", "sdl2", "headless"), None, {"default": "pyglet"}),
     )  # fmt: skip
 
 
@@ -79,28 +73,19 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "transport; and, as a detail, where both see the same lit surface under lights "
         "without extent, by points and directions in place of the scene's.",
     )  # fmt: skip
-    scene_options.add_scene(parser)
-    options.add_output(
-        parser, "for pictures (EXR), sheets (PNG) and compare.json; default: the scene's name "
-        "with _compare in the current folder",
-    )  # fmt: skip
-    parser.add_argument(
-        "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["fast"],
-        help=f"methods of the shaders: {', '.join(METHODS)}, or all; default: fast",
-    )  # fmt: skip
-    options.add_samples(parser, 2, 1024)
-    parser.add_argument(
-        "--full-spp", metavar="N", type=whole_number(0), default=64,
-        help="samples per pixel of full transport; 0 leaves it out; default: 64",
-    )  # fmt: skip
-    parser.add_argument(
-        "--frames", metavar="N", type=whole_number(4), default=512,
-        help="frames of progressive light for fast and exact; default: 512",
-    )  # fmt: skip
-    parser.add_argument(
-        "--supersampling", metavar="N", type=whole_number(1), default=8,
-        help="the shaders' samples along either side of a pixel (at most 2 of flss, nmm and pq); "
-        "default: 8",
+    options.add_options(
+        parser,
+        *scene_options.SCENE,
+        ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
+         "scene's name with _compare in the current folder", Path),
+        ("--method NAME ...", f"methods of the shaders: {', '.join(METHODS)}, or all; default: "
+         "fast", (*METHODS, "all"), ["fast"]),
+        *options.samples(2, 1024),
+        ("--full-spp N", "samples per pixel of full transport; 0 leaves it out",
+         whole_number(0), 64),
+        ("--frames N", "frames of progressive light for fast and exact", whole_number(4), 512),
+        ("--supersampling N", "the shaders' samples along either side of a pixel (at most 2 of "
+         "flss, nmm and pq)", whole_number(1), 8),
     )  # fmt: skip
     options.add_json(parser)
 
@@ -143,18 +128,15 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
         "as fit; the resulting ΔE2000 is printed, and shown on the page.",
     )  # fmt: skip
-    scene_options.add_scene(parser)
-    parser.add_argument(
-        "output", metavar="OUT", type=path_ending_in(".html"), help="the page to write"
-    )
-    parser.add_argument(
-        "--method", choices=(*WEB_METHODS, "all"), default="all",
-        help="method on the page; all leaves out those that do not suit the scene; default: all",
+    options.add_options(
+        parser,
+        *scene_options.SCENE,
+        ("OUT", "the page to write", path_ending_in(".html"), None, {"dest": "output"}),
+        ("--method", "method on the page; all leaves out those that do not suit the scene",
+         (*WEB_METHODS, "all"), "all"),
+        options.VIEW,
+        ("--title TEXT", "title of the page; default: the scene's name"),
     )  # fmt: skip
-    options.add_view(parser)
-    parser.add_argument(
-        "--title", metavar="TEXT", help="title of the page; default: the scene's name"
-    )
     options.add_json(parser, "contents of the page")
 
 
@@ -201,17 +183,15 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
         "constants (JSON), and a material of three.js that uses them. How to bring it into "
         "another engine: docs/realtime.md.",
     )  # fmt: skip
-    add_surface_source(parser)
-    options.add_output(
-        parser, "to write into, made if it is missing; default: SOURCE's name with -shader in the "
-        "current folder",
+    options.add_options(
+        parser,
+        *SURFACE_SOURCE,
+        ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
+         "-shader in the current folder", Path),
+        ("--method", "colours of daylight summed up beforehand, a loop over wavelengths, or both; "
+         "default: both", _EXPORTED, _EXPORTED, {"nargs": "+"}),
+        options.MODE,
     )  # fmt: skip
-    parser.add_argument(
-        "--method", choices=_EXPORTED, nargs="+", default=_EXPORTED,
-        help="colours of daylight summed up beforehand, a loop over wavelengths, or both; "
-        "default: both",
-    )  # fmt: skip
-    options.add_mode(parser)
     add_surface(parser.add_argument_group("the surface"), turned=False)
     options.add_heights(parser)
     options.add_json(parser, "the files and their settings")

@@ -29,14 +29,14 @@ from ..scene.parameters import values_of_frames
 from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
-from .animation import add_animation, say_why
+from .animation import ANIMATION, say_why
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
-from .observed import add_observer, run_observed
-from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
+from .observed import OBSERVER, run_observed
+from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, default_output, save_report
-from .studio import add_studio, take_studio
-from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
+from .studio import STUDIO_OPTIONS, take_studio
+from .workers import THREADS, add_workers, client_of, film_of, on_workers, say_report
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -47,37 +47,30 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "files while parameters of the scene change; existing frames with the same "
         "settings are kept, so an interrupted run can be continued.",
     )  # fmt: skip
-    scene_options.add_scene(parser)
-    options.add_output(
-        parser, "EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
-        "the current folder. With --frames: a folder, or a film, .webp, .gif or .mp4, whose "
-        "frames go into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
+    options.add_options(
+        parser,
+        *scene_options.SCENE,
+        ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: the scene's name "
+         "with .exr in the current folder. With --frames: a folder, or a film, .webp, .gif or "
+         ".mp4, whose frames go into a folder of its name; default: the folder SCENE_frames", Path),
+        *options.samples(1, None),
+        ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
+        options.VIEW,
+        ("--denoise", "write a denoised picture, too, with _denoised in its name (extra denoise); "
+         "with --frames, denoise each frame, all of one seed; the film gets the box filter, which "
+         "the denoiser needs", bool),
+        ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
+         bool),
+        ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "
+         "of `plan -o`, or without any, planned first", recipe_file, None, {"nargs": "*"}),
+        *PLAN,
+        *OBSERVER,
     )  # fmt: skip
-    options.add_samples(parser, 1, None)
-    options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
-    options.add_view(parser)
-    parser.add_argument(
-        "--denoise", action="store_true",
-        help="write a denoised picture, too, with _denoised in its name (extra denoise); with "
-        "--frames, denoise each frame, all of one seed; the film gets the box filter, which the "
-        "denoiser needs",
-    )  # fmt: skip
-    parser.add_argument(
-        "--preview", action="store_true",
-        help="half the width and height, and at most 16 samples, unless -s is given",
-    )  # fmt: skip
-    parser.add_argument(
-        "--plan", nargs="*", metavar="RECIPE.toml", type=recipe_file,
-        help="render with tables limited to what the scene needs: by the recipes of `plan -o`, or "
-        "without any, planned first",
-    )  # fmt: skip
-    add_plan_options(parser)
-    add_observer(parser)
     options.add_json(parser, "size, samples, time and files of the picture")
-    add_animation(parser)
-    add_studio(parser)
+    options.add_options(parser.add_argument_group("animation"), *ANIMATION)
+    options.add_options(parser.add_argument_group("a mesh in a few words"), *STUDIO_OPTIONS)
     add_workers(parser)
-    add_threads(parser)
+    options.add_option(parser, *THREADS)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, readable_file
 from ..scene.parameters import Change, change_of
-from .options import add_mode, whole_number
+from .options import MODE, whole_number
 
 #: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
 SURFACE = "surface"
@@ -34,40 +34,23 @@ def change(text: str) -> Change:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def add_scene(parser: argparse.ArgumentParser) -> None:
-    """Add a scene, its parameters, variant and sensor."""
-    parser.add_argument(
-        "scene", metavar="SCENE", type=Path,
-        help="Mitsuba XML file; or, with --patch, a mesh (PLY, OBJ, glTF, USD) for the studio",
-    )  # fmt: skip
-    parser.add_argument(
-        "--patch", metavar="FILE", type=Path,
-        help="surface of a mesh: heights, recipe or table; pixel_size, max_height, material, up, "
-        "turn and the lamp are set by -D",
-    )  # fmt: skip
-    parser.add_argument(
-        "--preset", metavar="[ID=]NAME[,NAME=VALUE...]", action="append", default=[],
-        dest="presets",
-        help="instead of --patch: a named look, e.g. cd or snake,height_scale=0.7, which "
-        "'mitsuba-diffraction presets' lists; of a scene, the look of the BSDF or shape of this "
-        f"id; default of ID: {SURFACE}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--material", metavar="ID=FILE[,NAME=VALUE...]", type=definition, action="append",
-        default=[], dest="materials",
-        help="put a surface on the BSDF or shape of this id, e.g. mat-Skin=scale.exr,int_ior=1.56; "
-        "the scene's BSDF there lies beneath it, unless `material` names a conductor; may be "
-        "given several times",
-    )  # fmt: skip
-    add_mode(parser)
-    parser.add_argument(
-        "-D", "--define", metavar="KEY=VALUE", type=definition, action="append", default=[],
-        dest="parameters", help="set a parameter of the scene; may be given several times",
-    )  # fmt: skip
-    parser.add_argument(
-        "--sensor", metavar="N", type=whole_number(0), default=0,
-        help="number of the sensor, from 0; default: 0",
-    )  # fmt: skip
+#: A scene, its parameters, variant and sensor.
+SCENE = (
+    ("SCENE", "Mitsuba XML file; or, with --patch, a mesh (PLY, OBJ, glTF, USD) for the studio",
+     Path),
+    ("--patch FILE", "surface of a mesh: heights, recipe or table; pixel_size, max_height, "
+     "material, up, turn and the lamp are set by -D", Path),
+    ("--preset [ID=]NAME[,NAME=VALUE...]", "instead of --patch: a named look, e.g. cd or "
+     "snake,height_scale=0.7, which 'mitsuba-diffraction presets' lists; of a scene, the look of "
+     f"the BSDF or shape of this id; default of ID: {SURFACE}", [str], None, {"dest": "presets"}),
+    ("--material ID=FILE[,NAME=VALUE...]", "put a surface on the BSDF or shape of this id, e.g. "
+     "mat-Skin=scale.exr,int_ior=1.56; the scene's BSDF there lies beneath it, unless `material` "
+     "names a conductor; may be given several times", [definition], None, {"dest": "materials"}),
+    MODE,
+    ("-D --define KEY=VALUE", "set a parameter of the scene; may be given several times",
+     [definition], None, {"dest": "parameters"}),
+    ("--sensor N", "number of the sensor, from 0", whole_number(0), 0),
+)  # fmt: skip
 
 
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:

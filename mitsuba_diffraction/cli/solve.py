@@ -30,6 +30,15 @@ _SOLVED_ONLY = (
     "wavelength_range", "tolerance", "solver", "resolution", "polarised", "accept", "theta", "phi",
     "step", "jobs", "workers", "scheduler",
 )  # fmt: skip
+#: Options that override fields of a recipe.
+_OF_A_RECIPE = (
+    "material", "superstrate", "thin", "block", "output", "substrate", "layers", "beneath",
+)  # fmt: skip
+#: Options that override settings of a recipe, and the names of these.
+_SETTINGS = {
+    "wavelength_range": "wavelengths", "tolerance": "tolerance", "solver": "method",
+    "resolution": "resolution", "polarised": "polarised", "accept": "accept",
+}  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -40,109 +49,63 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "table of the BSDF diffraction_orders. "
         "Interrupted by Ctrl-C, the same command goes on.",
     )  # fmt: skip
-    parser.add_argument(
-        "source", metavar="SOURCE",
-        help="lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, undercut "
-        "allowed); a recipe (.toml); with --import a file of efficiencies",
+    options.add_options(
+        parser,
+        ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
+         "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
+        ("-o --output OUT", "the table; default: SOURCE's name with .nc",
+         options.path_ending_in(".nc")),
     )  # fmt: skip
-    options.add_output(parser, "the table; default: SOURCE's name with .nc", ".nc")
-    group = parser.add_argument_group("the grating")
-    group.add_argument("--period", metavar="D", type=number_between(0.01, 1000), help="µm")
-    group.add_argument(
-        "--crossed", action="store_true", default=None,
-        help="SOURCE is one period of heights in x and y: an array (.npy) in µm, or an image with "
-        "--depth from black to white; needs --period; reflection in air, by ikarus-rcwa (extra "
-        "crossed), for dielectrics",
+    options.add_options(
+        parser.add_argument_group("the grating"),
+        ("--period D", "µm", number_between(0.01, 1000)),
+        ("--crossed", "SOURCE is one period of heights in x and y: an array (.npy) in µm, or an "
+         "image with --depth from black to white; needs --period; reflection in air, by "
+         "ikarus-rcwa (extra crossed), for dielectrics", bool),
+        ("--period-y D", "µm, of a crossed grating, along y; default: --period",
+         number_between(0.01, 1000)),
+        ("--depth H", "µm, of a generator", number_between(0, 100)),
+        ("--duty F", "ridge, lamellar", number_between(0, 1)),
+        ("--direction", "towards +x, blazed", ("descending", "ascending")),
+        ("--material M", "conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, or none "
+         "(reflects all); default: Al"),
+        ("--superstrate N", "index of the clear medium above the grooves, e.g. 1.58 under "
+         "polycarbonate; default: 1", number_between(1, 5)),
+        ("--layer M:T", "film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; "
+         "once for each, from the material upwards", [_layer], None, {"dest": "layers"}),
+        ("--beneath M:T", "layer beneath the grooves, or a file of layers and slices (.toml); once "
+         "for each, from the substrate upwards", [_layer]),
+        ("--substrate M", "material below them; default: --material"),
+        ("--thin", "a thin sheet that light goes through, with these grooves on its upper side; "
+         "needs an index as material", bool),
+        ("--block", "a clear block with these grooves on its upper face, in light from above and "
+         "from within; needs an index as material; solved by coupled waves", bool),
     )  # fmt: skip
-    group.add_argument(
-        "--period-y", metavar="D", type=number_between(0.01, 1000),
-        help="µm, of a crossed grating, along y; default: --period",
+    options.add_options(
+        parser.add_argument_group("the table"),
+        ("--wavelength-range A,B", "nm; default: 380,780", _pair),
+        ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
+         "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
+        ("--accept", "write a table that misses the tolerance, too, with its error", bool),
+        ("--solver", "Chandezon's method, for slopes; boundary integral (extra solve); coupled "
+         "waves, for dielectrics; default: auto, the first that suits",
+         ("auto", "chandezon", "integral", "coupled")),
+        ("--resolution N", "points on the boundary, or harmonics; default: chosen by convergence",
+         whole_number(4)),
+        ("--polarised", "with Mueller matrices, for polarised variants; about 20 times as large",
+         bool),
+        ("--theta DEG", "solve light from these directions alone, angles from the normal within "
+         "the superstrate, e.g. 63.4, or --theta=-20:20:5: for an echelle in its mount",
+         options.numbers),
+        ("--phi DEG", "with --theta: azimuths from x, across the grooves, towards y; default: 0",
+         options.numbers),
+        ("--step NM", "with --theta: between wavelengths; default: 5", number_between(0.01, 1000)),
+        ("--import", "SOURCE holds efficiencies of another program or a bench: a long CSV of "
+         "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of incidence "
+         "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
+         {"dest": "imports"}),
     )  # fmt: skip
-    group.add_argument(
-        "--depth", metavar="H", type=number_between(0, 100), help="µm, of a generator"
-    )
-    group.add_argument("--duty", metavar="F", type=number_between(0, 1), help="ridge, lamellar")
-    group.add_argument(
-        "--direction", choices=("descending", "ascending"), help="towards +x, blazed"
-    )
-    group.add_argument(
-        "--material", metavar="M",
-        help="conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, or none (reflects "
-        "all); default: Al",
-    )  # fmt: skip
-    group.add_argument(
-        "--superstrate", metavar="N", type=number_between(1, 5),
-        help="index of the clear medium above the grooves, e.g. 1.58 under polycarbonate; "
-        "default: 1",
-    )  # fmt: skip
-    group.add_argument(
-        "--layer", metavar="M:T", type=_layer, action="append", dest="layers",
-        help="film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; once for "
-        "each, from the material upwards",
-    )  # fmt: skip
-    group.add_argument(
-        "--beneath", metavar="M:T", type=_layer, action="append",
-        help="layer beneath the grooves, or a file of layers and slices (.toml); once for each, "
-        "from the substrate upwards",
-    )  # fmt: skip
-    group.add_argument("--substrate", metavar="M", help="material below them; default: --material")
-    group.add_argument(
-        "--thin", action="store_true", default=None,
-        help="a thin sheet that light goes through, with these grooves on its upper side; needs an "
-        "index as material",
-    )  # fmt: skip
-    group.add_argument(
-        "--block", action="store_true", default=None,
-        help="a clear block with these grooves on its upper face, in light from above and from "
-        "within; needs an index as material; solved by coupled waves",
-    )  # fmt: skip
-    group = parser.add_argument_group("the table")
-    group.add_argument("--wavelength-range", metavar="A,B", type=_pair, help="nm; default: 380,780")
-    group.add_argument(
-        "--tolerance", metavar="E", type=number_between(1e-4, 0.2),
-        help="mean error between nodes, of the light in all orders but 0; 95 %% of directions keep "
-        "4 times as much; default: 0.01",
-    )  # fmt: skip
-    group.add_argument(
-        "--accept", action="store_true", default=None,
-        help="write a table that misses the tolerance, too, with its error",
-    )  # fmt: skip
-    group.add_argument(
-        "--solver", choices=("auto", "chandezon", "integral", "coupled"),
-        help="Chandezon's method, for slopes; boundary integral (extra solve); coupled waves, for "
-        "dielectrics; default: auto, the first that suits",
-    )  # fmt: skip
-    group.add_argument(
-        "--resolution", metavar="N", type=whole_number(4),
-        help="points on the boundary, or harmonics; default: chosen by convergence",
-    )  # fmt: skip
-    group.add_argument(
-        "--polarised", action="store_true", default=None,
-        help="with Mueller matrices, for polarised variants; about 20 times as large",
-    )  # fmt: skip
-    group.add_argument(
-        "--theta", metavar="DEG", type=options.numbers,
-        help="solve light from these directions alone, angles from the normal within the "
-        "superstrate, e.g. 63.4, or --theta=-20:20:5: for an echelle in its mount",
-    )  # fmt: skip
-    group.add_argument(
-        "--phi", metavar="DEG", type=options.numbers,
-        help="with --theta: azimuths from x, across the grooves, towards y; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--step", metavar="NM", type=number_between(0.01, 1000),
-        help="with --theta: between wavelengths; default: 5",
-    )  # fmt: skip
-    group.add_argument(
-        "--import", dest="imports", action="store_true",
-        help="SOURCE holds efficiencies of another program or a bench: a long CSV of "
-        "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of "
-        "incidence or more; order_x, order_y for order make a crossed grating; needs --period",
-    )  # fmt: skip
-    parser.add_argument(
-        "--jobs", metavar="N", type=whole_number(1),
-        help="processes here; default: 1",
-    )  # fmt: skip
+    options.add_option(parser, "--jobs N", "processes here; default: 1", whole_number(1))
     add_workers(parser)
     options.add_json(parser, "the table's summary")
 
@@ -183,10 +146,7 @@ def _check_import(args: argparse.Namespace) -> None:
     """Refuse an import without its period, or with options of a solution."""
     if args.period is None:
         args.parser.error("argument --import: needs --period, µm")
-    for name in _SOLVED_ONLY:
-        if getattr(args, name) is not None:
-            option = name.replace("_", "-")
-            args.parser.error(f"argument --{option}: is for a solution; --import has efficiencies")
+    options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
@@ -195,16 +155,10 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     from ..solve.recipes import SolvedRecipe, profile_of
 
     source = Path(args.source)
-    if args.period_y is not None:
-        args.parser.error("argument --period-y: profiles are one-dimensional; add --crossed")
-    shape = {
-        name: value
-        for name in ("period", "depth", "duty", "direction")
-        if (value := getattr(args, name)) is not None
-    }
+    options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
+    shape = options.given(args, ("period", "depth", "duty", "direction"))
     if source.suffix.lower() == ".toml":
-        if shape:
-            args.parser.error(f"argument --{next(iter(shape))}: the recipe has the profile")
+        options.refuse(args, shape, ": the recipe has the profile")
         recipe = SolvedRecipe.load(source)
     else:
         if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
@@ -213,27 +167,12 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
-    changed = {
-        field: value
-        for field, value in (
-            ("wavelengths", args.wavelength_range), ("tolerance", args.tolerance),
-            ("method", args.solver), ("resolution", args.resolution),
-            ("polarised", args.polarised), ("accept", args.accept),
-        )
-        if value is not None
-    }  # fmt: skip
-    return replace(
-        recipe,
-        material=recipe.material if args.material is None else args.material,
-        superstrate=recipe.superstrate if args.superstrate is None else args.superstrate,
-        thin=recipe.thin or bool(args.thin),
-        block=recipe.block or bool(args.block),
-        settings=replace(recipe.settings, **changed),
-        output=args.output or recipe.output,
-        substrate=recipe.substrate if args.substrate is None else args.substrate,
-        layers=_chained(args.layers, recipe.layers),
-        beneath=_chained(args.beneath, recipe.beneath),
-    )
+    changed = options.given(args, _OF_A_RECIPE)
+    for name in ("layers", "beneath"):
+        if name in changed:
+            changed[name] = tuple(itertools.chain(*changed[name]))
+    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
+    return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
@@ -359,11 +298,6 @@ def _layer(text: str) -> Layers:
             "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
             f"'{text[:40]}'"
         ) from error
-
-
-def _chained(given: list[Layers] | None, default: Layers) -> Layers:
-    """Return the layers of all uses of an option."""
-    return default if given is None else tuple(itertools.chain(*given))
 
 
 def _time(seconds: float) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from . import options
 from .console import Bar, say
 from .workers import executor_for
 
@@ -26,10 +27,7 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
     from ..heights.read import LoadOptions, read_heights
     from ..solve.crossed import solve_crossed
 
-    for name in _GROOVES_ONLY:
-        if getattr(args, name):
-            option = {"layers": "layer", "imports": "import"}.get(name, name)
-            args.parser.error(f"argument --{option}: not allowed with --crossed")
+    options.refuse(args, _GROOVES_ONLY, ": not allowed with --crossed")
     if args.period is None:
         args.parser.error("argument --crossed: needs --period, µm")
     cell = read_heights(

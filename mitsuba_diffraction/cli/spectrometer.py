@@ -37,40 +37,18 @@ def group(text: str) -> tuple[str, str]:
     return name, pattern
 
 
-def add_spectrometer(group: argparse._ArgumentGroup) -> None:
-    """Add the options of the measurement."""
-    group.add_argument(
-        "--light", metavar="DEG", type=float, default=30.0,
-        help="angle of the lamp from the normal; default: 30",
-    )  # fmt: skip
-    group.add_argument(
-        "--light-azimuth", "--azimuth", metavar="DEG", type=azimuth, default=0.0,
-        help="azimuth of the lamp from the patch's x axis towards y, or auto: across the grooves "
-        "of each scan's strongest grating; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--detector", metavar="DEG", type=angles, nargs="+", default=None,
-        help="angles of the detectors from the normal, positive on the far side from the lamp, or "
-        "ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to",
-    )  # fmt: skip
-    group.add_argument(
-        "--acceptance", metavar="DEG", type=float, default=2.0,
-        help="full angle of the cone that a detector collects; default: 2",
-    )  # fmt: skip
-    group.add_argument(
-        "--relative", choices=("white", "mirror", "none"), default="white",
-        help="per cent of a white standard, of a perfect mirror, or of the incident light; "
-        "default: white",
-    )  # fmt: skip
-    group.add_argument(
-        "--polarisation", action="store_true",
-        help="also light polarised across (s) and in (p) the plane of incidence",
-    )  # fmt: skip
-    group.add_argument(
-        "--wavelength-range", metavar=("FIRST", "LAST"), nargs=2, type=number_between(100, 10000),
-        help="nm; default: 300 830, or from where a table begins",
-    )  # fmt: skip
-    group.add_argument(
-        "--step", metavar="NM", type=number_between(0.01, 1000), default=5.0,
-        help="between wavelengths; default: 5",
-    )  # fmt: skip
+#: Options of the measurement.
+SPECTROMETER = (
+    ("--light DEG", "angle of the lamp from the normal", float, 30.0),
+    ("--light-azimuth --azimuth DEG", "azimuth of the lamp from the patch's x axis towards y, or "
+     "auto: across the grooves of each scan's strongest grating", azimuth, 0.0),
+    ("--detector DEG ...", "angles of the detectors from the normal, positive on the far side from "
+     "the lamp, or ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to", angles),
+    ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
+    ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
+     ("white", "mirror", "none"), "white"),
+    ("--polarisation", "also light polarised across (s) and in (p) the plane of incidence", bool),
+    ("--wavelength-range FIRST LAST", "nm; default: 300 830, or from where a table begins",
+     number_between(100, 10000)),
+    ("--step NM", "between wavelengths", number_between(0.01, 1000), 5.0),
+)  # fmt: skip

@@ -17,7 +17,7 @@ from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import measured_spectra, say_notes
 from .options import whole_number
 from .report import check_outputs, save_report
-from .spectrometer import add_spectrometer, group
+from .spectrometer import SPECTROMETER, group
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -35,42 +35,31 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
         f"their mean, and a second file the standard errors. {options.LIMITS}",
     )  # fmt: skip
-    options.add_files(parser, "tables, also of orders, recipes or heights", needed=False)
-    parser.add_argument(
-        "--group", metavar="NAME=PATTERN", type=group, action="append", default=[], dest="groups",
-        help="scans of one species, in place of FILE, e.g. --group corn='corn/*.spm'; may be given "
-        "several times: each has its columns, mean and errors",
-    )  # fmt: skip
-    parser.add_argument(
-        "--crops", metavar="N", type=whole_number(2),
-        help="cut each scan into N parts, whose standard errors are the scan's repeatability",
-    )  # fmt: skip
-    parser.add_argument(
-        "--observer", metavar="ANIMAL|CSV",
-        help="also quantum catches and contrasts (JND) of an eye: avian_uv, avian_v, lizard, "
-        "snake, dog, bee, human, or a file of wavelengths (nm) and a column of sensitivities for "
-        "each receptor",
-    )  # fmt: skip
-    parser.add_argument(
-        "--illuminant", metavar="LIGHT|CSV",
-        help="light of --observer: ideal, the same number of quanta at all wavelengths; d55, sun; "
-        "d65, sun and sky; d75, sky in open shade; leaves, a model of shade under leaves; or a "
-        "file of wavelengths (nm) and photons; default: ideal",
-    )  # fmt: skip
-    parser.add_argument(
-        "--iridescence", action="store_true",
-        help="also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others 2019), fitted "
-        "to lamps from 0 to 60 degrees and detectors between them, beside the mirror direction",
-    )  # fmt: skip
-    options.add_output(
-        parser, "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in the current "
-        "folder", ".csv",
+    options.add_options(
+        parser,
+        options.files("tables, also of orders, recipes or heights", "*"),
+        ("--group NAME=PATTERN", "scans of one species, in place of FILE, e.g. --group "
+         "corn='corn/*.spm'; may be given several times: each has its columns, mean and errors",
+         [group], None, {"dest": "groups"}),
+        ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
+         "repeatability", whole_number(2)),
+        ("--observer ANIMAL|CSV", "also quantum catches and contrasts (JND) of an eye: avian_uv, "
+         "avian_v, lizard, snake, dog, bee, human, or a file of wavelengths (nm) and a column of "
+         "sensitivities for each receptor"),
+        ("--illuminant LIGHT|CSV", "light of --observer: ideal, the same number of quanta at all "
+         "wavelengths; d55, sun; d65, sun and sky; d75, sky in open shade; leaves, a model of "
+         "shade under leaves; or a file of wavelengths (nm) and photons; default: ideal"),
+        ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
+         "2019), fitted to lamps from 0 to 60 degrees and detectors between them, beside the "
+         "mirror direction", bool),
+        ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
+         "the current folder", options.path_ending_in(".csv")),
     )  # fmt: skip
     # argparse takes -60:60:5 for an option otherwise
     parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
-    add_spectrometer(parser.add_argument_group("the spectrometer"))
+    options.add_options(parser.add_argument_group("the spectrometer"), *SPECTROMETER)
     add_surface(parser.add_argument_group("the surface"))
-    options.add_treatments(parser)
+    options.add_option(parser, *options.TREATMENTS)
     options.add_heights(parser)
     options.add_json(parser, "the spectra")
 

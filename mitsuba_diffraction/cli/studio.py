@@ -26,40 +26,32 @@ LOOKS: dict[str, tuple[dict[str, str], str, str]] = {
 _FRAMES, _IRRADIANCE = 24, 3.0
 
 
-def add_studio(parser: argparse.ArgumentParser) -> None:
-    """Declare the options; see `take_studio`."""
-    group = parser.add_argument_group("a mesh in a few words")
-    group.add_argument(
-        "--env", metavar="FILE", help="panorama (HDR, EXR) that lights the scene instead of lamps"
-    )
-    group.add_argument(
-        "--sun", metavar="AZ,EL", type=_angles,
-        help="sun at this azimuth and elevation in degrees, azimuth 0 to the right and 90 away "
-        "from the camera; with a clear sky, or beside --env",
-    )  # fmt: skip
-    group.add_argument(
-        "--look", choices=tuple(LOOKS),
-        help="material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
-        "default: metal, or skin with a --base that is a colour",
-    )  # fmt: skip
-    group.add_argument(
-        "--base", metavar="COLOUR|FILE|METAL",
-        help="pigment of a skin: 'r,g,b', '#804020', sienna, a picture (by the mesh's texture "
-        "coordinates) or the mesh's .glb, for its base colour; or name of the metal, e.g. gold",
-    )  # fmt: skip
-    group.add_argument(
-        "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"
-    )
-    group.add_argument(
-        "--orbit", action="store_true",
-        help=f"let the camera go around the mesh, or the surfaces of a scene that diffract, in "
-        f"--frames ({_FRAMES}) pictures",
-    )  # fmt: skip
-    group.add_argument(
-        "--clamp", metavar="L", type=number_between(1e-3, 1e6),
-        help="limit each sample to L times white, against bright dots; 200 leaves most of the "
-        "streaks that a structure makes of the sun",
-    )  # fmt: skip
+def _angles(text: str) -> tuple[str, str]:
+    """Type of argument: azimuth and elevation in degrees."""
+    angles = numbers_in(text)
+    if angles is None or len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
+        raise argparse.ArgumentTypeError(
+            f"expected azimuth and elevation in degrees, such as 120,40, got {quoted(text)}"
+        )
+    return f"{angles[0]:g}", f"{angles[1]:g}"
+
+
+#: Options of `render`; see `take_studio`.
+STUDIO_OPTIONS = (
+    ("--env FILE", "panorama (HDR, EXR) that lights the scene instead of lamps"),
+    ("--sun AZ,EL", "sun at this azimuth and elevation in degrees, azimuth 0 to the right and 90 "
+     "away from the camera; with a clear sky, or beside --env", _angles),
+    ("--look", "material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
+     "default: metal, or skin with a --base that is a colour", tuple(LOOKS)),
+    ("--base COLOUR|FILE|METAL", "pigment of a skin: 'r,g,b', '#804020', sienna, a picture (by the "
+     "mesh's texture coordinates) or the mesh's .glb, for its base colour; or name of the metal, "
+     "e.g. gold"),
+    ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
+    ("--orbit", "let the camera go around the mesh, or the surfaces of a scene that diffract, in "
+     f"--frames ({_FRAMES}) pictures", bool),
+    ("--clamp L", "limit each sample to L times white, against bright dots; 200 leaves most of the "
+     "streaks that a structure makes of the sun", number_between(1e-3, 1e6)),
+)  # fmt: skip
 
 
 def take_studio(args: argparse.Namespace) -> None:
@@ -123,13 +115,3 @@ def _is_metal(text: str) -> bool:
 
     name = METALS.get(text.lower(), text)
     return name not in TISSUES and tabulated_range(name) is not None
-
-
-def _angles(text: str) -> tuple[str, str]:
-    """Type of argument: azimuth and elevation in degrees."""
-    angles = numbers_in(text)
-    if angles is None or len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
-        raise argparse.ArgumentTypeError(
-            f"expected azimuth and elevation in degrees, such as 120,40, got {quoted(text)}"
-        )
-    return f"{angles[0]:g}", f"{angles[1]:g}"

@@ -11,12 +11,12 @@ from typing import Any
 
 from ..scene.load import set_variant
 from . import options
-from .brdf_map import add_material, surface_parameters
+from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
 from .report import check_writable, save_report
-from .workers import add_threads, add_workers, client_of, on_workers, worker_threads
+from .workers import THREADS, add_workers, client_of, on_workers, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
 _SIZES = 1.5
@@ -31,33 +31,26 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
         "command then exits with 1; a second run measures only new scans.",
     )  # fmt: skip
-    options.add_files(parser, "scans of any format, or recipes")
-    options.add_output(parser, "default: survey", default=Path("survey"))
-    options.add_treatments(parser)
-    parser.add_argument(
-        "--theta", metavar="DEG", type=number_between(0, 89), default=30.0,
-        help="angle of the light from the normal, across the strongest grating; default: 30",
+    options.add_options(
+        parser,
+        options.files("scans of any format, or recipes"),
+        ("-o --output FOLDER", "", Path, Path("survey")),
+        options.TREATMENTS,
+        ("--theta DEG", "angle of the light from the normal, across the strongest grating",
+         number_between(0, 89), 30.0),
+        ("--resolution N", "pixels of a map a side", whole_number(8), 160),
+        ("--repeats", "which scans are of one sample: those whose names differ in their last "
+         "number, or those of one folder", ("name", "folder"), "name"),
+        ("--crops N", "measure N crops of 10 µm of each scan, or as many as fit: compares scans of "
+         "different sizes, and gives errors of single scans", whole_number(1)),
+        options.MODE,
     )  # fmt: skip
-    parser.add_argument(
-        "--resolution", metavar="N", type=whole_number(8), default=160,
-        help="pixels of a map a side; default: 160",
-    )  # fmt: skip
-    parser.add_argument(
-        "--repeats", choices=("name", "folder"), default="name",
-        help="which scans are of one sample: those whose names differ in their last number, or "
-        "those of one folder; default: name",
-    )  # fmt: skip
-    parser.add_argument(
-        "--crops", metavar="N", type=whole_number(1),
-        help="measure N crops of 10 µm of each scan, or as many as fit: compares scans of "
-        "different sizes, and gives errors of single scans",
-    )  # fmt: skip
-    options.add_mode(parser)
-    add_material(parser.add_argument_group("the surface of the maps, by default R = 1"))
+    group = parser.add_argument_group("the surface of the maps, by default R = 1")
+    options.add_options(group, *MATERIAL)
     options.add_heights(parser)
     options.add_table(parser.add_argument_group("the tables"))
     add_workers(parser)
-    add_threads(parser)
+    options.add_option(parser, *THREADS)
     options.add_json(parser, "the rows")
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..scene.load import set_variant
 from . import options
-from .brdf_map import add_relative, gain_of
+from .brdf_map import RELATIVE, gain_of
 from .console import Bar
 from .report import check_outputs, save_report
 
@@ -32,15 +32,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "sweep over methods also times the package's own look-up against flss with both "
         "compiled. Writes a picture, and the numbers as CSV beside it.",
     )  # fmt: skip
-    parser.add_argument("kind", metavar="KIND", choices=KINDS, help=f"one of {', '.join(KINDS)}")
-    options.add_source(parser)
-    options.add_output(
-        parser, "contact sheet; default: SOURCE's name with -KIND.png in the current folder",
-        ".png",
+    options.add_options(
+        parser,
+        ("KIND", f"one of {', '.join(KINDS)}", KINDS),
+        options.SOURCE,
+        ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
+         "folder", options.path_ending_in(".png")),
+        ("--values V ...", "values to compare; default: those of the thesis"),
     )  # fmt: skip
-    parser.add_argument(
-        "--values", metavar="V", nargs="+", help="values to compare; default: those of the thesis"
-    )
     _add_options(parser.add_argument_group("the maps"))
     options.add_json(parser)
     options.add_heights(parser)
@@ -50,17 +49,19 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
     options.add_method(group, "flss", "what evaluates, except in a sweep over methods")
     options.add_direction(group)
     options.add_wavelengths(group)
-    options.add_resolution(group, 128)
-    group.add_argument(
-        "--samples", metavar="N", type=int, default=1, help="directions in a pixel; default: 1"
+    options.add_options(
+        group,
+        ("--resolution N", "pixels a side", int, 128),
+        ("--samples N", "directions in a pixel", int, 1),
+        ("--exposure EV", "of all maps, in stops; default: the best map's own", options.STOPS),
     )
-    options.add_exposure(group, None, "of all maps, in stops; default: the best map's own")
     options.add_table(group, options.TABLE_NAMES, coherence="patch")
-    add_relative(group)
-    group.add_argument("--int-ior", metavar="N", help="index for --relative; default: 1.5")
-    group.add_argument(
-        "--compiled", action=argparse.BooleanOptionalAction, default=True,
-        help="time spectral and flss in compiled code, in a sweep over methods",
+    options.add_options(
+        group,
+        RELATIVE,
+        ("--int-ior N", "index for --relative; default: 1.5"),
+        ("--compiled", "time spectral and flss in compiled code, in a sweep over methods", None,
+         None, {"action": argparse.BooleanOptionalAction, "default": True}),
     )  # fmt: skip
 
 

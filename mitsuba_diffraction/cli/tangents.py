@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
-from .options import number_between
+from .options import number_between, path_ending_in
 from .report import check_writable, save_report
 
 if TYPE_CHECKING:
@@ -26,22 +26,17 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "(a torus excepted) every field has singular points, around which the patch turns.",
     )  # fmt: skip
-    parser.add_argument("mesh", metavar="MESH", type=Path, help="mesh to read")
-    options.add_output(parser, "PLY to write", ".ply", required=True)
-    parser.add_argument(
-        "--along", choices=_GUIDES, default="smooth",
-        help="smooth: the field that turns least; x, y, z: that axis, laid onto the surface; body: "
-        "from one end of the body to the other; default: smooth",
-    )  # fmt: skip
-    parser.add_argument(
-        "--turn", metavar="DEGREES", type=number_between(-360, 360), default=0.0,
-        help="angle from the field to the patch's x axis, counter-clockwise seen from outside, "
-        "e.g. -90 to lay its y axis along the field; default: 0",
-    )  # fmt: skip
-    parser.add_argument(
-        "--smoothing", metavar="S", type=number_between(1e-4, 1), default=0.03,
-        help="distance within which the field may leave an axis or the body's direction to stay "
-        "smooth, as a share of the mesh's size; default: 0.03",
+    options.add_options(
+        parser,
+        ("MESH", "mesh to read", Path),
+        ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
+        ("--along", "smooth: the field that turns least; x, y, z: that axis, laid onto the "
+         "surface; body: from one end of the body to the other", _GUIDES, "smooth"),
+        ("--turn DEGREES", "angle from the field to the patch's x axis, counter-clockwise seen "
+         "from outside, e.g. -90 to lay its y axis along the field",
+         number_between(-360, 360), 0.0),
+        ("--smoothing S", "distance within which the field may leave an axis or the body's "
+         "direction to stay smooth, as a share of the mesh's size", number_between(1e-4, 1), 0.03),
     )  # fmt: skip
     options.add_json(parser, "quality of the field")
 

@@ -17,10 +17,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
         "than it was rendered with.",
     )  # fmt: skip
-    parser.add_argument("picture", metavar="FILE.exr", type=Path, help="linear picture")
-    options.add_output(parser, "PNG to write; default: beside the EXR, with its name", ".png")
-    options.add_exposure(parser, 0.0, "stops: +1 doubles the light; default: 0")
-    options.add_view(parser)
+    options.add_options(
+        parser,
+        ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
+        ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
+         options.path_ending_in(".png")),
+        ("--exposure EV", "stops: +1 doubles the light", options.STOPS, 0.0),
+        options.VIEW,
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:

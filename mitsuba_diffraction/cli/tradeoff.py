@@ -38,28 +38,31 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
         "error against time, and one of error against depth; recommends a setting.",
     )  # fmt: skip
-    options.add_output(parser, "where files go; default: tradeoff", default=Path("tradeoff"))
-    parser.add_argument("--quick", action="store_true", help="fewer settings, a smaller patch")
-    options.add_table(parser, ["coherence_width"])
-    budget = parser.add_argument_group("recommend a setting with")
-    budget.add_argument(
-        "--max-error", metavar="E", type=number_between(0.0, 1.0),
-        help="largest measured error; default: 1e-3",
-    )  # fmt: skip
-    budget.add_argument(
-        "--memory", metavar="MB", type=number_between(0.0, 1e6), help="largest table"
+    options.add_options(
+        parser,
+        ("-o --output FOLDER", "where files go", Path, Path("tradeoff")),
+        ("--quick", "fewer settings, a smaller patch", bool),
     )
-    budget.add_argument(
-        "--time", metavar="X", type=number_between(0.0, 1e6),
-        help="longest time of eval, as a multiple of roughconductor's",
+    options.add_table(parser, ["coherence_width"])
+    options.add_options(
+        parser.add_argument_group("recommend a setting with"),
+        ("--max-error E", "largest measured error; default: 1e-3", number_between(0, 1)),
+        ("--memory MB", "largest table", number_between(0, 1e6)),
+        ("--time X", "longest time of eval, as a multiple of roughconductor's",
+         number_between(0, 1e6)),
     )  # fmt: skip
     options.add_json(parser)
-    options.add_own_patch(parser)
+    options.add_option(
+        parser, "HEIGHTS", "patch to measure, from any file of heights; default: "
+        "gratings.elaphe_like", Path, None, {"nargs": "?"},
+    )  # fmt: skip
+    options.add_heights(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
-    options.check_own_patch(args)
+    if args.heights is None:
+        options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
     check_writable(args.output / "tradeoff.json", make_folder=True)
     from ..analysis.machine import describe_machine
     from ..analysis.timing import PIXEL
@@ -75,11 +78,13 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
     from ..heights.coherence import resolved_width
+    from ..heights.load import load_heights
 
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
-    field = options.own_patch(args)
-    if field is None:
+    if args.heights is None:
         field = gratings.elaphe_like(side * PIXEL, side)
+    else:
+        field = load_heights(args.heights, options.load_options(args))
     width = resolved_width(options.table_options(args).get("coherence_width", "auto"), [field])
     set_variant("llvm_ad_spectral")
     with Bar(args) as bar, warnings.catch_warnings():

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system import cores
 from .console import say, say_warning
-from .options import whole_number
+from .options import add_options, whole_number
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -26,23 +26,19 @@ VARIABLE = "DASK_SCHEDULER_ADDRESS"
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose workers."""
     group = parser.add_argument_group("workers (extra `cluster`)")
-    group.add_argument(
-        "--workers", metavar="N", type=whole_number(1), help="start N processes here for it"
-    )
-    group.add_argument(
-        "--scheduler", metavar="ADDRESS",
-        help="use the Dask cluster of this scheduler, or of a scheduler file (.json); default: "
-        f"that of ${VARIABLE}, if it is set",
+    add_options(
+        group,
+        ("--workers N", "start N processes here for it", whole_number(1)),
+        ("--scheduler ADDRESS", "use the Dask cluster of this scheduler, or of a scheduler file "
+         f"(.json); default: that of ${VARIABLE}, if it is set"),
     )  # fmt: skip
 
 
-def add_threads(parser: argparse.ArgumentParser) -> None:
-    """Add the number of Dr.Jit threads of a worker."""
-    parser.add_argument(
-        "--threads", metavar="N", type=whole_number(1),
-        help="Dr.Jit threads of a worker; default: its share of this machine's cores, or with "
-        "--scheduler all that it may use",
-    )  # fmt: skip
+#: The number of Dr.Jit threads of a worker.
+THREADS = (
+    "--threads N", "Dr.Jit threads of a worker; default: its share of this machine's cores, or "
+    "with --scheduler all that it may use", whole_number(1),
+)  # fmt: skip
 
 
 def on_workers(args: argparse.Namespace) -> bool:
