@@ -155,6 +155,13 @@ def both_sides(transmission: int = 0) -> list[int]:
     return [flags.GlossyReflection | sides, flags.GlossyTransmission | sides | transmission]
 
 
+def asked_sides(ctx: Context) -> tuple[bool, bool]:
+    """Return whether a context asks for reflection, and for transmission (`both_sides`)."""
+    kinds = mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission
+    reflection, transmission = (ctx.is_enabled(kind, n) for n, kind in enumerate(kinds))
+    return reflection, transmission
+
+
 def sample_of(wo: Vector3f, density: Float, passed: Mask, eta: Float) -> Sample:
     """Return the record of a direction of either side.
 

@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..directions import Pair, Site
-from ..lifecycle import both_sides, sample_of
+from ..lifecycle import asked_sides, both_sides, sample_of
 from ..types import (
     Context,
     Float,
@@ -73,6 +73,5 @@ class OrdersSheet(DiffractionOrders):
 
 def requested(ctx: Context, passed: Mask) -> Mask:
     """Mask of the lanes whose component a context asks for; passed : whether light goes through."""
-    reflection = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
-    transmission = ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1)
-    return dr.select(passed, mi.Mask(transmission), mi.Mask(reflection))
+    reflection, transmission = map(mi.Mask, asked_sides(ctx))
+    return dr.select(passed, transmission, reflection)

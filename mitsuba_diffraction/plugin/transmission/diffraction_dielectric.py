@@ -57,7 +57,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -71,7 +71,7 @@ from ..description import Surface
 from ..directions import Pair, Site, TablePoint
 from ..fresnel import Inside
 from ..layers import CoatedPair
-from ..lifecycle import both_sides, sample_of
+from ..lifecycle import asked_sides, both_sides, sample_of
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
 from ..surface import DiffractingSurface
@@ -92,13 +92,6 @@ from .dielectric_parameters import read_parameters
 from .energy import DielectricEnergy
 
 _LEAST_SHARE = 0.1
-
-
-class Asked(NamedTuple):
-    """Components that a context asks for."""
-
-    reflection: bool
-    transmission: bool
 
 
 class DiffractionDielectric(DiffractingSurface):
@@ -139,20 +132,20 @@ class DiffractionDielectric(DiffractingSurface):
         """See `NestingBSDF.evaluated`."""
         si, frame = site.si, site.frame
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
-        asked = _asked(ctx)
-        share = self._staying_share(cos_i, asked)
+        reflects, transmits = asked_sides(ctx)
+        share = self._staying_share(cos_i, ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
         change, where = None, (frame, site.wavenumbers, site.scale)
         if self._energy is not None and self._energy.scales_order_0:
             change = self._energy.order_0_scale((si.wi, wo), *where)
-        if asked.reflection:
+        if reflects:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
                 side, orders = reflected(ctx, site, wo, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
-        if asked.transmission:
+        if transmits:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
             passed = self._transmitted(ctx, site, crossing, change) * dr.abs(cos_o)
@@ -177,7 +170,7 @@ class DiffractionDielectric(DiffractingSurface):
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & (cos_i != 0.0)
         site = self.site_at(si, active)
-        share = self._staying_share(cos_i, _asked(ctx))
+        share = self._staying_share(cos_i, ctx)
         reflected, passed = sample1 < share, sample1 >= share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
@@ -335,10 +328,11 @@ class DiffractionDielectric(DiffractingSurface):
         ]
         return mueller(turned_round, light, about)
 
-    def _staying_share(self, cos_i: Float, asked: Asked) -> Float:
+    def _staying_share(self, cos_i: Float, ctx: Context) -> Float:
         """Share of the samples that stay on their side."""
-        if not (asked.reflection and asked.transmission):
-            return mi.Float(1.0 if asked.reflection else 0.0)
+        reflects, transmits = asked_sides(ctx)
+        if not (reflects and transmits):
+            return mi.Float(1.0 if reflects else 0.0)
         cosine = dr.abs(cos_i) if self.thin else cos_i
         flat = dr.detach(mi.fresnel(cosine, self.material.eta)[0])
         if self.thin:
@@ -372,13 +366,6 @@ class DiffractionDielectric(DiffractingSurface):
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
         return {**super().shown(), "thin": "true" if self.thin else "false"}
-
-
-def _asked(ctx: Context) -> Asked:
-    return Asked(
-        ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0),
-        ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1),
-    )
 
 
 mi.register_bsdf("diffraction_dielectric", DiffractionDielectric)
