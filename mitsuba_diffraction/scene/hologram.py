@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
+from ..tables.exr import write_exr
 
 Floats = NDArray[np.float32]
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.
@@ -85,8 +85,8 @@ class Hologram:
         names = "orientation.exr", "lateral_scale.exr", "weight.png"
         files = Files(*(Path(folder) / f"{stem}_{name}" for name in names))
         x, y, z = np.moveaxis(self.orientation, -1, 0)
-        _write_exr(files.orientation, {"R": x, "G": y, "B": z})
-        _write_exr(files.lateral_scale, {"Y": self.lateral_scale})
+        _write_halves(files.orientation, {"R": x, "G": y, "B": z})
+        _write_halves(files.lateral_scale, {"Y": self.lateral_scale})
         levels = np.round(self.weight * 255.0).astype(np.uint8)
         with atomic_path(files.weight) as temporary:
             Image.fromarray(levels).save(temporary, optimize=True)
@@ -246,11 +246,5 @@ def _texture(values: Floats) -> dict[str, Any]:
     return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": data}
 
 
-def _write_exr(path: Path, channels: dict[str, Floats]) -> None:
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    halves = {name: np.ascontiguousarray(part, np.float16) for name, part in channels.items()}
-    with atomic_path(path) as temporary:
-        try:
-            OpenEXR.File(header, halves).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR's exception for a full disk
-            raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
+def _write_halves(path: Path, channels: dict[str, Floats]) -> None:
+    write_exr(path, {name: part.astype(np.float16) for name, part in channels.items()})

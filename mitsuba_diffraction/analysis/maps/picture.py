@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import OpenEXR
 
 from ...atomic import atomic_path
+from ...tables.exr import write_exr
 from .result import BrdfMap
 
 if TYPE_CHECKING:
@@ -248,16 +248,7 @@ def save_exr(
         "samples": brdf_map.samples,
         **(notes or {}),
     }
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        ATTRIBUTE: json.dumps(document),
-    }
+    header = {ATTRIBUTE: json.dumps(document)}
     if brdf_map.spectrum is not None:
         header["spectralLayoutVersion"] = "1.0"
-    pixels = {name: np.ascontiguousarray(values[::-1]) for name, values in channels.items()}
-    with atomic_path(path) as temporary:
-        try:
-            OpenEXR.File(header, pixels).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR raises it on a full disk
-            raise OSError(None, f"OpenEXR: {' '.join(str(error).split())}") from error
+    write_exr(path, {name: values[::-1] for name, values in channels.items()}, header)
