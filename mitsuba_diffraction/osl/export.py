@@ -199,7 +199,6 @@ def shader_of(described: Surface) -> Shader:
 
 def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> Shader:
     texture = order_texture(table)
-    error = interpolation_error(table, texture)
     return Shader(
         "orders.osl",
         order_formulas(),
@@ -208,7 +207,7 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
         sockets_of({"CoherenceWidth": described.coherence_width, **placed}),
         {"OrdersFile": texture.pixels},
         str(table),
-        {"mean": error.mean, "largest of 99.9 %": error.worst},
+        interpolation_error(table, texture),
     )
 
 
