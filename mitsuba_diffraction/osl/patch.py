@@ -201,8 +201,7 @@ def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
     count = len(probabilities)
     scaled = probabilities * count
     threshold, other = np.ones(count), np.arange(count)
-    small = [int(n) for n in np.flatnonzero(scaled < 1.0)]
-    large = [int(n) for n in np.flatnonzero(scaled >= 1.0)]
+    small, large = (np.flatnonzero(chosen).tolist() for chosen in (scaled < 1.0, scaled >= 1.0))
     left = scaled.tolist()
     while small and large:
         less, more = small.pop(), large[-1]

@@ -181,8 +181,7 @@ def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.
     whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
     _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)
-    rank = np.empty(len(order), np.uint32)
-    rank[order] = np.arange(len(order), dtype=np.uint32)
+    rank = np.argsort(order).astype(np.uint32)
     return rows[first[order]], rank[inverse.ravel()]
 
 
