@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
@@ -21,6 +20,7 @@ from ..errors import DiffractionError, one_line, quoted
 from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES, linear_srgb, response
 from ..plugin.description import Consumer, Feature, Surface
+from ..tables.exr import write_channels
 from ..tables.orders import OrderTable
 from .formulas import order_formulas, patch_formulas, shader_file
 from .patch import (
@@ -148,7 +148,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
         key: path / f"{name}_{key.removesuffix('File').lower()}.exr" for key in shader.textures
     }
     for key, pixels in shader.textures.items():
-        _save_texture(files[key], pixels)
+        write_channels(files[key], {"RGBA": pixels})
     textures = [
         Socket(key, key.removesuffix("File") + " Texture", "string", file.name,
                "File of the export, beside the shader; the script in Blender sets its path")
@@ -199,7 +199,6 @@ def shader_of(described: Surface) -> Shader:
 
 def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> Shader:
     texture = order_texture(table)
-    error = interpolation_error(table, texture)
     return Shader(
         "orders.osl",
         order_formulas(),
@@ -208,7 +207,7 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
         sockets_of({"CoherenceWidth": described.coherence_width, **placed}),
         {"OrdersFile": texture.pixels},
         str(table),
-        {"mean": error.mean, "largest of 99.9 %": error.worst},
+        interpolation_error(table, texture),
     )
 
 
@@ -334,12 +333,3 @@ def _literal(value: float | int) -> str:
 def _save_text(path: Path, text: str) -> None:
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _save_texture(path: Path, pixels: NDArray[np.floating]) -> None:
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with atomic_path(path) as temporary:
-        try:
-            OpenEXR.File(header, {"RGBA": np.ascontiguousarray(pixels)}).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR's exception for a full disk
-            raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error

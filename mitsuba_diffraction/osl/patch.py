@@ -13,7 +13,7 @@ from ..optics.coat import coated_reflectance, cosine_within, face_transmittance
 from ..optics.fresnel import reflectance
 from ..plugin.description import Surface
 from ..tables.directional import FINE, SHARE
-from ..tables.powers import order_0_power
+from ..tables.powers import order_0_power, powers_at
 from ..tables.table import DiffractionTable
 
 #: Nodes of an interval of κ, Chebyshev's of the first kind on 0 to 1, in the channels of a pixel.
@@ -62,28 +62,13 @@ class EnergyTexture(NamedTuple):
     Attributes
     ----------
     pixels : (wavelengths · (polar + 1), azimuthal + 1, 4) float32 on `FINE`, the first column
-        repeated at the end; channels are the scales of the height scales `nodes`, and two of 1.
-    nodes : the surface's height scale, and the largest of its table.
-    wavelengths : (n,) nm, evenly in their logarithm.
+        repeated at the end; channels are the scales of the surface's height scale and of the
+        largest of its table, and two of 1. Wavelengths lie evenly in their logarithm.
+    constants : of `shaders/patch.osl`.
     """
 
     pixels: NDArray[np.float32]
-    nodes: tuple[float, float]
-    wavelengths: NDArray[np.float64]
-
-    @property
-    def constants(self) -> dict[str, float | int]:
-        """Constants of `shaders/patch.osl`."""
-        return {
-            "ENERGY_POLAR": FINE.polar,
-            "ENERGY_AZIMUTHAL": FINE.azimuthal,
-            "ENERGY_SHARE": SHARE,
-            "ENERGY_HEIGHT": self.nodes[0],
-            "ENERGY_MOST": self.nodes[1],
-            "ENERGY_PAGES": len(self.wavelengths),
-            "ENERGY_FIRST": float(np.log(self.wavelengths[0])),
-            "ENERGY_LAST": float(np.log(self.wavelengths[-1])),
-        }
+    constants: dict[str, float | int]
 
 
 def energy_texture(described: Surface) -> EnergyTexture | None:
@@ -98,7 +83,17 @@ def energy_texture(described: Surface) -> EnergyTexture | None:
         if table is not None:
             pages = np.stack([table.page(float(wavelength)) for wavelength in lam])
             values[..., channel] = np.pad(pages, [(0, 0), (0, 0), (0, 1)], mode="wrap")
-    return EnergyTexture(values.reshape(-1, *values.shape[2:]), nodes, lam)
+    constants = {
+        "ENERGY_POLAR": FINE.polar,
+        "ENERGY_AZIMUTHAL": FINE.azimuthal,
+        "ENERGY_SHARE": SHARE,
+        "ENERGY_HEIGHT": nodes[0],
+        "ENERGY_MOST": nodes[1],
+        "ENERGY_PAGES": len(lam),
+        "ENERGY_FIRST": float(np.log(lam[0])),
+        "ENERGY_LAST": float(np.log(lam[-1])),
+    }
+    return EnergyTexture(values.reshape(-1, *values.shape[2:]), constants)
 
 
 def mean_transmittance(
@@ -140,16 +135,6 @@ def patch_textures(table: DiffractionTable) -> PatchTextures:
     order_0 = order_0_power(table, np.linspace(0.0, largest, ORDER_0_NODES))
     draws = bands.reshape(-1, DRAWS_WIDTH, 4)
     return PatchTextures(pixels, draws, intervals, scale, cells // DRAWS_WIDTH, order_0)
-
-
-def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
-    """Return |a_j(κ)|² of all orders but order 0, (ny, nx); kappa : rad/µm."""
-    interval = int(table.expansion.interval(kappa))
-    weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
-    parts = table.coefficients[interval].astype(np.float32) @ weights
-    if table.expansion.kind == "power":
-        return np.maximum(parts[..., 0], 0.0)
-    return np.asarray(np.sum(parts**2, axis=-1))
 
 
 def interpolated(textures: PatchTextures, largest: float, kappa: float) -> NDArray[np.float64]:
@@ -216,8 +201,7 @@ def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
     count = len(probabilities)
     scaled = probabilities * count
     threshold, other = np.ones(count), np.arange(count)
-    small = [int(n) for n in np.flatnonzero(scaled < 1.0)]
-    large = [int(n) for n in np.flatnonzero(scaled >= 1.0)]
+    small, large = (np.flatnonzero(chosen).tolist() for chosen in (scaled < 1.0, scaled >= 1.0))
     left = scaled.tolist()
     while small and large:
         less, more = small.pop(), large[-1]

@@ -42,13 +42,6 @@ class OrderTexture(NamedTuple):
     tiles_across: int
 
 
-class Error(NamedTuple):
-    """Error of the texture's interpolation, as a share of the incident light."""
-
-    mean: float
-    worst: float
-
-
 def order_texture(table: OrderTable) -> OrderTexture:
     """Resample a table, with the reflections between its clear layer's face and the grating.
 
@@ -81,8 +74,8 @@ def order_texture(table: OrderTable) -> OrderTexture:
     return OrderTexture(pixels, counts, np.array(starts), across)
 
 
-def interpolation_error(table: OrderTable, texture: OrderTexture) -> Error:
-    """Compare the centres of the texture's cells with the table's polynomials there."""
+def interpolation_error(table: OrderTable, texture: OrderTexture) -> dict[str, float]:
+    """Return errors of the centres of the texture's cells, as shares of the incident light."""
     finer = Counts(*(2 * count for count in texture.counts))
     differences = []
     for band in table.bands:
@@ -96,7 +89,7 @@ def interpolation_error(table: OrderTable, texture: OrderTexture) -> Error:
             error = np.abs(middles(corners) - centre) * face[..., :, None] * face[..., None, :]
             differences.append(error[np.broadcast_to(face[..., :, None] > 0.0, error.shape)])
     joined = np.concatenate(differences)
-    return Error(float(joined.mean()), float(np.quantile(joined, 0.999)))
+    return {"mean": float(joined.mean()), "largest of 99.9 %": float(np.quantile(joined, 0.999))}
 
 
 def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float | int]:

@@ -20,7 +20,7 @@ from PIL import Image
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
-from .pictures import write_channels
+from ..tables.exr import write_channels
 
 Floats = NDArray[np.float32]
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.

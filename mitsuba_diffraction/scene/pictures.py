@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
-from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
@@ -84,24 +81,6 @@ def colours_of(bitmap: Any) -> Any | None:
     if root is None or root.pixel_format().name not in _SHOWN_AS:
         return None
     return root
-
-
-def write_channels(
-    path: str | os.PathLike[str],
-    channels: Mapping[str, NDArray[Any]],
-    attributes: Mapping[str, str] | None = None,
-) -> None:
-    """Write named channels (ny, nx), row 0 at the top, as an EXR of scan lines, compressed.
-
-    Raises a DiffractionError if the file cannot be written; no half-written file is left.
-    """
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    pixels = {name: np.ascontiguousarray(values) for name, values in channels.items()}
-    with atomic_path(path) as temporary:
-        try:
-            OpenEXR.File(header | dict(attributes or {}), pixels).write(str(temporary))
-        except RuntimeError as error:  # OpenEXR's exception for a full disk
-            raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 
 
 def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> None:

@@ -52,14 +52,28 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     rows, columns = table.grid.shape
     header = {
         "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
         TABLE_ATTRIBUTE: text,
         CHECKSUM: _checksum(text, channels),
     }
+    write_channels(path, channels, header)
+
+
+def write_channels(
+    path: str | os.PathLike[str],
+    channels: Mapping[str, NDArray[Any]],
+    attributes: Mapping[str, Any] | None = None,
+) -> None:
+    """Write channels (ny, nx), or (ny, nx, 4) called RGBA, and attributes as an EXR file.
+
+    Raises a DiffractionError if it cannot be written; no half-written file is left.
+    """
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **(attributes or {}),
+    }  # fmt: skip
+    contiguous = {name: np.ascontiguousarray(part) for name, part in channels.items()}
     with atomic_path(path) as temporary:
         try:
-            OpenEXR.File(header, channels).write(str(temporary))
+            OpenEXR.File(header, contiguous).write(str(temporary))
         except RuntimeError as error:  # OpenEXR's exception for a full disk
             raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 

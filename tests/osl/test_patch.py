@@ -20,10 +20,10 @@ from mitsuba_diffraction.osl.patch import (
     energy_texture,
     interpolated,
     patch_textures,
-    powers_at,
 )
 from mitsuba_diffraction.plugin.description import Energy, Quantity, Surface
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
+from mitsuba_diffraction.tables.powers import powers_at
 from tests.support.patches import DEEP, DEFAULTS, PATCH, SMALL_SCAN
 
 

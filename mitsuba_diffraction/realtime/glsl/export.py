@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Surface
+from ...tables.exr import write_channels
 from .maps import Map
 from .methods import CONSUMERS
 from .packing import pack_responses
@@ -170,8 +170,8 @@ def export_shader(
         ) from error
     shader = make_shader(bsdf, methods)
     for texture in shader.textures:
-        with atomic_path(folder / f"{texture.name}.exr") as path:
-            _save(texture, path)
+        # the first line of the file is the texture's last row
+        write_channels(folder / f"{texture.name}.exr", {"RGBA": texture.data[::-1]})
     texts = {
         "diffraction.glsl": shader.code,
         "constants.json": json.dumps(shader.constants(), indent=1, ensure_ascii=False) + "\n",
@@ -242,13 +242,6 @@ def _four(data: Any) -> Any:
     """Pad a texture to four channels, which some loaders require."""
     missing = 4 - data.shape[2]
     return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
-
-
-def _save(texture: Texture, path: Path) -> None:
-    """Write a texture as EXR; the first line of the file is the texture's last row."""
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    channels = {"RGBA": np.ascontiguousarray(texture.data[::-1])}
-    OpenEXR.File(header, channels).write(str(path))
 
 
 @functools.cache

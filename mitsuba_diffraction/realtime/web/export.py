@@ -233,10 +233,12 @@ def _packed(
             sources.append(source)
         return sources.index(source)
 
-    stored_tables: dict[str, list[Any]] = {method: [] for method in shown}
-    for (method, _), table in packed.items():
-        parts = packed_parts(table.packed, sections, table.sections)
-        stored_tables[method].append(parts)
+    stored_tables, losses = {}, {}
+    for method in shown:
+        rounded = [packed[method, n] for n in range(len(tables))]
+        stored_tables[method] = [packed_parts(t.packed, sections, t.sections) for t in rounded]
+        # largest mean and largest 99th percentile
+        losses[method] = tuple(map(max, zip(*(table.loss for table in rounded), strict=True)))
     entries = []
     for surface, (common, mesh, parts) in zip(scene.surfaces, stored, strict=True):
         diffraction = surface.material.diffraction
@@ -289,7 +291,7 @@ def _packed(
         "vertex": vertex_source("web"),
         "shadow": plain_source("position.frag", dialect="web"),
         "shown": _display(view),
-        "loss": {m: _worst([packed[m, n].loss for n in range(len(tables))]) for m in shown},
+        "loss": losses,
         "left_out": left_out,
         "orders": [strongest_orders(table.described) for table in tables],
         "sections": layouts,
@@ -343,11 +345,6 @@ def _fitted(
         f"the scene is too large for a page ({reasons}); use fewer triangles, a smaller "
         "coherence_width, or a shallower surface"
     )
-
-
-def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the largest mean and the largest 99th percentile of some tables."""
-    return max(mean for mean, _ in losses), max(most for _, most in losses)
 
 
 def _source(method: str, definitions: dict[str, str]) -> str:

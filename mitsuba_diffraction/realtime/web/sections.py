@@ -20,14 +20,6 @@ from ..glsl.scene import VERTEX
 from ..glsl.texels import Packed, Texture, plain
 
 _LEVEL = 6
-_NAMES = {
-    np.dtype(np.uint8): "Uint8Array",
-    np.dtype(np.int16): "Int16Array",
-    np.dtype(np.uint16): "Uint16Array",
-    np.dtype(np.uint32): "Uint32Array",
-    np.dtype(np.float32): "Float32Array",
-    np.dtype(np.float16): "Uint16Array",  # JavaScript has no half floats; WebGL takes their bits
-}
 
 _UNIT = 32767  # integer that encodes a coordinate 1 of directions
 _STEPS = 65535  # integer that encodes the far side of a bounding box
@@ -50,9 +42,10 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
     values : values of a type that JavaScript has an array of, or half floats.
     differences : whether to store differences from the row before, for integers in similar rows.
     """
+    if values.dtype == np.float16:  # JavaScript has no half floats; WebGL takes their bits
+        values = values.view(np.uint16)
     rows, columns = values.shape
-    kind = _NAMES[values.dtype]
-    size = values.dtype.itemsize
+    kind, size = f"{values.dtype.name.capitalize()}Array", values.dtype.itemsize
     if differences:
         # integers of fixed size wrap around, here and in the page
         values = np.concatenate([values[:1], values[1:] - values[:-1]])
@@ -188,8 +181,7 @@ def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.
     whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
     _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)
-    rank = np.empty(len(order), np.uint32)
-    rank[order] = np.arange(len(order), dtype=np.uint32)
+    rank = np.argsort(order).astype(np.uint32)
     return rows[first[order]], rank[inverse.ravel()]
 
 

@@ -16,7 +16,7 @@ from ...tables.colour.table import colour_difference, power_colour_difference
 from ...tables.orders import OrderTable, cells
 from ...tables.orders.grids import middles, rows, wavelength_of
 from ...tables.orders.table import Counts
-from ...tables.powers import power_series
+from ...tables.powers import power_series, powers_at
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
@@ -180,10 +180,7 @@ def strongest_orders(described: Surface) -> list[list[float]]:
     table = described.patch
     if table.grid.coherent:
         return []
-    series, _, scale, expansion = power_series(table)
-    kappa = np.array(2.0 * wavenumber(550.0))
-    weights = expansion.weights(kappa)
-    powers = series[int(expansion.interval(kappa))].astype(float) @ weights / scale
+    powers = powers_at(table, float(2.0 * wavenumber(550.0))).astype(float)
     last = np.array(table.grid.last)
     y, x = np.divmod(np.argsort(powers, axis=None)[::-1], powers.shape[1])
     q = (np.stack([x, y], axis=1) - last) * table.spacing

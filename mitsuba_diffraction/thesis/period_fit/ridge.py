@@ -242,10 +242,9 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     lines, light = lines[seen], np.nanmean(light[:, seen], axis=0)
     share, ratio = _contrast(lines, light, response.sigma)
     periods = abs(order) / lines
-    agrees = np.zeros(periods.shape, bool)
-    for period in expected:
-        agrees |= (periods < _AGREES * period) & (periods * _AGREES > period)
-    strong = agrees & (share >= LEAST_SHARE) & (ratio >= LEAST_RATIO)
+    known = np.reshape(expected, (-1, 1))
+    agrees = (periods < _AGREES * known) & (periods * _AGREES > known)
+    strong = agrees.any(axis=0) & (share >= LEAST_SHARE) & (ratio >= LEAST_RATIO)
     if not strong.any():
         return None
     return float(periods[np.where(strong, share, 0.0).argmax()])
@@ -302,13 +301,12 @@ def fit_period(ridge: Ridge) -> Fit:
             f"side of order {ridge.order}, too few to fit a period to (at least {FEWEST}); widen "
             "the ranges of angles and wavelengths, or choose another order"
         )
-    order = abs(ridge.order)
-    wavelength = response.wavelengths[fitted] * 1e-3
+    abscissa = abs(ridge.order) * response.wavelengths[fitted] * 1e-3
     u = ridge.frequency[fitted]
     lobe = float(np.median(1.0 / (response.sigma * wavenumber(response.wavelengths))))
-    start = float(np.median(u / (order * wavelength)))
+    start = float(np.median(u / abscissa))
     result = least_squares(
-        lambda s: u - order * wavelength * s[0], [start], loss="soft_l1", f_scale=lobe,
+        lambda s: u - abscissa * s[0], [start], loss="soft_l1", f_scale=lobe,
         x_scale=start, xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     period = float(1.0 / result.x[0])
@@ -316,7 +314,7 @@ def fit_period(ridge: Ridge) -> Fit:
     difference = difference[np.isfinite(difference)]
     return Fit(
         period=period,
-        error=_error(ridge, period),
+        error=_error(ridge, abscissa, u, period),
         residual=float(np.sqrt(np.mean(difference**2))) if difference.size else np.nan,
         largest=float(np.abs(difference).max()) if difference.size else np.nan,
         points=int(fitted.sum()),
@@ -324,17 +322,14 @@ def fit_period(ridge: Ridge) -> Fit:
     )
 
 
-def _error(ridge: Ridge, period: float) -> float:
-    """Return the error of a fitted period in µm, the quadratic sum of two.
+def _error(ridge: Ridge, abscissa: Array, u: Array, period: float) -> float:
+    """Return the error of a period fitted to u over mλ, µm, the quadratic sum of two.
 
     Scatter: the standard error of the slope u over mλ (least squares). Slope: where the brightness
     changes with u, the maximum of a Gaussian lobe of variance s² is shifted by s² d(ln f)/du; the
     gradient is that along the ridge.
     """
-    fitted = ridge.has_maximum
-    response = ridge.response
-    abscissa = abs(ridge.order) * response.wavelengths[fitted] * 1e-3
-    u = ridge.frequency[fitted]
+    fitted, response = ridge.has_maximum, ridge.response
     rest = u - abscissa / period
     scatter = math.sqrt(float(rest @ rest) / (u.size - 1) / float(abscissa @ abscissa)) * period
     # σ_u² of exp(−σ²k²Δu²)
