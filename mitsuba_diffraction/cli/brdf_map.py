@@ -18,7 +18,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -161,9 +161,8 @@ def gain_of(args: argparse.Namespace) -> Any:
         ) from error
 
 
-def run(args: argparse.Namespace) -> int:
-    """Make the map, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
     output = args.output or Path(f"{args.source.stem}-map.exr")
@@ -190,16 +189,15 @@ def run(args: argparse.Namespace) -> int:
     shown = ""
     if not bands.is_single:
         shown = f", exposure {result.exposure() if exposure is None else exposure:+g} stops"
-    seconds = time.perf_counter() - start
+    seconds = elapsed(args)
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
         f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {evaluated.method}"
     )
-    save_report(args, {"source": args.source, "files": written, "theta": args.theta,
-                       "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
-                       "bands": str(bands), "surface": surface, "method": evaluated.method,
-                       "seconds": seconds})  # fmt: skip
-    return 0
+    return {"source": args.source, "files": written, "theta": args.theta,
+            "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
+            "bands": str(bands), "surface": surface, "method": evaluated.method,
+            "seconds": seconds}  # fmt: skip
 
 
 class Evaluated(NamedTuple):

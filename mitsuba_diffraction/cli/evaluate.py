@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 import warnings
 from collections.abc import Sequence
 from functools import partial
@@ -17,7 +16,7 @@ from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -85,9 +84,8 @@ class _Experiment(NamedTuple):
     angles: Any  # (A,) degrees
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure, fit, draw, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Measure, fit, draw, and return the figures."""
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
     check_outputs(written, [args.source], "evaluation")
@@ -99,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
         f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
-        f"{time.perf_counter() - start:.1f} s"
+        f"{elapsed(args):.1f} s"
     )
     if distance := _distance(args, experiment, result.followed.ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
@@ -113,9 +111,8 @@ def run(args: argparse.Namespace) -> int:
         say_warning(notes)
     print(f"  {'period':<9} {_published(result.followed.fit, more.get('window_error'))}")
     beam = experiment.beam
-    save_report(args, {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
-                       "phi": beam.phi, **more})  # fmt: skip
-    return 0
+    return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
+            "phi": beam.phi, **more}  # fmt: skip
 
 
 def _prepared(args: argparse.Namespace) -> _Experiment:

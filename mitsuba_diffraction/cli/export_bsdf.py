@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
 _SUFFIXES = {"rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf")}
@@ -51,10 +50,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "what was written")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Write the file, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Write the file, and return the figures."""
     take_source(args)
-    start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}.{_default_suffix(args.format)}")
     name = args.format or ("rgl" if output.suffix.lower() == ".bsdf" else "bird")
     if output.suffix.lower() not in _SUFFIXES[name]:
@@ -86,12 +84,11 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{args.source} -> {output}: {name}, {size / 1e6:.1f} MB, {grid.theta.size} x "
         f"{grid.phi.size} directions of light, {grid.wavelengths.size} wavelengths, "
-        f"{time.perf_counter() - start:.1f} s"
+        f"{elapsed(args):.1f} s"
     )
-    save_report(args, {"source": args.source, "file": output, "format": name, "bytes": size,
-                       "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
-                       "wavelengths": grid.wavelengths.tolist()})  # fmt: skip
-    return 0
+    return {"source": args.source, "file": output, "format": name, "bytes": size,
+            "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
+            "wavelengths": grid.wavelengths.tolist()}  # fmt: skip
 
 
 def _default_suffix(name: str | None) -> str:

@@ -13,7 +13,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
-from .report import lines_of, plain, save_report
+from .report import STDOUT, Figures, lines_of, plain
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -30,7 +30,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     plot = path_ending_in(".png", ".pdf", ".svg")
     options.add_option(parser, "FILE", "table, table of orders, heights, recipe or mesh", Path)
-    options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
+    options.add_json(parser, "the description", nargs="?", const=STDOUT)
     options.add_options(
         parser,
         ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", plot),
@@ -43,8 +43,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_table(parser.add_argument_group("the table"), _TABLE)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Print the description, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Print the description, and return the figures."""
     data = {"file": str(args.file), **_describe(args.file, args)}
     if args.energy:
         if data["kind"] != "table":
@@ -60,12 +60,11 @@ def run(args: argparse.Namespace) -> int:
             args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
         _draw(args)
         data["picture"] = str(args.picture)
-    if args.json == options.STDOUT:
+    if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         print("\n".join(lines_of(data)))
-        save_report(args, data)
-    return 0
+    return data
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:

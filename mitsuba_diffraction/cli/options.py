@@ -18,6 +18,7 @@ from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
+from .report import Figures
 from .wording import worded
 
 if TYPE_CHECKING:
@@ -32,9 +33,6 @@ WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 
 #: Numbers of an option that accepts ranges, at most.
 _MOST_NUMBERS = 10_000
-
-#: `--json` without a file, which only `info` has: printed instead of the text.
-STDOUT = Path("-")
 
 #: Limits of spectra from heights, for help and descriptions.
 LIMITS = (
@@ -162,7 +160,7 @@ def _numbers_of(text: str) -> list[float]:
 
 
 def add_command(
-    subparsers: Subparsers, name: str, run: Callable[..., int], help: str, description: str
+    subparsers: Subparsers, name: str, run: Callable[..., Figures], help: str, description: str
 ) -> argparse.ArgumentParser:
     """Add the parser of a sub-command, which `main` runs by calling run(args)."""
     parser: argparse.ArgumentParser = subparsers.add_parser(

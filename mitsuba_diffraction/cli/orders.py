@@ -7,7 +7,7 @@ from pathlib import Path
 
 from . import options
 from .options import number_between
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -51,8 +51,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the lines")
 
 
-def run(args: argparse.Namespace) -> int:
-    """List the orders, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """List the orders, and return the figures."""
     import numpy as np
 
     from ..solve.listing import list_orders
@@ -72,5 +72,4 @@ def run(args: argparse.Namespace) -> int:
         f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
         f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"
     )
-    save_report(args, {"file": str(output), "columns": listing.columns, "lines": rows.tolist()})
-    return 0
+    return {"file": str(output), "columns": listing.columns, "lines": rows.tolist()}

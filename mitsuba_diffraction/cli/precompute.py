@@ -14,7 +14,7 @@ from ..optics.second_order_change import applies
 from ..system import peak_memory
 from . import options
 from .console import Bar
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs
 from .workers import add_workers, client_of, on_workers
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ class _Job(NamedTuple):
     of_recipe: bool  # whose folder of tables may be made
 
 
-def run(args: argparse.Namespace) -> int:
-    """Build the table of each recipe, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Build the table of each recipe, and return the figures."""
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
     if recipes and len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
@@ -70,8 +70,7 @@ def run(args: argparse.Namespace) -> int:
         summaries = [_precompute(_recipe_job(recipe, args), args) for recipe in recipes]
     else:
         summaries = [_precompute(_files_job(args), args)]
-    save_report(args, summaries[0] if len(summaries) == 1 else {"tables": summaries})
-    return 0
+    return summaries[0] if len(summaries) == 1 else {"tables": summaries}
 
 
 def _recipe_job(file: Path, args: argparse.Namespace) -> _Job:

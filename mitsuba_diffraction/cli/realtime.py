@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
-from .report import check_outputs, check_writable, plain, save_json, save_report
+from .report import Figures, check_outputs, check_writable, elapsed, plain, save_json
 
 _EXPORTED = ("fast", "exact")
 
@@ -44,8 +43,8 @@ def add_view(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
 
 
-def view(args: argparse.Namespace) -> int:
-    """Show the scene, and return the exit code."""
+def view(args: argparse.Namespace) -> Figures:
+    """Show the scene, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
@@ -61,7 +60,7 @@ def view(args: argparse.Namespace) -> int:
             window=args.window,
         )  # fmt: skip
     print(f"{frames} frames, {milliseconds:.3g} ms each at the end, method {args.method}")
-    return 0
+    return {}
 
 
 def add_compare(subparsers: options.Subparsers) -> None:
@@ -90,8 +89,8 @@ def add_compare(subparsers: options.Subparsers) -> None:
     options.add_json(parser)
 
 
-def compare(args: argparse.Namespace) -> int:
-    """Compare, and return the exit code."""
+def compare(args: argparse.Namespace) -> Figures:
+    """Compare, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     folder = args.output or Path(f"{args.name.stem}_compare")
@@ -102,7 +101,6 @@ def compare(args: argparse.Namespace) -> int:
     from ..realtime.shader_comparison.report import markdown
     from ..realtime.shader_comparison.run import Comparison
 
-    start = time.perf_counter()
     variant = _set_variant(args)
     every = "all" in args.method
     with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
@@ -114,10 +112,9 @@ def compare(args: argparse.Namespace) -> int:
         figures = comparison.run(METHODS if every else args.method, leave_out=every)
     figures = {"scene": figures["scene"], "parameters": parameters, **figures}
     save_json(folder / "compare.json", figures)
-    save_report(args, figures)
     print(markdown(plain(figures)))
-    print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
-    return 0
+    print(f"{folder}: pictures, sheets and compare.json, {elapsed(args):.0f} s")
+    return figures
 
 
 def add_export_viewer(subparsers: options.Subparsers) -> None:
@@ -140,15 +137,14 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "contents of the page")
 
 
-def export_viewer(args: argparse.Namespace) -> int:
-    """Export, and return the exit code."""
+def export_viewer(args: argparse.Namespace) -> Figures:
+    """Export, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output)
 
     from ..realtime.web import export_viewer
 
-    start = time.perf_counter()
     _set_variant(args)
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
@@ -165,14 +161,13 @@ def export_viewer(args: argparse.Namespace) -> int:
         f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
         for method, (mean, most) in page.loss.items()
     )
-    size, seconds = args.output.stat().st_size, time.perf_counter() - start
+    size, seconds = args.output.stat().st_size, elapsed(args)
     print(f"{args.output}: {size / 1e6:.1f} MB, {seconds:.1f} s; rounding: {losses}")
-    save_report(args, {"scene": args.scene, "files": [args.output], "bytes": size,
-                       "delta_e": {m: {"mean": mean, "99 %": most}
-                                   for m, (mean, most) in page.loss.items()},
-                       "left_out": page.left_out, "omissions": page.omissions,
-                       "seconds": seconds})  # fmt: skip
-    return 0
+    return {"scene": args.scene, "files": [args.output], "bytes": size,
+            "delta_e": {m: {"mean": mean, "99 %": most}
+                        for m, (mean, most) in page.loss.items()},
+            "left_out": page.left_out, "omissions": page.omissions,
+            "seconds": seconds}  # fmt: skip
 
 
 def add_export_shader(subparsers: options.Subparsers) -> None:
@@ -197,8 +192,8 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the files and their settings")
 
 
-def export_shader(args: argparse.Namespace) -> int:
-    """Export, and return the exit code."""
+def export_shader(args: argparse.Namespace) -> Figures:
+    """Export, and return the figures."""
     take_source(args)
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
@@ -206,7 +201,6 @@ def export_shader(args: argparse.Namespace) -> int:
 
     from ..realtime.glsl.export import export_shader
 
-    start = time.perf_counter()
     _set_variant(args)
     with mitsuba_warnings(), Bar(args) as bar:
         bar(0, 0, "making tables")
@@ -216,12 +210,11 @@ def export_shader(args: argparse.Namespace) -> int:
     print(
         f"{folder}: {', '.join(shader.functions.values())}: {code / 1e3:.1f} kB of GLSL, "
         f"{len(textures)} textures of {sum(textures) / 1e6:.1f} MB, "
-        f"{time.perf_counter() - start:.1f} s; {shader.surface}"
+        f"{elapsed(args):.1f} s; {shader.surface}"
     )
-    save_report(args, {"source": args.source, "folder": folder, "files": files,
-                       "functions": shader.functions, "surface": shader.surface,
-                       "bytes": {"code": code, "textures": sum(textures)}})  # fmt: skip
-    return 0
+    return {"source": args.source, "folder": folder, "files": files,
+            "functions": shader.functions, "surface": shader.surface,
+            "bytes": {"code": code, "textures": sum(textures)}}  # fmt: skip
 
 
 def _set_variant(args: argparse.Namespace) -> str:

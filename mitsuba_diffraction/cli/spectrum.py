@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import measured_spectra, say_notes
 from .options import whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 from .spectrometer import SPECTROMETER, group
 
 _RANGE = (300.0, 830.0)
@@ -64,9 +63,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the spectra")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure the spectra, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Measure the spectra, and return the figures."""
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
     groups = _groups(args)
     files = [file for members in groups.values() for file in members]
@@ -124,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     lam = shown.wavelength
     print(
         f"{' and '.join(map(str, written))}: {len(shown.geometry.detectors)} spectra of {lam.size} "
-        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {time.perf_counter() - start:.1f} s, "
+        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {elapsed(args):.1f} s, "
         f"{variant}"
     )
     for name, each in spectra.items():
@@ -138,12 +136,11 @@ def run(args: argparse.Namespace) -> int:
         column: values.tolist()
         for name, each in spectra.items() for column, values in each.columns(name).items()
     }  # fmt: skip
-    save_report(args, {"files": written, "sources": files, "light": args.light,
-                       "light_azimuth": turned or shown.geometry.azimuth,
-                       "detectors": shown.geometry.detectors,
-                       "acceptance": args.acceptance, "relative": args.relative,
-                       "wavelengths": lam.tolist(), "spectra": columns})  # fmt: skip
-    return 0
+    return {"files": written, "sources": files, "light": args.light,
+            "light_azimuth": turned or shown.geometry.azimuth,
+            "detectors": shown.geometry.detectors,
+            "acceptance": args.acceptance, "relative": args.relative,
+            "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:

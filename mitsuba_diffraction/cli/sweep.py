@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -65,14 +64,13 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
 
 
-def run(args: argparse.Namespace) -> int:
-    """Evaluate all maps, compare, draw, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Evaluate all maps, compare, draw, and return the figures."""
     from ..analysis.maps import LightDirection
     from ..analysis.maps.picture import contact_sheet
     from ..atomic import atomic_path
     from ..thesis.sweeps import sweep
 
-    start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
     numbers = output.with_suffix(".csv")
     check_outputs((output, numbers), [args.source], "sheet")
@@ -100,13 +98,10 @@ def run(args: argparse.Namespace) -> int:
     with atomic_path(output) as path:
         sheet.savefig(path, format="png")
     _save(numbers, result)
-    print(f"{output}, {numbers}: {time.perf_counter() - start:.1f} s")
+    print(f"{output}, {numbers}: {elapsed(args):.1f} s")
     for line in [*_lines(result), *compiled]:
         print(f"  {line}")
-    save_report(
-        args, {"patch": patch.name, "sweep": args.kind, "steps": [*map(_row, result.steps)]}
-    )
-    return 0
+    return {"patch": patch.name, "sweep": args.kind, "steps": [*map(_row, result.steps)]}
 
 
 def _values(args: argparse.Namespace) -> list[Any] | None:
