@@ -108,7 +108,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if there is no such look, or the pigment is a picture.
+    Raises a DiffractionError if there is no such look, the pigment is a picture, or an option for
+    reading heights does not fit.
     """
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
@@ -116,12 +117,12 @@ def take_source(args: argparse.Namespace) -> None:
         from ..plugin.presets import find_preset
 
         args.source = find_preset(args.preset).patch
-    if args.material is not None and args.int_ior is not None:
-        args.parser.error("argument --int-ior: not allowed with argument --material")
+    surface_parameters(args)
     if args.pigment is not None:
         from ..plugin.pigment import pigment_range
 
         pigment_range(args.pigment)
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
@@ -172,7 +173,6 @@ def run(args: argparse.Namespace) -> Figures:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..analysis.maps import Bands, save_exr, save_png
 

@@ -41,7 +41,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "
          "default: by format", options.numbers),
         ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default "
-         "550; default: by format", options.numbers),
+         "550; default: by format", options.numbers, None, {"dest": "wavelengths"}),
         ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
          "for zemax, 18 for bird", whole_number(8)),
     )  # fmt: skip
@@ -58,7 +58,6 @@ def run(args: argparse.Namespace) -> Figures:
     if output.suffix.lower() not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
     check_outputs([output], [args.source], "BRDF")
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..scene.load import set_variant
 
@@ -66,16 +65,9 @@ def run(args: argparse.Namespace) -> Figures:
     from ..analysis.export import bird, rgl, zemax
 
     module: Any = {"rgl": rgl, "zemax": zemax, "bird": bird}[name]
-    changed = {
-        field: np.asarray(value, np.float64)
-        for field in ("theta", "phi")
-        if (value := getattr(args, field)) is not None
-    }
-    if args.wavelength is not None:
-        changed["wavelengths"] = np.asarray(args.wavelength, np.float64)
-    grid = module.DEFAULT._replace(**changed)
-    if args.resolution is not None:
-        grid = grid._replace(resolution=args.resolution)
+    chosen = options.given(args, ("theta", "phi", "wavelengths"))
+    arrays = {name: np.asarray(values, np.float64) for name, values in chosen.items()}
+    grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
     with mitsuba_warnings(), Bar(args) as bar:
         bsdf = surface_bsdf(args)
         text = f"{args.source.name}: {bsdf.describe().text}"

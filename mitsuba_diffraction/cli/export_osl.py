@@ -51,12 +51,9 @@ def run(args: argparse.Namespace) -> Figures:
     take_source(args)
     look = args.source.stem if args.preset is None else args.preset.partition(",")[0]
     folder = args.output or Path(f"{look}-osl")
-    if folder.exists() and not folder.is_dir():
-        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     name = args.name or "diffraction_" + re.sub(r"[^A-Za-z0-9_]", "_", look)
     outputs = [folder / f"{name}.osl"]
     check_outputs(outputs, [args.source], "shader", make_folder=True)
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..osl import export
     from ..scene.load import set_variant

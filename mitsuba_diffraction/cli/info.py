@@ -46,18 +46,19 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> Figures:
     """Print the description, and return the figures."""
     data = {"file": str(args.file), **_describe(args.file, args)}
+    for name, kinds, what in (
+        ("energy", ("table",), "a table"),
+        ("albedo", ("table",), "a table"),
+        ("picture", ("height field", "recipe"), "heights"),
+    ):
+        if data["kind"] not in kinds:
+            options.refuse(args, [name], f": '{args.file}' is a {data['kind']}, not {what}")
     if args.energy:
-        if data["kind"] != "table":
-            args.parser.error(f"argument --energy: '{args.file}' is a {data['kind']}, not a table")
         data |= _energy(args.file)
     if args.albedo is not None:
-        if data["kind"] != "table":
-            args.parser.error(f"argument --albedo: '{args.file}' is a {data['kind']}, not a table")
         _plot_albedo(args.file, args.albedo)
         data["albedo plot"] = str(args.albedo)
     if args.picture is not None:
-        if data["kind"] not in ("height field", "recipe"):
-            args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
         _draw(args)
         data["picture"] = str(args.picture)
     if args.json == STDOUT:
@@ -84,8 +85,10 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
             f"and meshes ({', '.join(MESHES)})"
         )
     if kind is FileKind.TABLE:
+        from ..tables import DiffractionTable
+
         _refuse_heights_options(args, "a table")
-        return _table(file)
+        return {"kind": "table", **DiffractionTable.load(file).summary()}
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
         return {"kind": "table of orders", **load_any_orders(file).summary()}
@@ -95,12 +98,6 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
     names = (*options.HEIGHTS, *_TABLE)
     options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
-
-
-def _table(file: Path) -> dict[str, Any]:
-    from ..tables import DiffractionTable
-
-    return {"kind": "table", **DiffractionTable.load(file).summary()}
 
 
 def _energy(file: Path) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from ..extras import optional
 from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
@@ -94,8 +93,6 @@ def compare(args: argparse.Namespace) -> Figures:
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     folder = args.output or Path(f"{args.name.stem}_compare")
-    if folder.exists() and not folder.is_dir():
-        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
 
     from ..realtime.shader_comparison.report import markdown
@@ -197,7 +194,6 @@ def export_shader(args: argparse.Namespace) -> Figures:
     take_source(args)
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..realtime.glsl.export import export_shader
 

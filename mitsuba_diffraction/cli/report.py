@@ -127,11 +127,14 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
     path : the output.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
-    Raises a DiffractionError if the folder is missing or cannot be written, or `path` is a folder.
+    Raises a DiffractionError if the folder is missing, cannot be written or is a file, or `path` is
+    a folder.
     """
     if path.is_dir():
         raise DiffractionError(f"cannot write '{path}': it is a folder; name a file in it")
     folder = path.parent
+    if make_folder and folder.exists() and not folder.is_dir():
+        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     while make_folder and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:

@@ -13,7 +13,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
-from .measured_spectra import measured_spectra, say_notes
+from .measured_spectra import Measurement
 from .options import whole_number
 from .report import Figures, check_outputs, elapsed
 from .spectrometer import SPECTROMETER, group
@@ -96,11 +96,12 @@ def run(args: argparse.Namespace) -> Figures:
     )  # fmt: skip
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
+        measurement = Measurement(args, geometry, lam, bar)
         measured = {
-            name: [s for file in members for s in measured_spectra(args, file, geometry, lam, bar)]
+            name: [spectra for file in members for spectra in measurement.of_file(file)]
             for name, members in groups.items()
         }
-    say_notes(args)
+    measurement.say_notes()
     everything = files_of_spectra.on_common_wavelengths(measured)
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
