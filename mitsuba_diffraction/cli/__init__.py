@@ -20,7 +20,6 @@ tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 spectrum               reflectance spectra as a spectrometer measures them
 measured_spectra       spectra of files of `spectrum`: tables, scans and their crops
-spectrometer           options of a spectrometer, and types of their values
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory

@@ -6,7 +6,7 @@ import argparse
 import time
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..files import FileKind, kind_of
@@ -33,8 +33,8 @@ _SURFACE = (
 )  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
-    "mode", "material", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
-    "height_scale", "basis", "second_order", "preset",
+    "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "second_order", "preset",
+    "spectral",
 )  # fmt: skip
 
 
@@ -174,13 +174,14 @@ def run(args: argparse.Namespace) -> Figures:
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
 
-    from ..analysis.maps import Bands, save_exr, save_png
+    from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
 
     spectrum = options.wavelengths(args)
     bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
-    evaluated = evaluate(args, bands, spectrum)
-    result, surface = evaluated.result, evaluated.surface
+    light = LightDirection(args.theta, args.phi)
+    check_map(bands, args.resolution, args.samples, args.spectral)
+    result, surface, method = evaluate(args, light, bands, spectrum)
     exposure = None if bands.is_single else args.exposure
     if not only_png:
         notes = {"source": str(args.source), "surface": surface}
@@ -192,28 +193,20 @@ def run(args: argparse.Namespace) -> Figures:
     seconds = elapsed(args)
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {evaluated.method}"
+        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {method}"
     )
     return {"source": args.source, "files": written, "theta": args.theta,
             "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
-            "bands": str(bands), "surface": surface, "method": evaluated.method,
+            "bands": str(bands), "surface": surface, "method": method,
             "seconds": seconds}  # fmt: skip
 
 
-class Evaluated(NamedTuple):
-    """A map, its surface and the method of its evaluation, both in words."""
+def _by_bsdf(
+    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
+) -> tuple[Any, str, str]:
+    """Map the renderer's BSDF; also return its surface and the variant in words."""
+    from ..analysis.maps import brdf_map
 
-    result: Any
-    surface: str
-    method: str
-
-
-def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
-    """Map the renderer's BSDF."""
-    from ..analysis.maps import LightDirection, brdf_map, check_map
-
-    light = LightDirection(args.theta, args.phi)
-    check_map(bands, args.resolution, args.samples, args.spectral)
     variant = set_variant(args.mode)
     notes = _notes(args)
     with mitsuba_warnings(), Bar(args) as bar:
@@ -227,7 +220,7 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
             wavelength=args.wavelength, **spectrum,
         )  # fmt: skip
-    return Evaluated(result, _surface(bsdf), variant)
+    return result, _surface(bsdf), variant
 
 
 def _notes(args: argparse.Namespace) -> str:
@@ -241,15 +234,14 @@ def _notes(args: argparse.Namespace) -> str:
         return options.notes(args, patch, TableSettings(**settings))
 
 
-def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
-    """Map a method of the thesis."""
-    from ..analysis.maps import LightDirection, check_map
+def _by_method(
+    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
+) -> tuple[Any, str, str]:
+    """Map a method of the thesis; also return its surface and the method in words."""
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
 
-    light = LightDirection(args.theta, args.phi)
     samples, single = args.samples or 1, args.wavelength
-    check_map(bands, args.resolution, args.samples, spectral=False)
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
     if single is not None:
@@ -267,7 +259,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
         )  # fmt: skip
     quantity = "relative reflectance" if args.relative else "R = 1"
     how = f"method {args.method}: {time.perf_counter() - start:.2f} s for the map"
-    return Evaluated(result, f"{quantity}; method {args.method}", how)
+    return result, f"{quantity}; method {args.method}", how
 
 
 def _refuse_contradictions(args: argparse.Namespace) -> None:
@@ -278,7 +270,7 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     if args.method is None:
         options.refuse(args, ("period", "relative"), ": only with argument --method")
         return
-    options.refuse(args, (*_OF_THE_BSDF, "spectral"), ": not allowed with argument --method")
+    options.refuse(args, _OF_THE_BSDF, ": not allowed with argument --method")
     if args.illuminant != "D65":
         args.parser.error("argument --method: is under --illuminant D65 only")
     if not args.relative:

@@ -90,16 +90,15 @@ def run(args: argparse.Namespace) -> Figures:
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
     check_outputs(written, [args.source], "evaluation")
     experiment = _prepared(args)
-    result, more = _measured(args, experiment)
-    report = [("spectrum", str(grating)) for grating in experiment.gratings]
-    report += [result.followed.line, *result.lines]
-    _write(args, experiment, result, report, more, written)
+    result = _measured(args, experiment)
+    report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines
+    _write(args, experiment, result, report, written)
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
         f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
         f"{elapsed(args):.1f} s"
     )
-    if distance := _distance(args, experiment, result.followed.ridge):
+    if distance := _distance(args, experiment, result.ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
@@ -109,10 +108,10 @@ def run(args: argparse.Namespace) -> Figures:
     )
     if notes := options.notes(args, experiment.patch, asked):
         say_warning(notes)
-    print(f"  {'period':<9} {_published(result.followed.fit, more.get('window_error'))}")
-    beam = experiment.beam
+    figures, beam = result.figures, experiment.beam
+    print(f"  {'period':<9} {_published(result.fit, figures.get('window_error'))}")
     return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
-            "phi": beam.phi, **more}  # fmt: skip
+            "phi": beam.phi, **figures}  # fmt: skip
 
 
 def _prepared(args: argparse.Namespace) -> _Experiment:
@@ -145,15 +144,25 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
 
 
 class _Result(NamedTuple):
-    """Response of the patch, the ridge in it, and lines on single windows."""
+    """Response of the patch, its ridge of maxima and the fit of the period.
+
+    The ridge is empty and the fit None if no period fits.
+
+    Attributes
+    ----------
+    lines : label and text of each line for people.
+    figures : entries of the NPZ file.
+    """
 
     response: Response
-    followed: FollowedRidge
+    ridge: Ridge
+    fit: Fit | None
     lines: list[tuple[str, str]]
+    figures: dict[str, Any]
 
 
-def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Result, dict[str, Any]]:
-    """Measure and fit; also return the figures for the NPZ file."""
+def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
+    """Measure and fit the patch, and single windows."""
     from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
@@ -164,15 +173,15 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Resul
         response = measure(
             brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
         )  # fmt: skip
-        followed = _followed(response, args.order, held)
-        fit = followed.fit
-        lines, more = _windows(args, patch, settings, beam, steps, angles, fit, bar)
-    more |= {"fitted_period": math.nan if fit is None else fit.period,
-             "fit_error": math.nan if fit is None else fit.error,
-             "residual": math.nan if fit is None else fit.residual,
-             "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
-             "source": str(args.source)}  # fmt: skip
-    return _Result(response, followed, lines), more
+        ridge, fit, line = _followed(response, args.order, held)
+        lines, more = _windows(args, experiment, fit, bar)
+    figures = {**more,
+               "fitted_period": math.nan if fit is None else fit.period,
+               "fit_error": math.nan if fit is None else fit.error,
+               "residual": math.nan if fit is None else fit.residual,
+               "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
+               "source": str(args.source)}  # fmt: skip
+    return _Result(response, ridge, fit, [("fitted", line), *lines], figures)
 
 
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
@@ -200,14 +209,14 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
 
 def _write(
     args: argparse.Namespace, experiment: _Experiment, result: _Result,
-    report: Sequence[tuple[str, str]], more: dict[str, Any], written: Sequence[Path],
+    report: Sequence[tuple[str, str]], written: Sequence[Path],
 ) -> None:  # fmt: skip
     """Write the picture, the ridge (CSV) and everything (NPZ)."""
     from ..atomic import atomic_path
     from ..thesis.period_fit.plot import figure, save_csv, save_npz
 
-    response, (ridge, fit, _), _ = result
-    period = more["fitted_period"] if args.period is None else args.period
+    response, ridge, fit, _, figures = result
+    period = figures["fitted_period"] if args.period is None else args.period
     with atomic_path(written[0]) as path:
         figure(
             response, ridge if fit else None, fit, None if math.isnan(period) else period,
@@ -215,7 +224,7 @@ def _write(
             notes="\n".join(f"{name}: {text}" for name, text in report),
         ).savefig(path, format="png")  # fmt: skip
     save_csv(written[1], response, ridge, period, args.order)
-    save_npz(written[2], response, ridge, period, args.order, more)
+    save_npz(written[2], response, ridge, period, args.order, figures)
 
 
 def _distance(args: argparse.Namespace, experiment: _Experiment, ridge: Ridge) -> str:
@@ -238,19 +247,10 @@ def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
     return [g.period / c for g, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
 
 
-class FollowedRidge(NamedTuple):
-    """Ridge of maxima and the fit of its period; an empty ridge and None if no period fits.
-
-    line : label and text for people.
-    """
-
-    ridge: Ridge
-    fit: Fit | None
-    line: tuple[str, str]
-
-
-def _followed(response: Response, order: int, held: Sequence[float]) -> FollowedRidge:
-    """Find the ridge that obeys the grating equation, and fit its period.
+def _followed(
+    response: Response, order: int, held: Sequence[float]
+) -> tuple[Ridge, Fit | None, str]:
+    """Find the ridge that obeys the grating equation, fit its period, and describe the fit.
 
     Raises a DiffractionError if there are too few maxima to look for one.
     """
@@ -262,13 +262,15 @@ def _followed(response: Response, order: int, held: Sequence[float]) -> Followed
     ridge = ridge_of(response, order, period=period)
     fit = fit_period(ridge)
     if period is not None:
-        return FollowedRidge(ridge, fit, _fitted(fit))
+        return ridge, fit, (
+            f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at "
+            f"most, {fit.points} of {fit.wavelengths} wavelengths"
+        )  # fmt: skip
     nothing = np.full(response.wavelengths.size, np.nan)
-    why = (
+    return Ridge(response, order, nothing, nothing), None, (
         "none: the light on this side follows no grating equation (the brightest angles alone "
         f"would give {1e3 * fit.period:.4g} nm)"
-    )
-    return FollowedRidge(Ridge(response, order, nothing, nothing), None, ("fitted", why))
+    )  # fmt: skip
 
 
 def viewing_angles(
@@ -303,15 +305,15 @@ def viewing_angles(
 
 
 def _windows(
-    args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
-    angles: Any, fit: Fit | None, bar: Bar,
-) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
+    args: argparse.Namespace, experiment: _Experiment, fit: Fit | None, bar: Bar
+) -> tuple[list[tuple[str, str]], dict[str, Any]]:
     """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
     from ..thesis.methods import make
     from ..thesis.period_fit import thesis_fit, window_fits
 
+    patch, settings, _, _, beam, steps, angles = experiment
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
@@ -321,7 +323,7 @@ def _windows(
     try:
         fits = window_fits(
             table, beam, few, angles, count=args.positions, order=args.order,
-            period=None if fit is None else fit.period, progress=bar,
+            period=fit.period, progress=bar,
         )  # fmt: skip
     except DiffractionError as error:
         lines.append(("windows", str(error)))
@@ -364,11 +366,4 @@ def _published(fit: Fit | None, window_error: float | None) -> str:
     return (
         f"{1e3 * fit.period:.{digits}f} ± {error:.{digits}f} nm to publish ({', '.join(parts)}; "
         "the pixel size's relative error, unknown here, adds to it)"
-    )
-
-
-def _fitted(fit: Any) -> tuple[str, str]:
-    return "fitted", (
-        f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at most, "
-        f"{fit.points} of {fit.wavelengths} wavelengths"
     )

@@ -46,8 +46,7 @@ def run(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     if args.addon is not None:
         return _addon(args)
-    if args.folders:
-        args.parser.error("argument --with: is for --addon")
+    options.refuse(args, ["folders"], ": is for --addon")
     take_source(args)
     look = args.source.stem if args.preset is None else args.preset.partition(",")[0]
     folder = args.output or Path(f"{look}-osl")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -142,7 +141,7 @@ STOPS = number_between(-100, 100)
 def numbers(text: str) -> tuple[float, ...]:
     """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
     try:
-        return tuple(itertools.chain.from_iterable(map(_numbers_of, text.split(","))))
+        return tuple(n for part in text.split(",") for n in numbers_of(part, _MOST_NUMBERS))
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
@@ -150,11 +149,12 @@ def numbers(text: str) -> tuple[float, ...]:
         ) from error
 
 
-def _numbers_of(text: str) -> list[float]:
+def numbers_of(text: str, most: int) -> list[float]:
+    """Return a number, or at most so many from FIRST to LAST by STEP; else raise a ValueError."""
     if ":" not in text:
         return [float(text)]
     first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
+    if not (step > 0.0 and last >= first and (last - first) / step < most):
         raise ValueError(text)
     return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 

@@ -79,8 +79,7 @@ def run(args: argparse.Namespace) -> Figures:
     scene_options.put_on_stage(args)
     if args.observer is not None:
         return run_observed(args)
-    if args.illuminant is not None:
-        args.parser.error("argument --illuminant: is for the eye of --observer; name one")
+    options.refuse(args, ["illuminant"], ": is for the eye of --observer; name one")
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)

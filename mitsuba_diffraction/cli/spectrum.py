@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
 from itertools import chain
 from pathlib import Path
@@ -14,15 +15,55 @@ from . import options
 from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
-from .options import whole_number
+from .options import number_between, whole_number
 from .report import Figures, check_outputs, elapsed
-from .spectrometer import SPECTROMETER, group
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
 _NOTHING = 1e-3
 # Files of an animal's catches and contrasts.
 _SEEN = ("catches", "contrasts")
+
+
+def _angles(text: str) -> list[float]:
+    """Parse a number, or FIRST:LAST:STEP, in degrees."""
+    with contextlib.suppress(ValueError):
+        found = options.numbers_of(text, 1000)
+        if found[-1] - found[0] <= 180.0:
+            return [round(angle, 6) for angle in found]
+    raise argparse.ArgumentTypeError(
+        f"expected degrees, or FIRST:LAST:STEP such as 0:60:5, got {text!r}"
+    )
+
+
+def azimuth(text: str) -> float | str:
+    """Parse an angle, or auto."""
+    return text if text == "auto" else float(text)
+
+
+def _group(text: str) -> tuple[str, str]:
+    """Parse NAME=PATTERN."""
+    name, equals, pattern = text.partition("=")
+    if not (equals and name and pattern):
+        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN, got {text!r}")
+    return name, pattern
+
+
+#: Options of the measurement.
+_SPECTROMETER = (
+    ("--light DEG", "angle of the lamp from the normal", float, 30.0),
+    ("--light-azimuth --azimuth DEG", "azimuth of the lamp from the patch's x axis towards y, or "
+     "auto: across the grooves of each scan's strongest grating", azimuth, 0.0),
+    ("--detector DEG ...", "angles of the detectors from the normal, positive on the far side from "
+     "the lamp, or ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to", _angles),
+    ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
+    ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
+     ("white", "mirror", "none"), "white"),
+    ("--polarisation", "also light polarised across (s) and in (p) the plane of incidence", bool),
+    ("--wavelength-range FIRST LAST", "nm; default: 300 830, or from where a table begins",
+     number_between(100, 10000)),
+    ("--step NM", "between wavelengths", number_between(0.01, 1000), 5.0),
+)  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -39,7 +80,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         options.files("tables, also of orders, recipes or heights", "*"),
         ("--group NAME=PATTERN", "scans of one species, in place of FILE, e.g. --group "
          "corn='corn/*.spm'; may be given several times: each has its columns, mean and errors",
-         [group], None, {"dest": "groups"}),
+         [_group], None, {"dest": "groups"}),
         ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
          "repeatability", whole_number(2)),
         ("--observer ANIMAL|CSV", "also quantum catches and contrasts (JND) of an eye: avian_uv, "
@@ -56,7 +97,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     # argparse takes -60:60:5 for an option otherwise
     parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
-    options.add_options(parser.add_argument_group("the spectrometer"), *SPECTROMETER)
+    options.add_options(parser.add_argument_group("the spectrometer"), *_SPECTROMETER)
     add_surface(parser.add_argument_group("the surface"))
     options.add_option(parser, *options.TREATMENTS)
     options.add_heights(parser)
@@ -147,8 +188,7 @@ def run(args: argparse.Namespace) -> Figures:
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
     """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
     if args.observer is None:
-        if args.illuminant is not None:
-            args.parser.error("argument --illuminant: is the light of --observer; name one")
+        options.refuse(args, ["illuminant"], ": is the light of --observer; name one")
         return None, None
     from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 
