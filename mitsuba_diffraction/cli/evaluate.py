@@ -16,7 +16,7 @@ from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -212,17 +212,16 @@ def _write(
     report: Sequence[tuple[str, str]], written: Sequence[Path],
 ) -> None:  # fmt: skip
     """Write the picture, the ridge (CSV) and everything (NPZ)."""
-    from ..atomic import atomic_path
     from ..thesis.period_fit.plot import figure, save_csv, save_npz
 
     response, ridge, fit, _, figures = result
     period = figures["fitted_period"] if args.period is None else args.period
-    with atomic_path(written[0]) as path:
-        figure(
-            response, ridge if fit else None, fit, None if math.isnan(period) else period,
-            order=args.order, title=experiment.patch.name,
-            notes="\n".join(f"{name}: {text}" for name, text in report),
-        ).savefig(path, format="png")  # fmt: skip
+    picture = figure(
+        response, ridge if fit else None, fit, None if math.isnan(period) else period,
+        order=args.order, title=experiment.patch.name,
+        notes="\n".join(f"{name}: {text}" for name, text in report),
+    )  # fmt: skip
+    save_figure(written[0], picture)
     save_csv(written[1], response, ridge, period, args.order)
     save_npz(written[2], response, ridge, period, args.order, figures)
 

@@ -13,7 +13,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
-from .report import STDOUT, Figures, lines_of, plain
+from .report import STDOUT, Figures, lines_of, plain, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -112,16 +112,13 @@ def _energy(file: Path) -> dict[str, Any]:
 
 def _plot_albedo(file: Path, output: Path) -> None:
     from ..analysis.pictures import albedo_figure
-    from ..atomic import atomic_path
     from ..tables import DiffractionTable
 
-    with atomic_path(output) as temporary:
-        albedo_figure(DiffractionTable.load(file)).savefig(temporary, dpi=100)
+    save_figure(output, albedo_figure(DiffractionTable.load(file)), dpi=100)
 
 
 def _draw(args: argparse.Namespace) -> None:
     from ..analysis.pictures import patches_figure
-    from ..atomic import atomic_path
     from ..heights.load import load_heights
     from ..heights.recipes import Recipe
 
@@ -130,8 +127,7 @@ def _draw(args: argparse.Namespace) -> None:
         fields = Recipe.load(args.file).fields(how)
     else:
         fields = [load_heights(args.file, how)]
-    with atomic_path(args.picture) as temporary:
-        patches_figure(fields).savefig(temporary, dpi=80)
+    save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:

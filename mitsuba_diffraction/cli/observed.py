@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..scene.load import load_scene, set_variant
 from ..scene.pictures import count_bad, write_exr
 from . import scene_options
 from .console import mitsuba_warnings, say, say_warning
-from .report import Figures, check_writable, default_output, elapsed
+from .report import Figures, check_writable, default_output, elapsed, save_figure
 
 #: The animal.
 OBSERVER = (
@@ -65,9 +64,7 @@ def run_observed(args: argparse.Namespace) -> Figures:
 
     light = f", light: {Path(args.illuminant).stem}" if args.illuminant else ""
     title = f"{args.name.name} as {Path(args.observer).stem}{light}"
-    with atomic_path(png) as temporary:
-        figure = false_colour_figure(channels, eye, args.exposure, title)
-        figure.savefig(temporary, format="png")
+    save_figure(png, false_colour_figure(channels, eye, args.exposure, title))
     width, height = result.bitmap.size()
     print(
         f"{output} and {png}: {width} x {height} pixels, channels {', '.join(eye.names)}, "

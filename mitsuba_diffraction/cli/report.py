@@ -72,6 +72,15 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
+def save_figure(path: Path, figure: Any, **how: Any) -> None:
+    """Write a figure of Matplotlib in the format of the suffix.
+
+    how : more arguments of `matplotlib.figure.Figure.savefig`.
+    """
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], **how)
+
+
 def save_report(args: argparse.Namespace, figures: Figures) -> None:
     """Write the file of --json, if it is requested and there are figures."""
     if figures and args.json not in (None, STDOUT):
@@ -134,7 +143,7 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
         raise DiffractionError(f"cannot write '{path}': it is a folder; name a file in it")
     folder = path.parent
     if make_folder and folder.exists() and not folder.is_dir():
-        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
+        raise DiffractionError(f"cannot write to '{folder}': it is a file; name a folder")
     while make_folder and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:

@@ -16,7 +16,7 @@ from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, save_figure
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -127,7 +127,6 @@ def run(args: argparse.Namespace) -> Figures:
     from ..analysis import spectra_files as files_of_spectra
     from ..analysis.spectra import mean_spectra
     from ..analysis.spectrometer import Geometry
-    from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
     auto = args.light_azimuth == "auto"
@@ -158,8 +157,7 @@ def run(args: argparse.Namespace) -> Figures:
     if args.iridescence:
         files_of_spectra.save_angular(spectra, angular)
     title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
-    with atomic_path(written[1]) as temporary:
-        files_of_spectra.spectra_figure(spectra, title, turned).savefig(temporary, format="png")
+    save_figure(written[1], files_of_spectra.spectra_figure(spectra, title, turned))
     shown = spectra[first]
     lam = shown.wavelength
     print(

@@ -14,7 +14,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, save_figure
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -68,7 +68,6 @@ def run(args: argparse.Namespace) -> Figures:
     """Evaluate all maps, compare, draw, and return the figures."""
     from ..analysis.maps import LightDirection
     from ..analysis.maps.picture import contact_sheet
-    from ..atomic import atomic_path
     from ..thesis.sweeps import sweep
 
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
@@ -95,8 +94,7 @@ def run(args: argparse.Namespace) -> Figures:
         [step.map for step in result.steps], [_title(step, result) for step in result.steps],
         title=f"{patch.name}: {args.kind}{where}", exposure=exposure,
     )  # fmt: skip
-    with atomic_path(output) as path:
-        sheet.savefig(path, format="png")
+    save_figure(output, sheet)
     _save(numbers, result)
     print(f"{output}, {numbers}: {elapsed(args):.1f} s")
     for line in [*_lines(result), *compiled]:
