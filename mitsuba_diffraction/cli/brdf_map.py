@@ -72,9 +72,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Picture the BRDF over all view directions for one light direction, seen from above: "
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
          "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),

@@ -37,9 +37,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
         "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
         "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.SOURCE,
         ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
          "folder", options.path_ending_in(".png")),

@@ -25,9 +25,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write the reflected light on a grid of directions, for programs that have no diffraction: "
         "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
         "the BiRD project. Lobes narrower than the grid become as wide as it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
          options.path_ending_in(".bsdf", ".json", ".brdf")),

@@ -22,9 +22,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
         "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
         "all named looks, as an add-on that Blender installs.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
          "folder; without SOURCE and --preset it has all named looks that the shaders show",

@@ -17,9 +17,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Divide a picture into areas of a few colours, give each the grating that shows its "
         "colour, and write textures and a scene with a card, or with a label on the front of a "
         "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("PICTURE", "PNG, JPEG, ...", Path),
         ("--mesh FILE", "mesh with texture coordinates", Path),
         ("-o --output FOLDER", "default: PICTURE_hologram", Path),

@@ -160,13 +160,15 @@ def numbers_of(text: str, most: int) -> list[float]:
 
 
 def add_command(
-    subparsers: Subparsers, name: str, run: Callable[..., Figures], help: str, description: str
-) -> argparse.ArgumentParser:
-    """Add the parser of a sub-command, which `main` runs by calling run(args)."""
+    subparsers: Subparsers, name: str, run: Callable[..., Figures], help: str, description: str,
+    *rows: tuple[Any, ...],
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Add the parser of a sub-command, which `main` runs by calling run(args), and its options."""
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name, help=help, description=description
     )
     parser.set_defaults(run=run, parser=parser)
+    add_options(parser, *rows)
     return parser
 
 

@@ -17,9 +17,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "wavelength, direction to the light within the superstrate, order, and the reflected share "
         "of s and of p light; a thin sheet also has the transmitted shares. "
         "'solve --import' reads the file back.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
         ("-o --output OUT", "the CSV; default: TABLE's name with .csv in the current folder",
          options.path_ending_in(".csv")),

@@ -36,9 +36,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Trace paths through an XML scene, report which spatial frequencies, kappa and "
         "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
         "these, for `precompute` and `render --plan`.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         *PLAN,
         ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "

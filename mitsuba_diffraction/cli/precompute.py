@@ -30,9 +30,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "precompute", run, "build the table of a height field",
         "Build a table of diffraction orders from measured or generated heights, and measure its "
         "error. Options override the settings of a recipe.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("SOURCE ...", "image, array, text, AFM file or recipe (.toml); several patches of one "
          "surface make one table of their mean powers, several recipes make a table each", Path,
          None, {"dest": "sources"}),

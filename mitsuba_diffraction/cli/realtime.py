@@ -21,14 +21,11 @@ _EXPORTED = ("fast", "exact")
 
 
 def add_view(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
+    options.add_command(
         subparsers, "view", view, "look at a scene in a window, in real time",
         "Open a window on a scene, drawn by shaders. Turn it with the left button, drag the "
         "light with the right one, move with the middle one or shift, zoom with the wheel; "
         "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("--method", "method of the shaders", METHODS, "fast"),
         ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
@@ -43,7 +40,7 @@ def add_view(subparsers: options.Subparsers) -> None:
 
 
 def view(args: argparse.Namespace) -> Figures:
-    """Show the scene, and return the figures."""
+    """Show the scene, which has no figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
@@ -70,9 +67,6 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "difference: over all pixels in all direct light of the scene, and beside it in full "
         "transport; and, as a detail, where both see the same lit surface under lights "
         "without extent, by points and directions in place of the scene's.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
          "scene's name with _compare in the current folder", Path),
@@ -121,9 +115,6 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
         "as fit; the resulting ΔE2000 is printed, and shown on the page.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("OUT", "the page to write", path_ending_in(".html"), None, {"dest": "output"}),
         ("--method", "method on the page; all leaves out those that do not suit the scene",
@@ -174,9 +165,6 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
         "Write a function `vec3 diffraction(vec3 wi, vec3 wo)` in GLSL, its textures (EXR) and "
         "constants (JSON), and a material of three.js that uses them. How to bring it into "
         "another engine: docs/realtime.md.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
          "-shader in the current folder", Path),

@@ -45,9 +45,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "current pass and keeps the picture so far. With --frames, render a folder of PNG "
         "files while parameters of the scene change; existing frames with the same "
         "settings are kept, so an interrupted run can be continued.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: the scene's name "
          "with .exr in the current folder. With --frames: a folder, or a film, .webp, .gif or "

@@ -48,9 +48,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "orders, and a thin sheet's transmitted ones, for all directions and wavelengths, as a "
         "table of the BSDF diffraction_orders. "
         "Interrupted by Ctrl-C, the same command goes on.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
          "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
         ("-o --output OUT", "the table; default: SOURCE's name with .nc",

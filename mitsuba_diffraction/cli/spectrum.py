@@ -74,9 +74,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "in nm first and a column for each detector, as the R package pavo reads it, a table of "
         "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
         f"their mean, and a second file the standard errors. {options.LIMITS}",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.files("tables, also of orders, recipes or heights", "*"),
         ("--group NAME=PATTERN", "scans of one species, in place of FILE, e.g. --group "
          "corn='corn/*.spm'; may be given several times: each has its columns, mean and errors",

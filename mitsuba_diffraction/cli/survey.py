@@ -29,9 +29,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "survey.csv, samples.csv (means and standard errors of repeated scans), contact sheets, "
         "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
         "command then exits with 1; a second run measures only new scans.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.files("scans of any format, or recipes"),
         ("-o --output FOLDER", "", Path, Path("survey")),
         options.TREATMENTS,

@@ -30,9 +30,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
         "sweep over methods also times the package's own look-up against flss with both "
         "compiled. Writes a picture, and the numbers as CSV beside it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("KIND", f"one of {', '.join(KINDS)}", KINDS),
         options.SOURCE,
         ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "

@@ -25,9 +25,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "(a torus excepted) every field has singular points, around which the patch turns.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("MESH", "mesh to read", Path),
         ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
         ("--along", "smooth: the field that turns least; x, y, z: that axis, laid onto the "

@@ -12,13 +12,10 @@ from .report import Figures, check_outputs, default_output
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
+    options.add_command(
         subparsers, "tonemap", run, "show a linear EXR as a PNG",
         "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
         "than it was rendered with.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
         ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
          options.path_ending_in(".png")),
@@ -28,7 +25,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> Figures:
-    """Write the PNG, and return the figures."""
+    """Write the PNG, which has no figures."""
     output = args.output or default_output(args.picture, ".png")
     check_outputs([output], [args.picture], "picture")
     set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one

@@ -37,12 +37,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "integral in double precision, the colours' ΔE2000, the time of eval beside "
         "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
         "error against time, and one of error against depth; recommends a setting.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("-o --output FOLDER", "where files go", Path, Path("tradeoff")),
         ("--quick", "fewer settings, a smaller patch", bool),
-    )
+    )  # fmt: skip
     options.add_table(parser, ["coherence_width"])
     options.add_options(
         parser.add_argument_group("recommend a setting with"),
