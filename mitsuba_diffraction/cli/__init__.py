@@ -20,7 +20,6 @@ tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 spectrum               reflectance spectra as a spectrometer measures them
 measured_spectra       spectra of files of `spectrum`: tables, scans and their crops
-spectrometer           options of a spectrometer, and types of their values
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory
@@ -28,12 +27,12 @@ realtime               `view` and `compare`, `export-viewer` and `export-shader`
 export_bsdf            a surface's BRDF for other programs
 export_osl             a surface as a shader for Blender's Cycles
 options                options that several commands share, declared once, and their types
-scene_options          the scene, its parameters and materials; a mesh on a stage
+scene_options          the scene, its parameters and materials; a mesh on a stage; its rendering
 workers                options of commands that may run on many processes
 console                lines and bars on stderr, and Mitsuba's among them
 interrupt              Ctrl-C and SIGTERM
 wording                messages of the library with the options of the command
-report                 output files, checked before the work; plain data as text and JSON
+report                 output files, checked before the work; figures as text, JSON and pictures
 """
 
 from .console import Bar, say_error

@@ -6,7 +6,7 @@ import argparse
 import time
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..files import FileKind, kind_of
@@ -18,7 +18,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -33,8 +33,8 @@ _SURFACE = (
 )  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
-    "mode", "material", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
-    "height_scale", "basis", "second_order", "preset",
+    "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "second_order", "preset",
+    "spectral",
 )  # fmt: skip
 
 
@@ -72,9 +72,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Picture the BRDF over all view directions for one light direction, seen from above: "
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
          "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),
@@ -108,7 +105,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if there is no such look, or the pigment is a picture.
+    Raises a DiffractionError if there is no such look, the pigment is a picture, or an option for
+    reading heights does not fit.
     """
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
@@ -116,12 +114,12 @@ def take_source(args: argparse.Namespace) -> None:
         from ..plugin.presets import find_preset
 
         args.source = find_preset(args.preset).patch
-    if args.material is not None and args.int_ior is not None:
-        args.parser.error("argument --int-ior: not allowed with argument --material")
+    surface_parameters(args)
     if args.pigment is not None:
         from ..plugin.pigment import pigment_range
 
         pigment_range(args.pigment)
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
@@ -161,9 +159,8 @@ def gain_of(args: argparse.Namespace) -> Any:
         ) from error
 
 
-def run(args: argparse.Namespace) -> int:
-    """Make the map, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
     output = args.output or Path(f"{args.source.stem}-map.exr")
@@ -173,15 +170,15 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
-    from ..analysis.maps import Bands, save_exr, save_png
+    from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
 
     spectrum = options.wavelengths(args)
     bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
-    evaluated = evaluate(args, bands, spectrum)
-    result, surface = evaluated.result, evaluated.surface
+    light = LightDirection(args.theta, args.phi)
+    check_map(bands, args.resolution, args.samples, args.spectral)
+    result, surface, method = evaluate(args, light, bands, spectrum)
     exposure = None if bands.is_single else args.exposure
     if not only_png:
         notes = {"source": str(args.source), "surface": surface}
@@ -190,32 +187,23 @@ def run(args: argparse.Namespace) -> int:
     shown = ""
     if not bands.is_single:
         shown = f", exposure {result.exposure() if exposure is None else exposure:+g} stops"
-    seconds = time.perf_counter() - start
+    seconds = elapsed(args)
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {evaluated.method}"
+        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {method}"
     )
-    save_report(args, {"source": args.source, "files": written, "theta": args.theta,
-                       "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
-                       "bands": str(bands), "surface": surface, "method": evaluated.method,
-                       "seconds": seconds})  # fmt: skip
-    return 0
+    return {"source": args.source, "files": written, "theta": args.theta,
+            "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
+            "bands": str(bands), "surface": surface, "method": method,
+            "seconds": seconds}  # fmt: skip
 
 
-class Evaluated(NamedTuple):
-    """A map, its surface and the method of its evaluation, both in words."""
+def _by_bsdf(
+    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
+) -> tuple[Any, str, str]:
+    """Map the renderer's BSDF; also return its surface and the variant in words."""
+    from ..analysis.maps import brdf_map
 
-    result: Any
-    surface: str
-    method: str
-
-
-def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
-    """Map the renderer's BSDF."""
-    from ..analysis.maps import LightDirection, brdf_map, check_map
-
-    light = LightDirection(args.theta, args.phi)
-    check_map(bands, args.resolution, args.samples, args.spectral)
     variant = set_variant(args.mode)
     notes = _notes(args)
     with mitsuba_warnings(), Bar(args) as bar:
@@ -229,7 +217,7 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
             wavelength=args.wavelength, **spectrum,
         )  # fmt: skip
-    return Evaluated(result, _surface(bsdf), variant)
+    return result, _surface(bsdf), variant
 
 
 def _notes(args: argparse.Namespace) -> str:
@@ -243,15 +231,14 @@ def _notes(args: argparse.Namespace) -> str:
         return options.notes(args, patch, TableSettings(**settings))
 
 
-def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
-    """Map a method of the thesis."""
-    from ..analysis.maps import LightDirection, check_map
+def _by_method(
+    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
+) -> tuple[Any, str, str]:
+    """Map a method of the thesis; also return its surface and the method in words."""
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
 
-    light = LightDirection(args.theta, args.phi)
     samples, single = args.samples or 1, args.wavelength
-    check_map(bands, args.resolution, args.samples, spectral=False)
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
     if single is not None:
@@ -269,7 +256,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
         )  # fmt: skip
     quantity = "relative reflectance" if args.relative else "R = 1"
     how = f"method {args.method}: {time.perf_counter() - start:.2f} s for the map"
-    return Evaluated(result, f"{quantity}; method {args.method}", how)
+    return result, f"{quantity}; method {args.method}", how
 
 
 def _refuse_contradictions(args: argparse.Namespace) -> None:
@@ -280,7 +267,7 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     if args.method is None:
         options.refuse(args, ("period", "relative"), ": only with argument --method")
         return
-    options.refuse(args, (*_OF_THE_BSDF, "spectral"), ": not allowed with argument --method")
+    options.refuse(args, _OF_THE_BSDF, ": not allowed with argument --method")
     if args.illuminant != "D65":
         args.parser.error("argument --method: is under --illuminant D65 only")
     if not args.relative:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import re
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator
-from types import TracebackType
+from collections.abc import Iterator
 from typing import Any, Self
 
 from ..errors import DiffractionWarning, one_line, shortened
@@ -62,7 +62,7 @@ def say_warning(text: str) -> None:
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Print every Python warning inside as one line, and each text only once."""
-    say = saying_once()
+    say = functools.cache(say_warning)
 
     def show(message: Warning | str, category: type[Warning], *_: object) -> None:
         ours = issubclass(category, DiffractionWarning)
@@ -74,18 +74,6 @@ def warnings_in_one_line() -> Iterator[None]:
         yield
 
 
-def saying_once() -> Callable[[str], None]:
-    """Return a `say_warning` that prints each text only once."""
-    said: set[str] = set()
-
-    def say(text: str) -> None:
-        if text not in said:
-            said.add(text)
-            say_warning(text)
-
-    return say
-
-
 @contextlib.contextmanager
 def mitsuba_warnings() -> Iterator[None]:
     """Print Mitsuba's warnings inside like this program's, each once.
@@ -94,7 +82,7 @@ def mitsuba_warnings() -> Iterator[None]:
     """
     import mitsuba as mi
 
-    say = saying_once()
+    say = functools.cache(say_warning)
 
     class Lines(mi.Appender):
         def append(self, level: object, text: str) -> None:
@@ -177,12 +165,7 @@ class Bar:
             threading.Thread(target=self._say_regularly, daemon=True).start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._over.set()
         if self._bar is not None:
             self._bar.close()

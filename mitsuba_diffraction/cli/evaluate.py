@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 import warnings
 from collections.abc import Sequence
 from functools import partial
@@ -17,7 +16,7 @@ from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -38,9 +37,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
         "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
         "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.SOURCE,
         ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
          "folder", options.path_ending_in(".png")),
@@ -85,23 +81,21 @@ class _Experiment(NamedTuple):
     angles: Any  # (A,) degrees
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure, fit, draw, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Measure, fit, draw, and return the figures."""
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
     check_outputs(written, [args.source], "evaluation")
     experiment = _prepared(args)
-    result, more = _measured(args, experiment)
-    report = [("spectrum", str(grating)) for grating in experiment.gratings]
-    report += [result.followed.line, *result.lines]
-    _write(args, experiment, result, report, more, written)
+    result = _measured(args, experiment)
+    report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines
+    _write(args, experiment, result, report, written)
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
         f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
-        f"{time.perf_counter() - start:.1f} s"
+        f"{elapsed(args):.1f} s"
     )
-    if distance := _distance(args, result.followed.ridge):
+    if distance := _distance(args, result.ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
@@ -111,11 +105,10 @@ def run(args: argparse.Namespace) -> int:
     )
     if notes := options.notes(args, experiment.patch, asked):
         say_warning(notes)
-    print(f"  {'period':<9} {_published(result.followed.fit, more.get('window_error'))}")
-    beam = experiment.beam
-    save_report(args, {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
-                       "phi": beam.phi, **more})  # fmt: skip
-    return 0
+    figures, beam = result.figures, experiment.beam
+    print(f"  {'period':<9} {_published(result.fit, figures.get('window_error'))}")
+    return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
+            "phi": beam.phi, **figures}  # fmt: skip
 
 
 def _prepared(args: argparse.Namespace) -> _Experiment:
@@ -148,15 +141,25 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
 
 
 class _Result(NamedTuple):
-    """Response of the patch, the ridge in it, and lines on single windows."""
+    """Response of the patch, its ridge of maxima and the fit of the period.
+
+    The ridge is empty and the fit None if no period fits.
+
+    Attributes
+    ----------
+    lines : label and text of each line for people.
+    figures : entries of the NPZ file.
+    """
 
     response: Response
-    followed: FollowedRidge
+    ridge: Ridge
+    fit: Fit | None
     lines: list[tuple[str, str]]
+    figures: dict[str, Any]
 
 
-def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Result, dict[str, Any]]:
-    """Measure and fit; also return the figures for the NPZ file."""
+def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
+    """Measure and fit the patch, and single windows."""
     from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
@@ -167,15 +170,15 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> tuple[_Resul
         response = measure(
             brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
         )  # fmt: skip
-        followed = _followed(response, args.order, held)
-        fit = followed.fit
-        lines, more = _windows(args, patch, settings, beam, steps, angles, fit, bar)
-    more |= {"fitted_period": math.nan if fit is None else fit.period,
-             "fit_error": math.nan if fit is None else fit.error,
-             "residual": math.nan if fit is None else fit.residual,
-             "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
-             "source": str(args.source)}  # fmt: skip
-    return _Result(response, followed, lines), more
+        ridge, fit, line = _followed(response, args.order, held)
+        lines, more = _windows(args, experiment, fit, bar)
+    figures = {**more,
+               "fitted_period": math.nan if fit is None else fit.period,
+               "fit_error": math.nan if fit is None else fit.error,
+               "residual": math.nan if fit is None else fit.residual,
+               "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
+               "source": str(args.source)}  # fmt: skip
+    return _Result(response, ridge, fit, [("fitted", line), *lines], figures)
 
 
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
@@ -203,22 +206,21 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
 
 def _write(
     args: argparse.Namespace, experiment: _Experiment, result: _Result,
-    report: Sequence[tuple[str, str]], more: dict[str, Any], written: Sequence[Path],
+    report: Sequence[tuple[str, str]], written: Sequence[Path],
 ) -> None:  # fmt: skip
     """Write the picture, the ridge (CSV) and everything (NPZ)."""
-    from ..atomic import atomic_path
     from ..thesis.period_fit.plot import figure, save_csv, save_npz
 
-    response, (ridge, fit, _), _ = result
-    period = more["fitted_period"] if args.period is None else args.period
-    with atomic_path(written[0]) as path:
-        figure(
-            response, ridge if fit else None, None if math.isnan(period) else period,
-            order=args.order, title=experiment.patch.name,
-            notes="\n".join(f"{name}: {text}" for name, text in report),
-        ).savefig(path, format="png")  # fmt: skip
+    response, ridge, fit, _, figures = result
+    period = figures["fitted_period"] if args.period is None else args.period
+    picture = figure(
+        response, ridge if fit else None, None if math.isnan(period) else period,
+        order=args.order, title=experiment.patch.name,
+        notes="\n".join(f"{name}: {text}" for name, text in report),
+    )  # fmt: skip
+    save_figure(written[0], picture)
     save_csv(written[1], ridge, period)
-    save_npz(written[2], ridge, period, more)
+    save_npz(written[2], ridge, period, figures)
 
 
 def _distance(args: argparse.Namespace, ridge: Ridge) -> str:
@@ -240,19 +242,10 @@ def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
     return [g.period / c for g, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
 
 
-class FollowedRidge(NamedTuple):
-    """Ridge of maxima and the fit of its period; an empty ridge and None if no period fits.
-
-    line : label and text for people.
-    """
-
-    ridge: Ridge
-    fit: Fit | None
-    line: tuple[str, str]
-
-
-def _followed(response: Response, order: int, held: Sequence[float]) -> FollowedRidge:
-    """Find the ridge that obeys the grating equation, and fit its period.
+def _followed(
+    response: Response, order: int, held: Sequence[float]
+) -> tuple[Ridge, Fit | None, str]:
+    """Find the ridge that obeys the grating equation, fit its period, and describe the fit.
 
     Raises a DiffractionError if there are too few maxima to look for one.
     """
@@ -264,13 +257,15 @@ def _followed(response: Response, order: int, held: Sequence[float]) -> Followed
     ridge = ridge_of(response, order, period=period)
     fit = fit_period(ridge)
     if period is not None:
-        return FollowedRidge(ridge, fit, _fitted(fit))
+        return ridge, fit, (
+            f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at "
+            f"most, {fit.points} of {fit.wavelengths} wavelengths"
+        )  # fmt: skip
     nothing = np.full(response.wavelengths.size, np.nan)
-    why = (
+    return Ridge(response, order, nothing, nothing), None, (
         "none: the light on this side follows no grating equation (the brightest angles alone "
         f"would give {1e3 * fit.period:.4g} nm)"
-    )
-    return FollowedRidge(Ridge(response, order, nothing, nothing), None, ("fitted", why))
+    )  # fmt: skip
 
 
 def viewing_angles(
@@ -305,15 +300,15 @@ def viewing_angles(
 
 
 def _windows(
-    args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
-    angles: Any, fit: Fit | None, bar: Bar,
-) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
+    args: argparse.Namespace, experiment: _Experiment, fit: Fit | None, bar: Bar
+) -> tuple[list[tuple[str, str]], dict[str, Any]]:
     """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
     from ..thesis.methods import make
     from ..thesis.period_fit import thesis_fit, window_fits
 
+    patch, settings, _, _, beam, steps, angles = experiment
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
@@ -323,7 +318,7 @@ def _windows(
     try:
         fits = window_fits(
             table, beam, few, angles, count=args.positions, order=args.order,
-            period=None if fit is None else fit.period, progress=bar,
+            period=fit.period, progress=bar,
         )  # fmt: skip
     except DiffractionError as error:
         lines.append(("windows", str(error)))
@@ -366,11 +361,4 @@ def _published(fit: Fit | None, window_error: float | None) -> str:
     return (
         f"{1e3 * fit.period:.{digits}f} ± {error:.{digits}f} nm to publish ({', '.join(parts)}; "
         "the pixel size's relative error, unknown here, adds to it)"
-    )
-
-
-def _fitted(fit: Any) -> tuple[str, str]:
-    return "fitted", (
-        f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at most, "
-        f"{fit.points} of {fit.wavelengths} wavelengths"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
 _SUFFIXES = {"rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf")}
@@ -26,9 +25,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write the reflected light on a grid of directions, for programs that have no diffraction: "
         "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
         "the BiRD project. Lobes narrower than the grid become as wide as it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
          options.path_ending_in(".bsdf", ".json", ".brdf")),
@@ -42,7 +38,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "
          "default: by format", options.numbers),
         ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default "
-         "550; default: by format", options.numbers),
+         "550; default: by format", options.numbers, None, {"dest": "wavelengths"}),
         ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
          "for zemax, 18 for bird", whole_number(8)),
     )  # fmt: skip
@@ -51,16 +47,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "what was written")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Write the file, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Write the file, and return the figures."""
     take_source(args)
-    start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}.{_default_suffix(args.format)}")
     name = args.format or ("rgl" if output.suffix.lower() == ".bsdf" else "bird")
     if output.suffix.lower() not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
     check_outputs([output], [args.source], "BRDF")
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..scene.load import set_variant
 
@@ -68,16 +62,9 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis.export import bird, rgl, zemax
 
     module: Any = {"rgl": rgl, "zemax": zemax, "bird": bird}[name]
-    changed = {
-        field: np.asarray(value, np.float64)
-        for field in ("theta", "phi")
-        if (value := getattr(args, field)) is not None
-    }
-    if args.wavelength is not None:
-        changed["wavelengths"] = np.asarray(args.wavelength, np.float64)
-    grid = module.DEFAULT._replace(**changed)
-    if args.resolution is not None:
-        grid = grid._replace(resolution=args.resolution)
+    chosen = options.given(args, ("theta", "phi", "wavelengths"))
+    arrays = {name: np.asarray(values, np.float64) for name, values in chosen.items()}
+    grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
     with mitsuba_warnings(), Bar(args) as bar:
         bsdf = surface_bsdf(args)
         text = f"{args.source.name}: {bsdf.describe().text}"
@@ -86,12 +73,11 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{args.source} -> {output}: {name}, {size / 1e6:.1f} MB, {grid.theta.size} x "
         f"{grid.phi.size} directions of light, {grid.wavelengths.size} wavelengths, "
-        f"{time.perf_counter() - start:.1f} s"
+        f"{elapsed(args):.1f} s"
     )
-    save_report(args, {"source": args.source, "file": output, "format": name, "bytes": size,
-                       "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
-                       "wavelengths": grid.wavelengths.tolist()})  # fmt: skip
-    return 0
+    return {"source": args.source, "file": output, "format": name, "bytes": size,
+            "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
+            "wavelengths": grid.wavelengths.tolist()}  # fmt: skip
 
 
 def _default_suffix(name: str | None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import re
 import tempfile
-import time
 from pathlib import Path
 
 from ..errors import DiffractionError
@@ -13,7 +12,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -23,9 +22,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
         "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
         "all named looks, as an add-on that Blender installs.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
          "folder; without SOURCE and --preset it has all named looks that the shaders show",
@@ -43,26 +39,21 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the files and their settings")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Export, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Export, and return the figures."""
     if args.addon is not None:
         return _addon(args)
-    if args.folders:
-        args.parser.error("argument --with: is for --addon")
+    options.refuse(args, ["folders"], ": is for --addon")
     take_source(args)
     look = args.source.stem if args.preset is None else args.preset.partition(",")[0]
     folder = args.output or Path(f"{look}-osl")
-    if folder.exists() and not folder.is_dir():
-        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     name = args.name or "diffraction_" + re.sub(r"[^A-Za-z0-9_]", "_", look)
     outputs = [folder / f"{name}.osl"]
     check_outputs(outputs, [args.source], "shader", make_folder=True)
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..osl import export
     from ..scene.load import set_variant
 
-    start = time.perf_counter()
     set_variant(args.mode)
     with mitsuba_warnings(), Bar(args) as bar:
         bar(0, 0, "making tables")
@@ -72,17 +63,16 @@ def run(args: argparse.Namespace) -> int:
     size = sum(file.stat().st_size for file in files)
     print(
         f"{exported.shader}: {size / 1e6:.1f} MB with textures, "
-        f"{time.perf_counter() - start:.1f} s; {exported.surface}; error of the textures, as a "
+        f"{elapsed(args):.1f} s; {exported.surface}; error of the textures, as a "
         f"share of the light: {error}"
     )
-    save_report(args, {"source": args.source, "folder": folder, "files": files,
-                       "surface": exported.surface, "error": exported.error,
-                       "bytes": size})  # fmt: skip
-    return 0
+    return {"source": args.source, "folder": folder, "files": files,
+            "surface": exported.surface, "error": exported.error,
+            "bytes": size}  # fmt: skip
 
 
-def _addon(args: argparse.Namespace) -> int:
-    """Pack the add-on, and return the exit code."""
+def _addon(args: argparse.Namespace) -> Figures:
+    """Pack the add-on, and return the figures."""
     if args.source is not None or args.preset is not None or args.output is not None:
         args.parser.error(
             "argument --addon: export SOURCE or --preset into a folder first, and name it by --with"
@@ -91,19 +81,14 @@ def _addon(args: argparse.Namespace) -> int:
 
     from ..osl import make_addon
 
-    start = time.perf_counter()
     folders = {folder.resolve().name.removesuffix("-osl"): folder for folder in args.folders}
     with tempfile.TemporaryDirectory() as temporary:
         if not folders:
             folders = _exported_looks(args, Path(temporary))
         make_addon(folders, args.addon)
     size = args.addon.stat().st_size
-    print(
-        f"{args.addon}: {', '.join(folders)}: {size / 1e6:.1f} MB, "
-        f"{time.perf_counter() - start:.1f} s"
-    )
-    save_report(args, {"files": [args.addon], "looks": list(folders), "bytes": size})
-    return 0
+    print(f"{args.addon}: {', '.join(folders)}: {size / 1e6:.1f} MB, {elapsed(args):.1f} s")
+    return {"files": [args.addon], "looks": list(folders), "bytes": size}
 
 
 def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:

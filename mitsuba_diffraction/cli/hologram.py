@@ -8,7 +8,7 @@ from pathlib import Path
 from . import options
 from .console import mitsuba_warnings
 from .options import number_between, whole_number
-from .report import save_report
+from .report import Figures
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -17,9 +17,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Divide a picture into areas of a few colours, give each the grating that shows its "
         "colour, and write textures and a scene with a card, or with a label on the front of a "
         "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("PICTURE", "PNG, JPEG, ...", Path),
         ("--mesh FILE", "mesh with texture coordinates", Path),
         ("-o --output FOLDER", "default: PICTURE_hologram", Path),
@@ -37,8 +34,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "colours and files")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Write the folder, print the colours, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Write the folder, print the colours, and return the figures."""
     from ..scene import label
     from ..scene.load import set_variant
     from ..scene.logo import areas
@@ -61,5 +58,4 @@ def run(args: argparse.Namespace) -> int:
     for line in label.described(parts):
         print(line)
     print(f"{scene}: render it, e.g. mitsuba-diffraction render {scene} --denoise")
-    save_report(args, {"scene": scene, "colours": label.described(parts)})
-    return 0
+    return {"scene": scene, "colours": label.described(parts)}

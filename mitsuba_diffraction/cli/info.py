@@ -13,7 +13,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
-from .report import lines_of, plain, save_report
+from .report import STDOUT, Figures, lines_of, plain, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -30,7 +30,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     plot = path_ending_in(".png", ".pdf", ".svg")
     options.add_option(parser, "FILE", "table, table of orders, heights, recipe or mesh", Path)
-    options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
+    options.add_json(parser, "the description", nargs="?", const=STDOUT)
     options.add_options(
         parser,
         ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", plot),
@@ -43,29 +43,29 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_table(parser.add_argument_group("the table"), _TABLE)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Print the description, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Print the description, and return the figures."""
     data = {"file": str(args.file), **_describe(args.file, args)}
+    for name, kinds, what in (
+        ("energy", ("table",), "a table"),
+        ("albedo", ("table",), "a table"),
+        ("picture", ("height field", "recipe"), "heights"),
+    ):
+        if data["kind"] not in kinds:
+            options.refuse(args, [name], f": '{args.file}' is a {data['kind']}, not {what}")
     if args.energy:
-        if data["kind"] != "table":
-            args.parser.error(f"argument --energy: '{args.file}' is a {data['kind']}, not a table")
         data |= _energy(args.file)
     if args.albedo is not None:
-        if data["kind"] != "table":
-            args.parser.error(f"argument --albedo: '{args.file}' is a {data['kind']}, not a table")
         _plot_albedo(args.file, args.albedo)
         data["albedo plot"] = str(args.albedo)
     if args.picture is not None:
-        if data["kind"] not in ("height field", "recipe"):
-            args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
         _draw(args)
         data["picture"] = str(args.picture)
-    if args.json == options.STDOUT:
+    if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         print("\n".join(lines_of(data)))
-        save_report(args, data)
-    return 0
+    return data
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
@@ -85,8 +85,10 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
             f"and meshes ({', '.join(MESHES)})"
         )
     if kind is FileKind.TABLE:
+        from ..tables import DiffractionTable
+
         _refuse_heights_options(args, "a table")
-        return _table(file)
+        return {"kind": "table", **DiffractionTable.load(file).summary()}
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
         return {"kind": "table of orders", **load_any_orders(file).summary()}
@@ -96,12 +98,6 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
     names = (*options.HEIGHTS, *_TABLE)
     options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
-
-
-def _table(file: Path) -> dict[str, Any]:
-    from ..tables import DiffractionTable
-
-    return {"kind": "table", **DiffractionTable.load(file).summary()}
 
 
 def _energy(file: Path) -> dict[str, Any]:
@@ -116,16 +112,13 @@ def _energy(file: Path) -> dict[str, Any]:
 
 def _plot_albedo(file: Path, output: Path) -> None:
     from ..analysis.pictures import albedo_figure
-    from ..atomic import atomic_path
     from ..tables import DiffractionTable
 
-    with atomic_path(output) as temporary:
-        albedo_figure(DiffractionTable.load(file)).savefig(temporary, dpi=100)
+    save_figure(output, albedo_figure(DiffractionTable.load(file)), dpi=100)
 
 
 def _draw(args: argparse.Namespace) -> None:
     from ..analysis.pictures import patches_figure
-    from ..atomic import atomic_path
     from ..heights.load import load_heights
     from ..heights.recipes import Recipe
 
@@ -134,8 +127,7 @@ def _draw(args: argparse.Namespace) -> None:
         fields = Recipe.load(args.file).fields(how)
     else:
         fields = [load_heights(args.file, how)]
-    with atomic_path(args.picture) as temporary:
-        patches_figure(fields).savefig(temporary, dpi=80)
+    save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
 A sub-command is two functions: one declares its parser by `options.add_command`, the other runs it
-and returns the exit code. The second imports its modules (Mitsuba above all) when called, so that
+and returns its figures, which are written for --json; it sets `args.code` to end with another
+exit code than 0. The second imports its modules (Mitsuba above all) when called, so that
 `--help` and `--version` answer at once.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import time
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -41,8 +43,7 @@ from . import (
 )
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
-from .options import STDOUT
-from .report import check_writable
+from .report import STDOUT, check_writable, save_report
 from .wording import speak_for
 
 #: Functions that declare the sub-commands, in the order of --help.
@@ -56,6 +57,7 @@ COMMANDS = (
     export_osl.add_parser, export_bsdf.add_parser,
 )  # fmt: skip
 
+DONE = 0
 FAILED = 1
 USAGE = 2
 
@@ -92,7 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
     _add_common(parser)
-    parser.set_defaults(debug=False, progress=None)
+    parser.set_defaults(debug=False, progress=None, json=None)
     parser.add_argument(
         "--version", action="version", version=f"{PROGRAM} {version('mitsuba_diffraction')}"
     )
@@ -128,10 +130,12 @@ def _add_common(group: argparse._ActionsContainer) -> None:
 
 def _run(args: argparse.Namespace) -> int:
     try:
-        if getattr(args, "json", None) not in (None, STDOUT):
+        if args.json not in (None, STDOUT):
             check_writable(args.json)
-        code: int = args.run(args)
+        args.began, args.code = time.perf_counter(), DONE
+        save_report(args, args.run(args))
         sys.stdout.flush()
+        code: int = args.code
         return code
     except SystemExit as stop:  # args.parser.error of a sub-command
         return _code_of(stop)

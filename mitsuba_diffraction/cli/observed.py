@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 
 import numpy as np
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
-from ..scene.passes import Stop, render_passes
+from ..scene.load import load_scene, set_variant
 from ..scene.pictures import count_bad, write_exr
 from . import scene_options
-from .console import Bar, mitsuba_warnings, say, say_warning
-from .interrupt import INTERRUPTED
-from .report import check_writable, default_output, save_report
+from .console import mitsuba_warnings, say, say_warning
+from .report import Figures, check_writable, default_output, elapsed, save_figure
 
 #: The animal.
 OBSERVER = (
@@ -27,8 +23,8 @@ OBSERVER = (
 )  # fmt: skip
 
 
-def run_observed(args: argparse.Namespace) -> int:
-    """Render with a band for each receptor, and return the exit code."""
+def run_observed(args: argparse.Namespace) -> Figures:
+    """Render with a band for each receptor, and return the figures."""
     from ..analysis.observers import GRID, eye_of, relit, responses
 
     if args.frames is not None or args.plan is not None or args.denoise or args.workers:
@@ -42,26 +38,16 @@ def run_observed(args: argparse.Namespace) -> int:
     png = output.with_suffix(".png")
     for path in (output, png):
         check_writable(path)
-    start = time.perf_counter()
     variant = set_variant(args.mode)
     if "_spectral" not in variant:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
     from ..scene.bands import Bands
 
     bands = Bands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
-    with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, args.spp or 0, "loading")
-        scene = load_scene(args.scene, parameters, bands=bands)
-        sensor = sensor_of(scene, args.sensor)
-        if args.preview:
-            shrink(sensor)
-        spp = args.spp or preview_samples(sensor, args.preview)
-        with Stop() as stop:
-            result = render_passes(
-                scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
-            )
-    if result.spp == 0:
-        raise KeyboardInterrupt
+    with mitsuba_warnings():
+        result = scene_options.rendered(
+            args, variant, lambda _: load_scene(args.scene, parameters, bands=bands)
+        )[2]
     if bad := count_bad(result.bitmap):
         say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in the PNG")
     channels = np.nan_to_num(np.array(result.bitmap, np.float64)[..., : len(eye.names)])
@@ -78,15 +64,13 @@ def run_observed(args: argparse.Namespace) -> int:
 
     light = f", light: {Path(args.illuminant).stem}" if args.illuminant else ""
     title = f"{args.name.name} as {Path(args.observer).stem}{light}"
-    with atomic_path(png) as temporary:
-        figure = false_colour_figure(channels, eye, args.exposure, title)
-        figure.savefig(temporary, format="png")
+    save_figure(png, false_colour_figure(channels, eye, args.exposure, title))
     width, height = result.bitmap.size()
-    seconds = time.perf_counter() - start
     print(
         f"{output} and {png}: {width} x {height} pixels, channels {', '.join(eye.names)}, "
-        f"{result.spp} samples per pixel, {seconds:.1f} s, {variant}"
+        f"{result.spp} samples per pixel, {elapsed(args):.1f} s, {variant}"
     )
-    save_report(args, {"scene": args.scene, "files": [output, png], "observer": args.observer,
-                       "receptors": list(eye.names), "spp": result.spp})  # fmt: skip
-    return INTERRUPTED if result.interrupted else 0
+    return {
+        "scene": args.scene, "files": [output, png], "observer": args.observer,
+        "receptors": list(eye.names), "spp": result.spp,
+    }  # fmt: skip

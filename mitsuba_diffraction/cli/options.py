@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
+from .report import Figures
 from .wording import worded
 
 if TYPE_CHECKING:
@@ -32,9 +32,6 @@ WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 
 #: Numbers of an option that accepts ranges, at most.
 _MOST_NUMBERS = 10_000
-
-#: `--json` without a file, which only `info` has: printed instead of the text.
-STDOUT = Path("-")
 
 #: Limits of spectra from heights, for help and descriptions.
 LIMITS = (
@@ -144,7 +141,7 @@ STOPS = number_between(-100, 100)
 def numbers(text: str) -> tuple[float, ...]:
     """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
     try:
-        return tuple(itertools.chain.from_iterable(map(_numbers_of, text.split(","))))
+        return tuple(n for part in text.split(",") for n in numbers_of(part, _MOST_NUMBERS))
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
@@ -152,23 +149,26 @@ def numbers(text: str) -> tuple[float, ...]:
         ) from error
 
 
-def _numbers_of(text: str) -> list[float]:
+def numbers_of(text: str, most: int) -> list[float]:
+    """Return a number, or at most so many from FIRST to LAST by STEP; else raise a ValueError."""
     if ":" not in text:
         return [float(text)]
     first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
+    if not (step > 0.0 and last >= first and (last - first) / step < most):
         raise ValueError(text)
     return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
 
 def add_command(
-    subparsers: Subparsers, name: str, run: Callable[..., int], help: str, description: str
-) -> argparse.ArgumentParser:
-    """Add the parser of a sub-command, which `main` runs by calling run(args)."""
+    subparsers: Subparsers, name: str, run: Callable[..., Figures], help: str, description: str,
+    *rows: tuple[Any, ...],
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Add the parser of a sub-command, which `main` runs by calling run(args), and its options."""
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name, help=help, description=description
     )
     parser.set_defaults(run=run, parser=parser)
+    add_options(parser, *rows)
     return parser
 
 

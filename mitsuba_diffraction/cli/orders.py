@@ -7,7 +7,7 @@ from pathlib import Path
 
 from . import options
 from .options import number_between
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -17,9 +17,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "wavelength, direction to the light within the superstrate, order, and the reflected share "
         "of s and of p light; a thin sheet also has the transmitted shares. "
         "'solve --import' reads the file back.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
         ("-o --output OUT", "the CSV; default: TABLE's name with .csv in the current folder",
          options.path_ending_in(".csv")),
@@ -51,8 +48,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the lines")
 
 
-def run(args: argparse.Namespace) -> int:
-    """List the orders, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """List the orders, and return the figures."""
     import numpy as np
 
     from ..solve.listing import list_orders
@@ -72,5 +69,4 @@ def run(args: argparse.Namespace) -> int:
         f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
         f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"
     )
-    save_report(args, {"file": str(output), "columns": listing.columns, "lines": rows.tolist()})
-    return 0
+    return {"file": str(output), "columns": listing.columns, "lines": rows.tolist()}

@@ -14,7 +14,7 @@ from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
-from .report import check_writable, lines_of, save_report
+from .report import Figures, check_writable, lines_of
 
 if TYPE_CHECKING:
     from ..scene.planning.plan import PlannedTable
@@ -36,9 +36,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Trace paths through an XML scene, report which spatial frequencies, kappa and "
         "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
         "these, for `precompute` and `render --plan`.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         *PLAN,
         ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
@@ -61,8 +58,8 @@ def planning_variant(requested: str | None) -> str:
     return set_variant(f"{'cuda' if name.startswith('cuda') else 'llvm'}_ad_spectral")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Plan, report, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Plan, report, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     if args.output is not None:
@@ -85,7 +82,6 @@ def run(args: argparse.Namespace) -> int:
     }
     for line in lines_of(report):
         print(line)
-    save_report(args, report)
     limited = [table for table in planned if table.settings is not None]
     if args.output is not None and not limited:
         say_warning("every table is needed whole: no recipe was written")
@@ -97,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         names = " ".join(map(str, files))
         surfaces = "".join(f" --material {name}={text}" for name, text in args.materials)
         print(f"{names}: for mitsuba-diffraction render {args.scene}{surfaces} --plan {names}")
-    return 0
+    return report
 
 
 def _planned(

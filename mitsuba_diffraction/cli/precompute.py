@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from ..errors import warn
 from ..files import FileKind, kind_of
@@ -14,7 +15,7 @@ from ..optics.second_order_change import applies
 from ..system import peak_memory
 from . import options
 from .console import Bar
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs
 from .workers import add_workers, client_of, on_workers
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "precompute", run, "build the table of a height field",
         "Build a table of diffraction orders from measured or generated heights, and measure its "
         "error. Options override the settings of a recipe.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("SOURCE ...", "image, array, text, AFM file or recipe (.toml); several patches of one "
          "surface make one table of their mean powers, several recipes make a table each", Path,
          None, {"dest": "sources"}),
@@ -46,19 +44,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the table's summary")
 
 
-class _Job(NamedTuple):
-    """Heights of one table, the settings and name of that table, and the files that are read."""
-
-    source: str  # for people
-    read: Callable[[], list[HeightField]]
-    settings: dict[str, Any]  # the recipe's
-    output: Path
-    files: list[Path]
-    of_recipe: bool  # whose folder of tables may be made
-
-
-def run(args: argparse.Namespace) -> int:
-    """Build the table of each recipe, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Build the table of each recipe, and return the figures."""
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
     if recipes and len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
@@ -67,63 +54,69 @@ def run(args: argparse.Namespace) -> int:
     if not recipes and len(args.sources) > 1 and args.output is None:
         args.parser.error("argument -o/--output: name the one table of these files")
     if recipes:
-        summaries = [_precompute(_recipe_job(recipe, args), args) for recipe in recipes]
+        summaries = [_of_recipe(recipe, args) for recipe in recipes]
     else:
-        summaries = [_precompute(_files_job(args), args)]
-    save_report(args, summaries[0] if len(summaries) == 1 else {"tables": summaries})
-    return 0
+        summaries = [_of_files(args.sources, args)]
+    return summaries[0] if len(summaries) == 1 else {"tables": summaries}
 
 
-def _recipe_job(file: Path, args: argparse.Namespace) -> _Job:
+def _of_recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    """Build the table of a recipe."""
     from ..heights.recipes import Recipe
 
     recipe, how = Recipe.load(file), options.load_options(args)
-    return _Job(
-        str(file), lambda: recipe.fields(how), dict(recipe.table), args.output or recipe.output,
-        [file, *recipe.sources], args.output is None,
+    return _precompute(
+        args, [file], partial(recipe.fields, how), args.output or recipe.output, recipe.table,
+        recipe.sources, make_folder=args.output is None,
     )  # fmt: skip
 
 
-def _files_job(args: argparse.Namespace) -> _Job:
+def _of_files(files: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
+    """Build the table of patches."""
     from ..heights.load import load_heights
 
-    files, how = list(args.sources), options.load_options(args)
-    output = args.output or Path(f"{files[0].stem}.exr")
-    return _Job(
-        ", ".join(map(str, files)), lambda: [load_heights(file, how) for file in files], {},
-        output, files, False,
-    )  # fmt: skip
+    how, output = options.load_options(args), args.output or Path(f"{files[0].stem}.exr")
+    return _precompute(args, files, lambda: [load_heights(file, how) for file in files], output)
 
 
-def _precompute(job: _Job, args: argparse.Namespace) -> dict[str, Any]:
-    """Build one table and return its summary."""
+def _precompute(
+    args: argparse.Namespace, sources: Sequence[Path], read: Callable[[], list[HeightField]],
+    output: Path, of_recipe: Mapping[str, Any] = {}, more: Sequence[Path] = (), *,
+    make_folder: bool = False,
+) -> dict[str, Any]:  # fmt: skip
+    """Build one table and return its summary.
+
+    of_recipe : settings of the table that options override.
+    more : further files that are read.
+    make_folder : the folder of the table may be made.
+    """
     from ..settings import TableSettings
     from ..tables.build.checks import warnings_of
 
     start = time.perf_counter()
-    settings = TableSettings(**{**job.settings, **options.table_options(args)})
+    settings = TableSettings(**{**of_recipe, **options.table_options(args)})
     if (args.workers or args.scheduler) and settings.windows is None:
         args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
-    check_outputs([job.output], job.files, "table", make_folder=job.of_recipe)
+    check_outputs([output], [*sources, *more], "table", make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
-        fields = job.read()
+        fields = read()
     for line in warnings_of(fields, settings):  # before the minutes that the table takes
         warn(line)
     with Bar(args) as bar:
         table, workers = _built(args, fields, settings, bar)
-        if job.of_recipe:
-            job.output.parent.mkdir(parents=True, exist_ok=True)
-        table.save(job.output)
-    print(f"{job.source} -> {job.output}")
-    for label, text in _report(fields, table, job.output, time.perf_counter() - start):
+        if make_folder:
+            output.parent.mkdir(parents=True, exist_ok=True)
+        table.save(output)
+    print(f"{', '.join(map(str, sources))} -> {output}")
+    for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
     if workers:
         print(
             f"  work   {workers['tasks']} tasks of windows, {workers['retries']} given out again, "
             f"{workers['busy']:.1f} s of workers' work"
         )
-    return {"file": str(job.output), **table.summary(), **({"workers": workers} if workers else {})}
+    return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
 
 
 def _built(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from . import options
-from .report import save_report
+from .report import Figures
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -16,17 +16,16 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the looks")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Print a line for each look, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Print a line for each look, and return the figures."""
     from ..plugin.presets import presets
 
     width = max(map(len, presets()))
     for preset in presets().values():
         print(f"{preset.name:{width}}  {preset.about}")
-    save_report(args, {
+    return {
         "presets": [
             {"name": preset.name, "about": preset.about, **preset.changed({})}
             for preset in presets().values()
         ]
-    })  # fmt: skip
-    return 0
+    }  # fmt: skip

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from ..extras import optional
 from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
@@ -17,20 +15,17 @@ from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
-from .report import check_outputs, check_writable, plain, save_json, save_report
+from .report import Figures, check_outputs, check_writable, elapsed, plain, save_json
 
 _EXPORTED = ("fast", "exact")
 
 
 def add_view(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
+    options.add_command(
         subparsers, "view", view, "look at a scene in a window, in real time",
         "Open a window on a scene, drawn by shaders. Turn it with the left button, drag the "
         "light with the right one, move with the middle one or shift, zoom with the wheel; "
         "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("--method", "method of the shaders", METHODS, "fast"),
         ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
@@ -44,8 +39,8 @@ def add_view(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
 
 
-def view(args: argparse.Namespace) -> int:
-    """Show the scene, and return the exit code."""
+def view(args: argparse.Namespace) -> Figures:
+    """Show the scene, which has no figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
@@ -61,7 +56,7 @@ def view(args: argparse.Namespace) -> int:
             window=args.window,
         )  # fmt: skip
     print(f"{frames} frames, {milliseconds:.3g} ms each at the end, method {args.method}")
-    return 0
+    return {}
 
 
 def add_compare(subparsers: options.Subparsers) -> None:
@@ -72,9 +67,6 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "difference: over all pixels in all direct light of the scene, and beside it in full "
         "transport; and, as a detail, where both see the same lit surface under lights "
         "without extent, by points and directions in place of the scene's.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
          "scene's name with _compare in the current folder", Path),
@@ -90,19 +82,16 @@ def add_compare(subparsers: options.Subparsers) -> None:
     options.add_json(parser)
 
 
-def compare(args: argparse.Namespace) -> int:
-    """Compare, and return the exit code."""
+def compare(args: argparse.Namespace) -> Figures:
+    """Compare, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     folder = args.output or Path(f"{args.name.stem}_compare")
-    if folder.exists() and not folder.is_dir():
-        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
 
     from ..realtime.shader_comparison.report import markdown
     from ..realtime.shader_comparison.run import Comparison
 
-    start = time.perf_counter()
     variant = _set_variant(args)
     every = "all" in args.method
     with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
@@ -114,10 +103,9 @@ def compare(args: argparse.Namespace) -> int:
         figures = comparison.run(METHODS if every else args.method, leave_out=every)
     figures = {"scene": figures["scene"], "parameters": parameters, **figures}
     save_json(folder / "compare.json", figures)
-    save_report(args, figures)
     print(markdown(plain(figures)))
-    print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
-    return 0
+    print(f"{folder}: pictures, sheets and compare.json, {elapsed(args):.0f} s")
+    return figures
 
 
 def add_export_viewer(subparsers: options.Subparsers) -> None:
@@ -127,9 +115,6 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
         "as fit; the resulting ΔE2000 is printed, and shown on the page.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("OUT", "the page to write", path_ending_in(".html"), None, {"dest": "output"}),
         ("--method", "method on the page; all leaves out those that do not suit the scene",
@@ -140,15 +125,14 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "contents of the page")
 
 
-def export_viewer(args: argparse.Namespace) -> int:
-    """Export, and return the exit code."""
+def export_viewer(args: argparse.Namespace) -> Figures:
+    """Export, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     check_writable(args.output)
 
     from ..realtime.web import export_viewer
 
-    start = time.perf_counter()
     _set_variant(args)
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
@@ -165,14 +149,13 @@ def export_viewer(args: argparse.Namespace) -> int:
         f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
         for method, (mean, most) in page.loss.items()
     )
-    size, seconds = args.output.stat().st_size, time.perf_counter() - start
+    size, seconds = args.output.stat().st_size, elapsed(args)
     print(f"{args.output}: {size / 1e6:.1f} MB, {seconds:.1f} s; rounding: {losses}")
-    save_report(args, {"scene": args.scene, "files": [args.output], "bytes": size,
-                       "delta_e": {m: {"mean": mean, "99 %": most}
-                                   for m, (mean, most) in page.loss.items()},
-                       "left_out": page.left_out, "omissions": page.omissions,
-                       "seconds": seconds})  # fmt: skip
-    return 0
+    return {"scene": args.scene, "files": [args.output], "bytes": size,
+            "delta_e": {m: {"mean": mean, "99 %": most}
+                        for m, (mean, most) in page.loss.items()},
+            "left_out": page.left_out, "omissions": page.omissions,
+            "seconds": seconds}  # fmt: skip
 
 
 def add_export_shader(subparsers: options.Subparsers) -> None:
@@ -182,9 +165,6 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
         "Write a function `vec3 diffraction(vec3 wi, vec3 wo)` in GLSL, its textures (EXR) and "
         "constants (JSON), and a material of three.js that uses them. How to bring it into "
         "another engine: docs/realtime.md.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *SURFACE_SOURCE,
         ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
          "-shader in the current folder", Path),
@@ -197,16 +177,14 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the files and their settings")
 
 
-def export_shader(args: argparse.Namespace) -> int:
-    """Export, and return the exit code."""
+def export_shader(args: argparse.Namespace) -> Figures:
+    """Export, and return the figures."""
     take_source(args)
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
-    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..realtime.glsl.export import export_shader
 
-    start = time.perf_counter()
     _set_variant(args)
     with mitsuba_warnings(), Bar(args) as bar:
         bar(0, 0, "making tables")
@@ -216,12 +194,11 @@ def export_shader(args: argparse.Namespace) -> int:
     print(
         f"{folder}: {', '.join(shader.functions.values())}: {code / 1e3:.1f} kB of GLSL, "
         f"{len(textures)} textures of {sum(textures) / 1e6:.1f} MB, "
-        f"{time.perf_counter() - start:.1f} s; {shader.surface}"
+        f"{elapsed(args):.1f} s; {shader.surface}"
     )
-    save_report(args, {"source": args.source, "folder": folder, "files": files,
-                       "functions": shader.functions, "surface": shader.surface,
-                       "bytes": {"code": code, "textures": sum(textures)}})  # fmt: skip
-    return 0
+    return {"source": args.source, "folder": folder, "files": files,
+            "functions": shader.functions, "surface": shader.surface,
+            "bytes": {"code": code, "textures": sum(textures)}}  # fmt: skip
 
 
 def _set_variant(args: argparse.Namespace) -> str:

@@ -5,7 +5,6 @@ With --frames: which frames exist, why others are rendered, and their film."""
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
@@ -24,9 +23,9 @@ from ..scene.frames import (
     write_film,
     write_frame,
 )
-from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
+from ..scene.load import load_scene, set_variant
 from ..scene.parameters import values_of_frames
-from ..scene.passes import Result, Stop, integrator_of, render_passes
+from ..scene.passes import Result, Stop, integrator_of
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import ANIMATION, say_why
@@ -34,7 +33,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
 from .observed import OBSERVER, run_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import check_writable, default_output, save_report
+from .report import Figures, check_writable, default_output, elapsed
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, add_workers, client_of, film_of, on_workers, say_report
 
@@ -46,9 +45,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "current pass and keeps the picture so far. With --frames, render a folder of PNG "
         "files while parameters of the scene change; existing frames with the same "
         "settings are kept, so an interrupted run can be continued.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         *scene_options.SCENE,
         ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: the scene's name "
          "with .exr in the current folder. With --frames: a folder, or a film, .webp, .gif or "
@@ -73,15 +69,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_option(parser, *THREADS)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Render, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Render, and return the figures."""
     check_plan_options(args)
     take_studio(args)
     scene_options.put_on_stage(args)
     if args.observer is not None:
         return run_observed(args)
-    if args.illuminant is not None:
-        args.parser.error("argument --illuminant: is for the eye of --observer; name one")
+    options.refuse(args, ["illuminant"], ": is for the eye of --observer; name one")
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
@@ -140,72 +135,51 @@ def _outputs(args: argparse.Namespace) -> Outputs:
     return Outputs(output, png)
 
 
-def _on_workers(args: argparse.Namespace) -> int:
+def _on_workers(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
 
     from ..cluster.frames import FrameRequest
 
-    start = time.perf_counter()
     variant = set_variant(args.mode)
     keep = outputs.named.with_name(f"{outputs.named.name}.passes")
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
-            _check_colours(film.scene, film.sensor, args, outputs.png)
+            _check_colours(args, outputs.png, film.scene, film.sensor)
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
-                report = _finish(args, result, outputs, variant, start)
+                report = _finish(args, result, outputs, variant)
                 film.forget(0)
-                save_report(args, report | {"workers": say_report(film)})
-                return 0
+                return report | {"workers": say_report(film)}
     say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
-    return INTERRUPTED
+    args.code = INTERRUPTED
+    return {}
 
 
-def _run_one(args: argparse.Namespace) -> int:
+def _run_one(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
     for path in outputs.denoised if args.denoise else ():
         check_writable(path)
 
-    start = time.perf_counter()
+    def load(bar: Bar) -> Any:
+        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
+        return whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
+
     variant = set_variant(args.mode)
+    check = partial(_check_colours, args, outputs.png) if outputs.only_png else None
     with mitsuba_warnings():
-        with Bar(args, unit=" spp", delay=0) as bar:
-            spp = args.spp or 0
-            load = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
-            bar(0, spp, "loading")
-            scene = load() if args.plan is None else load_by_plan(args, variant, load, bar)
-            sensor = sensor_of(scene, args.sensor)
-            if args.preview:
-                shrink(sensor)
-            spp = spp or preview_samples(sensor, args.preview)
-            if outputs.only_png:
-                _check_colours(scene, sensor, args, outputs.png)
-            with Stop() as stop:
-                result = render_passes(
-                    scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop,
-                    progress=bar,
-                )  # fmt: skip
-        if result.spp == 0:
-            raise KeyboardInterrupt  # before the first pass: there is no picture
-        report = _finish(args, result, outputs, variant, start)
+        scene, sensor, result = scene_options.rendered(args, variant, load, check)
+        report = _finish(args, result, outputs, variant)
         if args.denoise:
             clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
             _write_denoised(args, clean, outputs.denoised)
             report["files"] += outputs.denoised
-    save_report(args, report)
-    if result.interrupted:
-        say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
-        return INTERRUPTED
-    return 0
+    return report
 
 
-def _finish(
-    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str,
-    start: float,
-) -> dict[str, Any]:  # fmt: skip
+def _finish(args: argparse.Namespace, result: Result, outputs: Outputs, variant: str) -> Figures:
     """Write the picture, print warnings and a summary, and return the figures for --json."""
     bad = count_bad(result.bitmap)
     if bad:
@@ -222,7 +196,7 @@ def _finish(
         write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
     (width, height), samples = result.bitmap.size(), f"{result.spp} samples"
-    seconds = time.perf_counter() - start
+    seconds = elapsed(args)
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
         f"{seconds:.1f} s, {variant}"
@@ -244,7 +218,7 @@ def _write_denoised(args: argparse.Namespace, picture: Any, files: Sequence[Path
     print(f"{' and '.join(map(str, files))}: denoised")
 
 
-def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
+def _check_colours(args: argparse.Namespace, output: Path, scene: Any, sensor: Any) -> None:
     """Refuse a film without colours for a PNG, before the work is done."""
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())
@@ -255,8 +229,8 @@ def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Pa
         )
 
 
-def _run_frames(args: argparse.Namespace) -> int:
-    """Render the frames that are missing or outdated, then the film; return the exit code."""
+def _run_frames(args: argparse.Namespace) -> Figures:
+    """Render the frames that are missing or outdated, then the film; return the figures."""
     folder, film = _folder_and_film(args)
     check_writable(folder / "frame_0000.png", make_folder=True)
     if film is not None:
@@ -267,7 +241,6 @@ def _run_frames(args: argparse.Namespace) -> int:
     to_do = [frame for frame in frames if reasons[frame.png]]
     say_why(reasons)
 
-    start = time.perf_counter()
     done, workers = 0, None
     if to_do and on_workers(args):
         done, workers = _frames_on_workers(args, to_do, folder)
@@ -279,22 +252,21 @@ def _run_frames(args: argparse.Namespace) -> int:
                 done += 1
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
-              "interrupted": done < len(to_do), "seconds": time.perf_counter() - start,
+              "interrupted": done < len(to_do), "seconds": elapsed(args),
               "workers": workers}  # fmt: skip
     if done < len(to_do):
-        save_report(args, report)
         there = len(frames) - len(to_do) + done
         say(
             f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
             "continue"
         )
-        return INTERRUPTED
+        args.code = INTERRUPTED
+        return report
     print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
     if film is not None:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
-    save_report(args, report | {"film": film})
-    return 0
+    return report | {"film": film}
 
 
 def _frames_on_workers(

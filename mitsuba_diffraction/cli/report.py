@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from numbers import Real
@@ -14,6 +15,11 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
+
+#: What a command measured and wrote, for --json.
+Figures = dict[str, Any]
+#: `--json` without a file, which only `info` has: printed instead of the text.
+STDOUT = Path("-")
 
 # Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
@@ -66,10 +72,24 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def save_report(args: argparse.Namespace, data: Mapping[str, Any]) -> None:
-    """Write the file of --json, if it is requested."""
-    if args.json is not None:
-        save_json(args.json, data)
+def save_figure(path: Path, figure: Any, **how: Any) -> None:
+    """Write a figure of Matplotlib in the format of the suffix.
+
+    how : more arguments of `matplotlib.figure.Figure.savefig`.
+    """
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], **how)
+
+
+def save_report(args: argparse.Namespace, figures: Figures) -> None:
+    """Write the file of --json, if it is requested and there are figures."""
+    if figures and args.json not in (None, STDOUT):
+        save_json(args.json, figures)
+
+
+def elapsed(args: argparse.Namespace) -> float:
+    """Return the seconds since the command began."""
+    return time.perf_counter() - args.began
 
 
 def _label(key: str) -> tuple[str, str]:
@@ -116,11 +136,14 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
     path : the output.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
-    Raises a DiffractionError if the folder is missing or cannot be written, or `path` is a folder.
+    Raises a DiffractionError if the folder is missing, cannot be written or is a file, or `path` is
+    a folder.
     """
     if path.is_dir():
         raise DiffractionError(f"cannot write '{path}': it is a folder; name a file in it")
     folder = path.parent
+    if make_folder and folder.exists() and not folder.is_dir():
+        raise DiffractionError(f"cannot write to '{folder}': it is a file; name a folder")
     while make_folder and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs
 from .solve_crossed import solve_crossed_cell
 from .workers import add_workers, executor_for
 
@@ -48,9 +48,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "orders, and a thin sheet's transmitted ones, for all directions and wavelengths, as a "
         "table of the BSDF diffraction_orders. "
         "Interrupted by Ctrl-C, the same command goes on.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
          "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
         ("-o --output OUT", "the table; default: SOURCE's name with .nc",
@@ -110,8 +107,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the table's summary")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Solve, write the table, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Solve, write the table, and return the figures."""
     source = Path(args.source)
     output = args.output or Path(f"{source.stem}.nc")
     if args.imports:
@@ -138,8 +135,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.source} -> {output}")
     for label, text in _report(table, output):
         print(f"  {label:<11} {text}")
-    save_report(args, {"file": str(output), **table.summary()})
-    return 0
+    return {"file": str(output), **table.summary()}
 
 
 def _check_import(args: argparse.Namespace) -> None:

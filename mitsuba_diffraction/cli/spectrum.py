@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
-import time
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -14,16 +14,56 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
-from .measured_spectra import measured_spectra, say_notes
-from .options import whole_number
-from .report import check_outputs, save_report
-from .spectrometer import SPECTROMETER, group
+from .measured_spectra import Measurement
+from .options import number_between, whole_number
+from .report import Figures, check_outputs, elapsed, save_figure
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
 _NOTHING = 1e-3
 # Files of an animal's catches and contrasts.
 _SEEN = ("catches", "contrasts")
+
+
+def _angles(text: str) -> list[float]:
+    """Parse a number, or FIRST:LAST:STEP, in degrees."""
+    with contextlib.suppress(ValueError):
+        found = options.numbers_of(text, 1000)
+        if found[-1] - found[0] <= 180.0:
+            return [round(angle, 6) for angle in found]
+    raise argparse.ArgumentTypeError(
+        f"expected degrees, or FIRST:LAST:STEP such as 0:60:5, got {text!r}"
+    )
+
+
+def azimuth(text: str) -> float | str:
+    """Parse an angle, or auto."""
+    return text if text == "auto" else float(text)
+
+
+def _group(text: str) -> tuple[str, str]:
+    """Parse NAME=PATTERN."""
+    name, equals, pattern = text.partition("=")
+    if not (equals and name and pattern):
+        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN, got {text!r}")
+    return name, pattern
+
+
+#: Options of the measurement.
+_SPECTROMETER = (
+    ("--light DEG", "angle of the lamp from the normal", float, 30.0),
+    ("--light-azimuth --azimuth DEG", "azimuth of the lamp from the patch's x axis towards y, or "
+     "auto: across the grooves of each scan's strongest grating", azimuth, 0.0),
+    ("--detector DEG ...", "angles of the detectors from the normal, positive on the far side from "
+     "the lamp, or ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to", _angles),
+    ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
+    ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
+     ("white", "mirror", "none"), "white"),
+    ("--polarisation", "also light polarised across (s) and in (p) the plane of incidence", bool),
+    ("--wavelength-range FIRST LAST", "nm; default: 300 830, or from where a table begins",
+     number_between(100, 10000)),
+    ("--step NM", "between wavelengths", number_between(0.01, 1000), 5.0),
+)  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -34,13 +74,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "in nm first and a column for each detector, as the R package pavo reads it, a table of "
         "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
         f"their mean, and a second file the standard errors. {options.LIMITS}",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.files("tables, also of orders, recipes or heights", "*"),
         ("--group NAME=PATTERN", "scans of one species, in place of FILE, e.g. --group "
          "corn='corn/*.spm'; may be given several times: each has its columns, mean and errors",
-         [group], None, {"dest": "groups"}),
+         [_group], None, {"dest": "groups"}),
         ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
          "repeatability", whole_number(2)),
         ("--observer ANIMAL|CSV", "also quantum catches and contrasts (JND) of an eye: avian_uv, "
@@ -57,16 +94,15 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     # argparse takes -60:60:5 for an option otherwise
     parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
-    options.add_options(parser.add_argument_group("the spectrometer"), *SPECTROMETER)
+    options.add_options(parser.add_argument_group("the spectrometer"), *_SPECTROMETER)
     add_surface(parser.add_argument_group("the surface"))
     options.add_option(parser, *options.TREATMENTS)
     options.add_heights(parser)
     options.add_json(parser, "the spectra")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure the spectra, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Measure the spectra, and return the figures."""
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
     groups = _groups(args)
     files = [file for members in groups.values() for file in members]
@@ -88,7 +124,6 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis import spectra_files as files_of_spectra
     from ..analysis.spectra import mean_spectra
     from ..analysis.spectrometer import Geometry
-    from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
     auto = args.light_azimuth == "auto"
@@ -98,11 +133,12 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
+        measurement = Measurement(args, geometry, lam, bar)
         measured = {
-            name: [s for file in members for s in measured_spectra(args, file, geometry, lam, bar)]
+            name: [spectra for file in members for spectra in measurement.of_file(file)]
             for name, members in groups.items()
         }
-    say_notes(args)
+    measurement.say_notes()
     everything = files_of_spectra.on_common_wavelengths(measured)
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
@@ -118,13 +154,12 @@ def run(args: argparse.Namespace) -> int:
     if args.iridescence:
         files_of_spectra.save_angular(spectra, angular)
     title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
-    with atomic_path(written[1]) as temporary:
-        files_of_spectra.spectra_figure(spectra, title, turned).savefig(temporary, format="png")
+    save_figure(written[1], files_of_spectra.spectra_figure(spectra, title, turned))
     shown = spectra[first]
     lam = shown.wavelength
     print(
         f"{' and '.join(map(str, written))}: {len(shown.geometry.detectors)} spectra of {lam.size} "
-        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {time.perf_counter() - start:.1f} s, "
+        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {elapsed(args):.1f} s, "
         f"{variant}"
     )
     for name, each in spectra.items():
@@ -138,19 +173,17 @@ def run(args: argparse.Namespace) -> int:
         column: values.tolist()
         for name, each in spectra.items() for column, values in each.columns(name).items()
     }  # fmt: skip
-    save_report(args, {"files": written, "sources": files, "light": args.light,
-                       "light_azimuth": turned or shown.geometry.azimuth,
-                       "detectors": shown.geometry.detectors,
-                       "acceptance": args.acceptance, "relative": args.relative,
-                       "wavelengths": lam.tolist(), "spectra": columns})  # fmt: skip
-    return 0
+    return {"files": written, "sources": files, "light": args.light,
+            "light_azimuth": turned or shown.geometry.azimuth,
+            "detectors": shown.geometry.detectors,
+            "acceptance": args.acceptance, "relative": args.relative,
+            "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
     """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
     if args.observer is None:
-        if args.illuminant is not None:
-            args.parser.error("argument --illuminant: is the light of --observer; name one")
+        options.refuse(args, ["illuminant"], ": is the light of --observer; name one")
         return None, None
     from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
-from .report import check_writable, save_report
+from .report import Figures, check_writable, elapsed
 from .workers import THREADS, add_workers, client_of, on_workers, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
@@ -30,9 +29,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "survey.csv, samples.csv (means and standard errors of repeated scans), contact sheets, "
         "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
         "command then exits with 1; a second run measures only new scans.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         options.files("scans of any format, or recipes"),
         ("-o --output FOLDER", "", Path, Path("survey")),
         options.TREATMENTS,
@@ -54,14 +50,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "the rows")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure new scans, and return the exit code."""
-    start = time.perf_counter()
+def run(args: argparse.Namespace) -> Figures:
+    """Measure new scans, and return the figures."""
     try:
         rows = _measured(args)
     except KeyboardInterrupt:
         say(f"interrupted; finished scans are in '{args.output}': run the command again to go on")
-        return INTERRUPTED
+        args.code = INTERRUPTED
+        return {}
     for row in rows:
         if row["reason"]:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
@@ -78,14 +74,14 @@ def run(args: argparse.Namespace) -> int:
     if args.crops is not None and whole:
         say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
     measured = "scans" if args.crops is None else "crops and whole scans"
-    seconds = time.perf_counter() - start
-    save_report(args, {"rows": rows, "seconds": seconds})
+    seconds = elapsed(args)
     print(
         f"{args.output}: {len(rows) - failed} {measured} in "
         f"survey.csv, {failed} failed, "
         f"{len({row['sample'] for row in rows})} samples in samples.csv, {seconds:.1f} s"
     )
-    return 1 if failed else 0
+    args.code = 1 if failed else 0
+    return {"rows": rows, "seconds": seconds}
 
 
 def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:

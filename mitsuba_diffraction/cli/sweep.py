@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import check_outputs, save_report
+from .report import Figures, check_outputs, elapsed, save_figure
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -31,9 +30,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
         "sweep over methods also times the package's own look-up against flss with both "
         "compiled. Writes a picture, and the numbers as CSV beside it.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("KIND", f"one of {', '.join(KINDS)}", KINDS),
         options.SOURCE,
         ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
@@ -65,14 +61,12 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
 
 
-def run(args: argparse.Namespace) -> int:
-    """Evaluate all maps, compare, draw, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Evaluate all maps, compare, draw, and return the figures."""
     from ..analysis.maps import LightDirection
     from ..analysis.maps.picture import contact_sheet
-    from ..atomic import atomic_path
     from ..thesis.sweeps import sweep
 
-    start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
     numbers = output.with_suffix(".csv")
     check_outputs((output, numbers), [args.source], "sheet")
@@ -97,16 +91,12 @@ def run(args: argparse.Namespace) -> int:
         [step.map for step in result.steps], [_title(step, result) for step in result.steps],
         title=f"{patch.name}: {args.kind}{where}", exposure=exposure,
     )  # fmt: skip
-    with atomic_path(output) as path:
-        sheet.savefig(path, format="png")
+    save_figure(output, sheet)
     _save(numbers, result)
-    print(f"{output}, {numbers}: {time.perf_counter() - start:.1f} s")
+    print(f"{output}, {numbers}: {elapsed(args):.1f} s")
     for line in [*_lines(result), *compiled]:
         print(f"  {line}")
-    save_report(
-        args, {"patch": patch.name, "sweep": args.kind, "steps": [*map(_row, result.steps)]}
-    )
-    return 0
+    return {"patch": patch.name, "sweep": args.kind, "steps": [*map(_row, result.steps)]}
 
 
 def _values(args: argparse.Namespace) -> list[Any] | None:

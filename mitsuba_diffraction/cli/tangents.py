@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between, path_ending_in
-from .report import check_writable, save_report
+from .report import Figures, check_writable
 
 if TYPE_CHECKING:
     from ..scene.orientation.tangents import TangentReport
@@ -25,9 +25,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "(a torus excepted) every field has singular points, around which the patch turns.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("MESH", "mesh to read", Path),
         ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
         ("--along", "smooth: the field that turns least; x, y, z: that axis, laid onto the "
@@ -41,8 +38,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_json(parser, "quality of the field")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Write the mesh, say where its field is singular, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Write the mesh, say where its field is singular, and return the figures."""
     check_writable(args.output)
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.mesh_files import load_mesh, write_ply
@@ -78,9 +75,8 @@ def run(args: argparse.Namespace) -> int:
             "of the surface: use a finer mesh, or another --along"
         )
     places = [{"at": at, "turns": n} for at, n in zip(field.singular, field.indices, strict=True)]
-    save_report(args, {"mesh": args.mesh, "files": [args.output], "along": args.along,
-                       "singular": places, "tangents": report})  # fmt: skip
-    return 0
+    return {"mesh": args.mesh, "files": [args.output], "along": args.along,
+            "singular": places, "tangents": report}  # fmt: skip
 
 
 def _todo(along: str, report: TangentReport) -> str:

@@ -8,17 +8,14 @@ from pathlib import Path
 from ..scene.load import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
-from .report import check_outputs, default_output
+from .report import Figures, check_outputs, default_output
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
+    options.add_command(
         subparsers, "tonemap", run, "show a linear EXR as a PNG",
         "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
         "than it was rendered with.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
         ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
          options.path_ending_in(".png")),
@@ -27,11 +24,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
 
 
-def run(args: argparse.Namespace) -> int:
-    """Write the PNG, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Write the PNG, which has no figures."""
     output = args.output or default_output(args.picture, ".png")
     check_outputs([output], [args.picture], "picture")
     set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one
     write_png(read_exr(args.picture), output, args.exposure, args.view)
     print(f"{output}: view {args.view}, {args.exposure:+g} stops")
-    return 0
+    return {}

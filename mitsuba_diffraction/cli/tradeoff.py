@@ -13,7 +13,7 @@ from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
-from .report import check_writable, save_json, save_report
+from .report import Figures, check_writable, save_json
 
 
 class Effort(NamedTuple):
@@ -37,12 +37,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "integral in double precision, the colours' ΔE2000, the time of eval beside "
         "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
         "error against time, and one of error against depth; recommends a setting.",
-    )  # fmt: skip
-    options.add_options(
-        parser,
         ("-o --output FOLDER", "where files go", Path, Path("tradeoff")),
         ("--quick", "fewer settings, a smaller patch", bool),
-    )
+    )  # fmt: skip
     options.add_table(parser, ["coherence_width"])
     options.add_options(
         parser.add_argument_group("recommend a setting with"),
@@ -59,8 +56,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_heights(parser)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure, write and recommend, and return the exit code."""
+def run(args: argparse.Namespace) -> Figures:
+    """Measure, write and recommend, and return the figures."""
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
     check_writable(args.output / "tradeoff.json", make_folder=True)
@@ -120,10 +117,9 @@ def run(args: argparse.Namespace) -> int:
     document |= plain(results, deep)
     save_json(args.output / "tradeoff.json", document)
     save_csv(args.output / "tradeoff.csv", document["settings"])
-    save_report(args, document)
     print("\n".join(lines(results, spectral, best, _budget(args))))
     print(f"wrote {args.output / 'tradeoff'}.json, .csv, .png and depth.png")
-    return 0
+    return document
 
 
 def _budget(args: argparse.Namespace) -> dict[str, float | None]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system import cores
 from .console import say, say_warning
-from .options import add_options, whole_number
+from .options import add_options, refuse, whole_number
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -46,8 +46,8 @@ def on_workers(args: argparse.Namespace) -> bool:
     if args.workers and args.scheduler:
         args.parser.error("argument --workers: starts workers; --scheduler has its own")
     wanted = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
-    if getattr(args, "threads", None) and not wanted:
-        args.parser.error("argument --threads: is for --workers or --scheduler")
+    if not wanted:
+        refuse(args, ["threads"], ": is for --workers or --scheduler")
     return wanted
 
 
@@ -104,8 +104,7 @@ def say_report(film: Film) -> dict[str, Any]:
 def executor_for(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
     """Yield the processes that solve, and their number."""
     if on_workers(args):
-        if args.jobs is not None:
-            args.parser.error("argument --jobs: is for this machine; --workers has its own")
+        refuse(args, ["jobs"], ": is for this machine; --workers has its own")
         from ..cluster.workers import check_workers, executor_of
 
         with client_of(args) as client:
