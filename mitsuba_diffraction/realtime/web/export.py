@@ -7,7 +7,8 @@ import functools
 import html
 import json
 import os
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -150,16 +151,13 @@ def _filled(header: dict[str, Any], data: bytes) -> str:
     """Fill the template of the page."""
     # "</script" would end the element of the header, and "<!--<script" its end
     text = json.dumps(header, ensure_ascii=False).replace("<", "\\u003c")
-    parts: dict[str, Callable[[], str]] = {
-        "style": lambda: _asset("style.css"),
-        "script": lambda: "\n".join(_asset(name) for name in _SCRIPTS),
-        "header": lambda: text,
-        "data": lambda: base64.b64encode(data).decode(),
+    parts = {
+        "style": _asset("style.css"),
+        "script": "\n".join(_asset(name) for name in _SCRIPTS),
+        "header": text,
+        "data": base64.b64encode(data).decode(),
     }
-    pieces = []
-    for n, piece in enumerate(_asset("page.html").replace("}}", "{{").split("{{")):
-        pieces.append(parts[piece]() if n % 2 else piece)
-    return "".join(pieces)
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
 
 
 @functools.cache
@@ -269,6 +267,9 @@ def _packed(
     joined = json.dumps(sources).encode()
     programs = sections.add(packed_array(np.frombuffer(joined, np.uint8)[:, None]))
     data, layouts = sections.joined()
+    display = plain_source(
+        "shown.frag", ("library.glsl", "formulas"), display_definitions(view), "web"
+    )
     header = {
         "title": title,
         "surfaces": entries,
@@ -290,7 +291,7 @@ def _packed(
         "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
         "vertex": vertex_source("web"),
         "shadow": plain_source("position.frag", dialect="web"),
-        "shown": _display(view),
+        "shown": {"vertex": vertex_source("web", "whole.vert"), "fragment": display},
         "loss": losses,
         "left_out": left_out,
         "orders": [strongest_orders(table.described) for table in tables],
@@ -313,13 +314,6 @@ def _common(surface: Surface) -> Packed:
     material = surface.material
     packed = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
     return packed | pack_conservation(material, [2.0**n for n in OCTAVES])
-
-
-def _display(view: str) -> dict[str, str]:
-    """Return the sources that show the picture under a view."""
-    files, definitions = ("library.glsl", "formulas"), display_definitions(view)
-    fragment = plain_source("shown.frag", files, definitions, "web")
-    return {"vertex": vertex_source("web", "whole.vert"), "fragment": fragment}
 
 
 def _fitted(

@@ -268,15 +268,8 @@ class Rainbow(Method):
         for n, lam, in_range in _orders(self.period.length, frequency, self.wavelength_range):
             yield lam, np.where(in_range, lam / n, 0.0)
 
-    def relative(
-        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
-    ) -> Array:
-        """Raise an error: `rainbow` has no mirror that a reflectance could be relative to."""
-        raise self._refused()
-
     def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
-        if gain is not None:
-            raise self._refused()
+        self._refuse(gain)
         total = np.zeros((len(wi), 3))
         for wavelength, gap in self.samples(wi, wo):
             total += gap[:, None] * response(wavelength)
@@ -285,6 +278,7 @@ class Rainbow(Method):
         return total / np.pi
 
     def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+        self._refuse(gain)
         return self.window_sum(wi, wo, wavelength) / np.pi
 
     def _frequency(self, wi: Array, wo: Array) -> NDArray[np.float64]:
@@ -292,9 +286,10 @@ class Rainbow(Method):
         u, v, _ = diffraction_coordinates(wi, wo)
         return np.abs(u if self.period.axis == "x" else v)
 
-    def _refused(self) -> DiffractionError:
-        """Return the error of a request for relative reflectance."""
-        return DiffractionError(
-            "method 'rainbow' has no relative reflectance, since it has no mirror to compare with; "
-            "leave it out, or ask for the BRDF"
-        )
+    def _refuse(self, gain: Gain | None) -> None:
+        """Refuse relative reflectance, which needs a mirror to compare with."""
+        if gain is not None:
+            raise DiffractionError(
+                "method 'rainbow' has no relative reflectance, since it has no mirror to compare "
+                "with; leave it out, or ask for the BRDF"
+            )
