@@ -7,13 +7,13 @@ from other surfaces, each towards six directions (an ambient cube, McTaggart 200
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...plugin.memory import upload
+from .maps import uploaded
 from .scene import RealtimeScene
 from .texels import Packed, listed
 
@@ -41,7 +41,7 @@ def pack_bounces(mitsuba_scene: Any, scene: RealtimeScene) -> Packed:
         origins = low + rng.random((_POINTS, 3)) * (high - low)
         traced.append(_traced(mitsuba_scene, origins, rng, seed))
         if seed == 0:  # beyond walls and under floors no light is looked up
-            low, high = _lit_box(traced[0][0][0].places, low, high)
+            low, high = _lit_box(traced[0][0][0][0], low, high)
     middle = 0.5 * (low + high)
     sides = np.maximum(high - low, _FLAT * max(float((high - low).max()), 1e-12))
     cell = float((sides.prod() / _CELLS) ** (1.0 / 3.0))
@@ -50,8 +50,8 @@ def pack_bounces(mitsuba_scene: Any, scene: RealtimeScene) -> Packed:
     sums = np.zeros((2, 2, 3, *size[::-1], 4))  # kinds, signs, axes, cells, colours and weight
     for kinds in traced:
         for kind, parts in zip(sums, kinds, strict=True):
-            for part in parts:
-                _add(kind, (part.places - low) / cell, part.axes, part.radiance)
+            for places, axes, radiance in parts:
+                _add(kind, (places - low) / cell, axes, radiance)
     light = _filled(sums)
     # entries of a cell: kind, axis, sign
     entries = light.transpose(3, 4, 5, 0, 2, 1, 6).reshape(-1, 3)
@@ -67,12 +67,9 @@ def pack_bounces(mitsuba_scene: Any, scene: RealtimeScene) -> Packed:
     )
 
 
-class _Light(NamedTuple):
-    """Radiances at places of surfaces."""
-
-    places: Array  # (n, 3)
-    axes: Array  # (n, 3) directions that the light leaves along, or normals that it arrives at
-    radiance: Array  # (n, 3) linear sRGB
+#: Places of surfaces, directions that light leaves along or normals that it arrives at, and its
+#: radiance in linear sRGB, (n, 3) each.
+_Light = tuple[Array, Array, Array]
 
 
 def _lit_box(places: Array, low: Array, high: Array) -> tuple[Array, Array]:
@@ -93,15 +90,15 @@ def _traced(scene: Any, origins: Array, rng: np.random.Generator, seed: int) -> 
 
     directions = rng.normal(size=origins.shape)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    to_points = mi.Ray3f(mi.Point3f(*_uploaded(origins)), mi.Vector3f(*_uploaded(directions)))
+    to_points = mi.Ray3f(mi.Point3f(*uploaded(origins)), mi.Vector3f(*uploaded(directions)))
     points, seen = _met(scene, to_points, True)
     local = mi.warp.square_to_cosine_hemisphere(
-        mi.Point2f(*_uploaded(rng.random((len(origins), 2))))
+        mi.Point2f(*uploaded(rng.random((len(origins), 2))))
     )
     away = points.spawn_ray(points.to_world(local))
     others, met = _met(scene, away, seen)
     begin, along = _rows(away.o), _rows(away.d)
-    active = np.concatenate([_mask(seen), _mask(met)])
+    active = np.concatenate([np.array(mask, bool).ravel() for mask in (seen, met)])
     radiance = _radiance(
         scene, np.concatenate([origins, begin]), np.concatenate([directions, along]), active, seed
     )
@@ -109,9 +106,9 @@ def _traced(scene: Any, origins: Array, rng: np.random.Generator, seed: int) -> 
     used, hit = np.split(active, 2)
     places = _rows(points.p)[used]
     return [
-        [_Light(places, -directions[used], first[used]),
-         _Light(_rows(others.p)[hit], -along[hit], second[hit])],
-        [_Light(places, _rows(points.sh_frame.n)[used], second[used])],
+        [(places, -directions[used], first[used]),
+         (_rows(others.p)[hit], -along[hit], second[hit])],
+        [(places, _rows(points.sh_frame.n)[used], second[used])],
     ]  # fmt: skip
 
 
@@ -133,11 +130,11 @@ def _radiance(
 
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(origins))
-    rays = mi.Ray3f(mi.Point3f(*_uploaded(origins)), mi.Vector3f(*_uploaded(directions)))
+    rays = mi.Ray3f(mi.Point3f(*uploaded(origins)), mi.Vector3f(*uploaded(directions)))
     weight = mi.Spectrum(1.0)
     if mi.is_spectral:
         rays.wavelengths, weight = mi.sample_rgb_spectrum(mi.sample_shifted(sampler.next_1d()))
-    known = _uploaded(active[:, None])[0] > 0.0
+    known = uploaded(active[:, None])[0] > 0.0
     integrator = mi.load_dict({"type": "path", "max_depth": _DEPTH})
     spectrum, _, _ = integrator.sample(scene, sampler, rays, None, known)
     colour = mi.unpolarized_spectrum(spectrum) * weight
@@ -148,21 +145,9 @@ def _radiance(
     return np.clip(radiance, 0.0, _BRIGHTEST * max(float(radiance.mean()), 1e-30))
 
 
-def _uploaded(rows: NDArray[np.generic]) -> list[Any]:
-    """Upload the columns of an array."""
-    import mitsuba as mi
-
-    return [upload(mi.Float, column.astype(np.float32)) for column in rows.T]
-
-
 def _rows(values: Any) -> Array:
     """Read vectors (n, 3)."""
     return np.array(values, np.float64).reshape(3, -1).T
-
-
-def _mask(values: Any) -> NDArray[np.bool_]:
-    """Read a mask (n,)."""
-    return np.array(values, bool).ravel()
 
 
 def _add(sums: Array, places: Array, axes: Array, radiance: Array) -> None:

@@ -33,10 +33,6 @@ class Camera:
         """Position of the camera (3,)."""
         return self.to_world[:3, 3]
 
-    def moved(self, to_world: Array) -> Camera:
-        """Return this camera with another transform."""
-        return replace(self, to_world=to_world)
-
     def resized(self, width: int, height: int) -> Camera:
         """Return this camera with a picture of another size."""
         return replace(self, size=(width, height))
@@ -165,15 +161,13 @@ class Orbit:
 
     def zoomed(self, factor: float) -> Orbit:
         """Move to `factor` times the distance."""
-        moved = self.to_world.copy()
-        moved[:3, 3] = self.target + factor * (moved[:3, 3] - self.target)
-        return replace(self, to_world=moved)
+        return replace(self, to_world=self._rotated(np.eye(3), factor))
 
-    def _rotated(self, rotation: Array) -> Array:
-        """Return the camera's transform after a rotation about the centre."""
+    def _rotated(self, rotation: Array, factor: float = 1.0) -> Array:
+        """Return the transform after a rotation about the centre, at `factor` the distance."""
         moved = self.to_world.copy()
         moved[:3, :3] = rotation @ moved[:3, :3]
-        moved[:3, 3] = self.target + rotation @ (moved[:3, 3] - self.target)
+        moved[:3, 3] = self.target + factor * (rotation @ (moved[:3, 3] - self.target))
         return moved
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...extras import optional
@@ -21,12 +22,6 @@ REQUIRED = 330
 
 _SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
-_KINDS = {
-    np.dtype(np.float16): "f2",
-    np.dtype(np.float32): "f4",
-    np.dtype(np.uint8): "f1",
-    np.dtype(np.uint32): "u4",
-}
 
 
 def headless_context() -> Any:
@@ -151,7 +146,6 @@ def upload(context: Any, texture: Texture) -> Any:
 
     Raises a DiffractionError if it is larger than the driver supports.
     """
-    moderngl = optional("moderngl")
     rows, columns, channels = texture.data.shape
     largest = context.info["GL_MAX_TEXTURE_SIZE"]
     if max(rows, columns) > largest:
@@ -160,9 +154,9 @@ def upload(context: Any, texture: Texture) -> Any:
             f"{context.info['GL_RENDERER']}, which supports {largest}"
         )
     data = np.ascontiguousarray(texture.data)
-    kind = _KINDS[data.dtype]
+    kind = "f1" if data.dtype == np.uint8 else data.dtype.str[1:]
     uploaded = context.texture((columns, rows), channels, data.data, alignment=1, dtype=kind)
-    filtering = moderngl.LINEAR if texture.smooth else moderngl.NEAREST
+    filtering = context.LINEAR if texture.smooth else context.NEAREST
     uploaded.filter = (filtering, filtering)
     uploaded.repeat_x = uploaded.repeat_y = texture.smooth
     return uploaded
@@ -185,6 +179,11 @@ class Target:
         self.depth = context.depth_renderbuffer((width, height))
         self.frame = context.framebuffer([self.colour], self.depth)
 
+    def read(self) -> NDArray[np.float32]:
+        """Return the picture (height, width, 4), from the top row down."""
+        pixels = np.frombuffer(self.frame.read(components=4, dtype="f4"), np.float32)
+        return pixels.reshape(self.frame.height, self.frame.width, 4)[::-1]
+
     def release(self) -> None:
         for thing in (self.frame, self.colour, self.depth):
             thing.release()
@@ -200,17 +199,54 @@ class Bindings:
 
     def use(self, program: Any, first_unit: int = 0) -> int:
         """Bind textures and uniforms in a program, and return the next free texture unit."""
-        set_uniforms(program, self.uniforms)
-        for name, texture in self.textures.items():
-            if (sampler := program.get(name, None)) is not None:
-                texture.use(first_unit)
-                sampler.value = first_unit
-                first_unit += 1
-        return first_unit
+        return bind(program, self.uniforms, self.textures, first_unit)
 
     def release(self) -> None:
         for texture in self.textures.values():
             texture.release()
+
+
+class Pass:
+    """Program of a triangle that covers the picture.
+
+    fragment, shared, definitions : parameters of `source.plain_source` for the fragment stage.
+    """
+
+    def __init__(
+        self, context: Any, fragment: str, shared: Sequence[str] = (),
+        definitions: Mapping[str, str] | None = None,
+    ) -> None:  # fmt: skip
+        self._context = context
+        self._program = compile_plain(context, "whole.vert", fragment, shared, definitions)
+        self._triangle = context.vertex_array(self._program, [])
+
+    def draw(
+        self, uniforms: Mapping[str, Uniform], textures: Mapping[str, Any], *, adding: bool = False
+    ) -> None:
+        """Draw into the current framebuffer, or add to it."""
+        context = self._context
+        context.enable_only(context.BLEND if adding else context.NOTHING)
+        context.blend_func = context.ONE, context.ONE
+        bind(self._program, uniforms, textures)
+        self._triangle.render(vertices=3)
+        context.enable_only(context.NOTHING)
+
+    def release(self) -> None:
+        self._triangle.release()
+        self._program.release()
+
+
+def bind(
+    program: Any, uniforms: Mapping[str, Uniform], textures: Mapping[str, Any], first_unit: int = 0
+) -> int:
+    """Bind textures and uniforms that a program reads, and return the next free texture unit."""
+    set_uniforms(program, uniforms)
+    for name, texture in textures.items():
+        if (sampler := program.get(name, None)) is not None:
+            texture.use(first_unit)
+            sampler.value = first_unit
+            first_unit += 1
+    return first_unit
 
 
 def set_uniforms(program: Any, uniforms: Mapping[str, Uniform]) -> None:

@@ -29,7 +29,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,11 @@ from .lights import (
     area_of,
     sampled_directions,
     sampled_positions,
+    scaled,
     spectra_along,
     without_extent,
 )
-from .surroundings import Environment, is_flat
+from .surroundings import Environment, beside, is_flat
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ class Emitters:
         irradiances = []
         for emitter in scene.emitters():
             sequence = _LightSequence(emitter, middle, self.environment)
-            if sequence.kind == "":
+            if not sequence.supported:
                 self.omissions.append(f"{name_of(emitter)} ({emitter.class_name()})")
             elif (irradiance := sequence.irradiance()) > 0.0:
                 self._sequences.append(sequence)
@@ -106,15 +107,17 @@ class Emitters:
 
         The sun of a sky is excluded.
         """
-        shares = [s.looked_up() if s.draws_from(emitter) else 0.0 for s in self._sequences]
+        shares = [s.looked_up() if s.emitter.ptr == emitter.ptr else 0.0 for s in self._sequences]
         return float(self.probabilities @ np.array(shares))
 
     def _features(self, light: Lamp) -> Array:
         """Return the light's irradiance in the middle by colour and spherical harmonics, (27,)."""
         direction = light.place[:3] - light.place[3] * self._middle
-        x, y, z = direction / max(float(np.linalg.norm(direction)), 1e-12)
+        direction /= max(float(np.linalg.norm(direction)), 1e-12)
+        x, y, z = direction
+        colour = light.irradiance(self._middle) * emission(light, -direction)
         harmonics = [1.0, x, y, z, x * y, y * z, z * x, 0.5 * (x * x - y * y), z * z - 1.0 / 3.0]
-        return np.outer(_colour_at(light, self._middle), harmonics).ravel()
+        return np.outer(colour, harmonics).ravel()
 
 
 def _nearest_to_mean(features: Array) -> list[int]:
@@ -133,14 +136,11 @@ class _LightSequence:
     """Sequence of lights without extent that represents one emitter."""
 
     def __init__(self, emitter: Any, middle: Array, environment: Environment | None) -> None:
-        self._emitter, self._middle, self._environment = emitter, middle, environment
+        self.emitter, self._middle, self._environment = emitter, middle, environment
         self._fixed = without_extent(emitter, middle)
         self._blocks: dict[int, list[Lamp]] = {}
-        self.kind = "fixed" if self._fixed is not None else _emitter_kind(emitter)
-
-    def draws_from(self, emitter: Any) -> bool:
-        """Return whether the lights represent `emitter`."""
-        return bool(self._emitter.ptr == emitter.ptr)
+        self._area = emitter.class_name() == "AreaLight"
+        self.supported = self._area or self._fixed is not None or emitter.is_environment()
 
     def looked_up(self) -> float:
         """Return the share of lights that lobes look up, too."""
@@ -158,20 +158,16 @@ class _LightSequence:
     def irradiance(self) -> float:
         """Return the mean irradiance of the lights in the middle, without cosines and cones."""
         lights = [self._fixed] if self._fixed is not None else [self.light(n) for n in range(64)]
-        irradiances = []
-        for light in lights:
-            away = light.place[:3] - self._middle
-            square = max(float(away @ away), 1e-12) if light.place[3] else 1.0
-            irradiances.append(max(float(light.colour.sum()), 0.0) / square)
-        return float(np.mean(irradiances))
+        irradiances = (float(light.irradiance(self._middle).sum()) for light in lights)
+        return float(np.mean([max(irradiance, 0.0) for irradiance in irradiances]))
 
     def _block(self, start: int) -> list[Lamp]:
         """Draw a block of lights from number `start` on."""
-        name = name_of(self._emitter)
-        if self.kind == "area":
-            values, places, normals, waves = sampled_positions(self._emitter, _BLOCK, start)
+        name = name_of(self.emitter)
+        if self._area:
+            values, places, normals, waves = sampled_positions(self.emitter, _BLOCK, start)
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
-            shape = self._emitter.get_shape()
+            shape = self.emitter.get_shape()
             densities = np.full(_BLOCK, 1.0 / area_of(shape) if is_flat(shape) else 0.0)
             address = int(shape.ptr)
         else:
@@ -180,71 +176,46 @@ class _LightSequence:
             address = 0
         return [
             Lamp(
-                name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
-                density=float(density), shape=address,
+                name, point, waves, value, normal, density=float(density), shape=address
             )
             for point, value, normal, density in zip(
                 points, values, normals, densities, strict=True
             )
         ]  # fmt: skip
 
-    def _environment_block(self, start: int) -> _Directions:
+    def _environment_block(self, start: int) -> tuple[Array, Array, Array, Array]:
         """Draw a block of directions of an environment.
 
         Five in eight are directions of the sun, if the sky has one. The sun's share of the light is
         larger, but the rest of the sky, all the light in the sun's shadow, needs more directions.
+
+        Returns irradiances as of `sampled_directions`, directions (n, 3), densities (n,) as in
+        `Light.density`, and wavelengths in nm.
         """
         assert self._environment is not None
-        sun = self._sun_block(start)
-        count = _BLOCK - len(sun.values)
+        of_sun, sunward = self._sun_block(start)
+        count = _BLOCK - len(sunward)
         directions, densities = self._environment.draw(start, count)
-        sky, waves = spectra_along(self._emitter, self._environment.beside_sun(directions))
-        sky = sky * (_BLOCK / count / np.maximum(densities, 1e-12))[:, None, None]
+        sky, waves = spectra_along(self.emitter, beside(self._environment.sun, directions))
+        sky = scaled(sky, _BLOCK / count / np.maximum(densities, 1e-12))
         # directions of sun and sky alternate evenly
         order = np.argsort(np.argsort(np.arange(_BLOCK) * _GOLDEN % 1.0))
-        values = np.concatenate([sky, sun.values])
-        directions = np.concatenate([directions, sun.directions])
-        flags = np.where(order < count, -1.0, 0.0)
-        return _Directions(values[order], directions[order], flags, waves)
+        values = np.concatenate([sky, of_sun])
+        directions = np.concatenate([directions, sunward])
+        return values[order], directions[order], np.where(order < count, -1.0, 0.0), waves
 
-    def _sun_block(self, start: int) -> _Directions:
-        """Draw the sun's part of a block; it is empty without a sun."""
+    def _sun_block(self, start: int) -> tuple[Array, Array]:
+        """Draw irradiances and directions of the sun's part of a block; empty without a sun."""
         assert self._environment is not None
         samples = 4 * _BLOCK if self._environment.sun.any() else 1
-        values, directions, _, waves = sampled_directions(
-            self._emitter, self._middle, samples, 4 * start
-        )
-        inside = np.flatnonzero(self._environment.in_sun(directions) & values.any(axis=(1, 2)))
+        values, directions, *_ = sampled_directions(self.emitter, self._middle, samples, 4 * start)
+        lit = values.reshape(samples, -1).any(axis=1)
+        inside = np.flatnonzero(self._environment.in_sun(directions) & lit)
         count = int(_SUN_SHARE * _BLOCK) if len(inside) else 0
         chosen = inside[np.linspace(0, len(inside) - 1, count).astype(int)]
-        total = values[inside].sum(axis=(0, 1, 2)) / samples
+        total = values[inside].sum() / samples
         factor = _BLOCK * total / max(float(values[chosen].sum()), 1e-30)
-        return _Directions(values[chosen] * factor, directions[chosen], np.zeros(count), waves)
-
-
-class _Directions(NamedTuple):
-    """Directions of an environment with their light."""
-
-    values: Array  # (n, wavelengths, 1 or 3) irradiance relative to D65
-    directions: Array  # (n, 3)
-    densities: Array  # (n,) `Light.density`
-    wavelengths: Array  # nm
-
-
-def _emitter_kind(emitter: Any) -> str:
-    """Return "area", "environment", or "" for an unsupported emitter."""
-    if emitter.class_name() == "AreaLight":
-        return "area"
-    return "environment" if emitter.is_environment() else ""
-
-
-def _colour_at(light: Lamp, middle: Array) -> Array:
-    """Return the irradiance of a light in the middle, linear sRGB (3,)."""
-    if light.place[3] == 0.0:
-        return light.colour
-    away = middle - light.place[:3]
-    square = max(float(away @ away), 1e-12)
-    return np.asarray(light.colour * (emission(light, away / square**0.5) / square))
+        return values[chosen] * factor, directions[chosen]
 
 
 def emission(light: Lamp, direction: Array) -> float:

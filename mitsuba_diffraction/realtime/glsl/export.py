@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,14 +21,13 @@ from .packing import pack_responses
 from .rewriting import global_names, pruned, renamed, resolved, shader_file
 from .shader_materials import (
     GLSL,
-    Diffracting,
     Material,
     pack_conservation,
     pack_surface,
     packed_by,
 )
-from .source import method_files, part
-from .texels import PAGE, Packed, Texture, plain
+from .source import method_files, part, surface_files
+from .texels import PAGE, Packed, Texture, four_channels, plain
 
 #: Methods that can be exported, and the names of their functions.
 EXPORTED = {"fast": "diffraction", "exact": "diffraction_exact"}
@@ -148,7 +145,9 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
-    tables = {method: _tables(method, surface) for method in methods}
+    tables = {method: surface.tables(method, floats=True) for method in methods}
+    if "exact" in tables:
+        tables["exact"] |= pack_responses([(np.array([360.0, 830.0]), np.ones(2))])
     return _joined(common, tables, described, surface.words)
 
 
@@ -175,21 +174,12 @@ def export_shader(
     texts = {
         "diffraction.glsl": shader.code,
         "constants.json": json.dumps(shader.constants(), indent=1, ensure_ascii=False) + "\n",
-        **{name: _example(name) for name in ("diffraction.js", "example.html")},
+        **{name: shader_file(name, "three") for name in ("diffraction.js", "example.html")},
     }
     for name, text in texts.items():
         with atomic_path(folder / name) as path:
             path.write_text(text, encoding="utf-8")
     return shader
-
-
-def _tables(method: str, surface: Diffracting) -> Packed:
-    """Pack the table of a surface for a method."""
-    tables = surface.tables(method, floats=True)
-    if method == "fast":
-        return tables
-    daylight = (np.array([360.0, 830.0]), np.ones(2))
-    return tables | pack_responses([daylight])
 
 
 def _joined(common: Packed, tables: dict[str, Packed], described: Surface, words: str) -> Shader:
@@ -199,15 +189,8 @@ def _joined(common: Packed, tables: dict[str, Packed], described: Surface, words
     for packed in tables.values():
         definitions |= packed.definitions
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
-    second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
-    look_up = "orders.glsl" if "ORDERS" in definitions else "pair.glsl"
-    files = [
-        "library.glsl", "formulas", "reflectance.glsl", "boundary.glsl", "layers.glsl",
-        *second_order, look_up,
-    ]  # fmt: skip
-    shared = "".join(constants) + resolved(
-        "\n".join(part(name, definitions) for name in files), definitions
-    )
+    files = [part(name, definitions) for name in surface_files(definitions)]
+    shared = "".join(constants) + resolved("\n".join(files), definitions)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)
@@ -234,17 +217,5 @@ def _declared(packed: Packed, prefix: str, names: set[str]) -> Packed:
     """Return the textures and uniforms among global `names`, under prefixed names."""
     samplers = [t for t in packed.textures if t.name in names]
     uniforms = {prefix + n: plain(value) for n, value in packed.uniforms.items() if n in names}
-    textures = tuple(Texture(prefix + t.name, _four(t.data), t.smooth) for t in samplers)
+    textures = tuple(Texture(prefix + t.name, four_channels(t.data), t.smooth) for t in samplers)
     return Packed(textures, uniforms)
-
-
-def _four(data: Any) -> Any:
-    """Pad a texture to four channels, which some loaders require."""
-    missing = 4 - data.shape[2]
-    return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
-
-
-@functools.cache
-def _example(name: str) -> str:
-    """Read a file of the example."""
-    return resources.files(__package__).joinpath("three", name).read_text(encoding="utf-8")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import daylight
-from ...plugin.memory import upload
 from ...plugin.properties import name_of
+from .maps import uploaded
 from .packing import daylight_colour
-from .source import display_definitions
 
 Array = NDArray[np.float64]
 
@@ -44,6 +43,11 @@ class Lamp:
     def colour(self) -> Array:
         """Colour in linear sRGB (3,)."""
         return daylight_colour(self.wavelengths, self.spectrum)
+
+    def irradiance(self, point: Array) -> Array:
+        """Return the irradiance at a point, linear sRGB (3,), without cosines and cones."""
+        away = point - self.place[:3]
+        return self.colour / (max(float(away @ away), 1e-12) if self.place[3] else 1.0)
 
 
 @dataclass
@@ -79,24 +83,11 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     for emitter in scene.emitters():
         _add(lighting, emitter, middle)
     if len(lighting.lights) > most:
-        lighting.lights.sort(key=lambda light: -_irradiance(light, middle))
+        lighting.lights.sort(key=lambda light: -float(light.irradiance(middle).sum()))
         names = ", ".join(light.name for light in lighting.lights[most:])
         lighting.omissions.append(f"more than {most} lights ({names})")
         del lighting.lights[most:]
     return lighting
-
-
-def light_definitions(lights: int, sky: bool, view: str | None = None) -> dict[str, str]:
-    """Return the shader's definitions of the light: number of lights, and whether a sky exists.
-
-    view : view by which a screen shows the picture (`optics.display`); None leaves it linear.
-    """
-    definitions = {"LIGHTS_LIT": str(lights)}
-    if sky:
-        definitions["SKY"] = ""
-    if view is not None:
-        definitions |= display_definitions(view)
-    return definitions
 
 
 def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
@@ -109,19 +100,18 @@ def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
     if light is not None and light.cone is None:
         lighting.lights.append(light)
     elif kind == "AreaLight":
-        mean = _mean_sample(emitter, middle, _SAMPLES)
-        place = np.append(middle + mean.direction * mean.distance, 1.0)
-        intensity = mean.spectrum * mean.distance**2
-        lighting.lights.append(Lamp(name, place, mean.wavelengths, intensity))
+        wavelengths, irradiance, direction, distance = _mean_sample(emitter, middle, _SAMPLES)
+        place = np.append(middle + direction * distance, 1.0)
+        lighting.lights.append(Lamp(name, place, wavelengths, irradiance * distance**2))
         lighting.omissions.append(f"the extent of {name} (area light, shown as a point)")
     elif kind == "ConstantBackgroundEmitter":
         lighting.sky = lighting.sky + _sky(emitter, middle)
     elif "sun_direction" in parameters:
         sun = np.array(parameters["sun_direction"], float).ravel()
-        mean = _mean_sample(emitter, middle, 4 * _SAMPLES, sun)
-        if mean.spectrum.any():
+        wavelengths, irradiance, *_ = _mean_sample(emitter, middle, 4 * _SAMPLES, sun)
+        if irradiance.any():
             place = np.append(sun, 0.0)
-            lighting.lights.append(Lamp(f"sun of {name}", place, mean.wavelengths, mean.spectrum))
+            lighting.lights.append(Lamp(f"sun of {name}", place, wavelengths, irradiance))
         lighting.sky = lighting.sky + _sky(emitter, middle, sun)
         lighting.omissions.append(
             f"the sun's disc and the sky of {name} (a direction, and a smooth sky)"
@@ -139,48 +129,39 @@ def without_extent(emitter: Any, middle: Array) -> Lamp | None:
 
     kind, parameters, name = emitter.class_name(), mi.traverse(emitter), name_of(emitter)
     if kind == "DirectionalEmitter":
-        mean = _mean_sample(emitter, middle, 1)
-        return Lamp(name, np.append(mean.direction, 0.0), mean.wavelengths, mean.spectrum)
+        wavelengths, irradiance, direction, _ = _mean_sample(emitter, middle, 1)
+        return Lamp(name, np.append(direction, 0.0), wavelengths, irradiance)
     if kind == "PointLight":
         position = np.array(parameters["position"], float).ravel()
-        mean = _mean_sample(emitter, position + np.array([0.0, 0.0, 1.0]), 1)
-        return Lamp(name, np.append(position, 1.0), mean.wavelengths, mean.spectrum)
+        wavelengths, intensity, *_ = _mean_sample(emitter, position + np.eye(3)[2], 1)
+        return Lamp(name, np.append(position, 1.0), wavelengths, intensity)
     if kind == "SpotLight":
         to_world = np.array(parameters["to_world"].matrix, float).reshape(4, 4)
         position, axis = to_world[:3, 3], to_world[:3, 2] / np.linalg.norm(to_world[:3, 2])
-        mean = _mean_sample(emitter, position + axis, 1)
+        wavelengths, intensity, *_ = _mean_sample(emitter, position + axis, 1)
         angles = (float(np.array(parameters[n]).ravel()[0]) for n in ("cutoff_angle", "beam_width"))
         cutoff, beam = (float(np.radians(angle)) for angle in angles)
-        place = np.append(position, 1.0)
-        return Lamp(name, place, mean.wavelengths, mean.spectrum, axis, (cutoff, beam))
+        return Lamp(name, np.append(position, 1.0), wavelengths, intensity, axis, (cutoff, beam))
     return None
 
 
-class _MeanSample(NamedTuple):
-    """Irradiance of an emitter at a point, and its mean direction and distance."""
+def _mean_sample(
+    emitter: Any, point: Array, samples: int, sun: Array | None = None
+) -> tuple[Array, Array, Array, float]:
+    """Average Mitsuba's samples of an emitter from a point, or only the samples of its sun.
 
-    wavelengths: Array  # (n,) nm
-    spectrum: Array  # (n,) or (n, 3), relative to D65
-    direction: Array  # (3,) unit vector towards the emitter
-    distance: float
-
-
-def _mean_sample(emitter: Any, point: Array, samples: int, sun: Array | None = None) -> _MeanSample:
-    """Average Mitsuba's samples of an emitter from a point, or only the samples of its sun."""
+    Returns wavelengths (n,) in nm, the irradiance (n,) or (n, 3) relative to D65, and the mean
+    direction (3,) and distance of the emitter.
+    """
     values, directions, distances, wavelengths = sampled_directions(emitter, point, samples)
     if sun is not None:
-        values = values * (directions @ sun > _SUN_COSINE)[:, None, None]
-    weight = values.sum(axis=(1, 2))
+        values = scaled(values, directions @ sun > _SUN_COSINE)
+    weight = values.reshape(samples, -1).sum(axis=1)
     total = weight.sum()
     share = weight / total if total > 0.0 else np.full(len(weight), 1.0 / len(weight))
     direction = share @ directions
-    spectrum = values.mean(axis=0)
-    return _MeanSample(
-        wavelengths,
-        spectrum[:, 0] if spectrum.shape[1] == 1 else spectrum,
-        direction / np.linalg.norm(direction),
-        float(share @ distances),
-    )
+    direction /= np.linalg.norm(direction)
+    return wavelengths, values.mean(axis=0), direction, float(share @ distances)
 
 
 def _sky(emitter: Any, point: Array, sun: Array | None = None) -> Array:
@@ -195,27 +176,19 @@ def _sky(emitter: Any, point: Array, sun: Array | None = None) -> Array:
     factors = np.column_stack(
         [included / (4.0 * np.pi), included[:, None] * directions / (2.0 * np.pi)]
     )
-    spectra = np.einsum("sf,swc->fwc", factors, values) / len(values)
-    return np.stack(
-        [daylight_colour(wavelengths, s[:, 0] if s.shape[1] == 1 else s) for s in spectra]
-    )
-
-
-class SampledDirections(NamedTuple):
-    """Samples of an emitter from a point."""
-
-    values: Array  # (samples, wavelengths, 1 or 3), irradiance over density, relative to D65
-    directions: Array  # (samples, 3)
-    distances: Array  # (samples,)
-    wavelengths: Array  # (wavelengths,) nm
+    spectra = np.tensordot(factors.T, values, 1) / len(values)
+    return np.stack([daylight_colour(wavelengths, spectrum) for spectrum in spectra])
 
 
 def sampled_directions(
     emitter: Any, point: Array, samples: int, start: int = 0
-) -> SampledDirections:
+) -> tuple[Array, Array, Array, Array]:
     """Draw directions from a point to an emitter, by Mitsuba's sampling of its irradiance.
 
     start : number of the first sample in a sequence that fills the emitter evenly.
+
+    Returns irradiances over density (samples, wavelengths), or (samples, wavelengths, 3) in RGB
+    variants, relative to D65; directions (samples, 3), distances (samples,), and wavelengths in nm.
     """
     import drjit as dr
     import mitsuba as mi
@@ -228,20 +201,17 @@ def sampled_directions(
     directions = lanes.vectors(sample.d)
     distances = np.broadcast_to(np.array(sample.dist, np.float64).ravel(), (lanes.count,))
     values, wavelengths = lanes.spectra(weight)
-    return SampledDirections(values, directions, distances[:: lanes.quads], wavelengths)
+    return values, directions, distances[:: lanes.quads], wavelengths
 
 
-class SampledPositions(NamedTuple):
-    """Samples of an area light."""
+def sampled_positions(
+    emitter: Any, samples: int, start: int = 0
+) -> tuple[Array, Array, Array, Array]:
+    """Draw points on an area light, evenly over its area.
 
-    values: Array  # (samples, wavelengths, 1 or 3), radiance times area, relative to D65
-    positions: Array  # (samples, 3)
-    normals: Array  # (samples, 3)
-    wavelengths: Array  # (wavelengths,) nm
-
-
-def sampled_positions(emitter: Any, samples: int, start: int = 0) -> SampledPositions:
-    """Draw points on an area light, evenly over its area."""
+    Returns radiances times the area as of `sampled_directions`; positions and normals (samples, 3),
+    and wavelengths in nm.
+    """
     import drjit as dr
     import mitsuba as mi
 
@@ -252,29 +222,28 @@ def sampled_positions(emitter: Any, samples: int, start: int = 0) -> SampledPosi
     si.wi = mi.Vector3f(0.0, 0.0, 1.0)
     lanes.set_wavelengths(si)
     values, wavelengths = lanes.spectra(emitter.eval(si) * weight)
-    return SampledPositions(values, lanes.vectors(sample.p), lanes.vectors(sample.n), wavelengths)
+    return values, lanes.vectors(sample.p), lanes.vectors(sample.n), wavelengths
 
 
 def radiance_along(emitter: Any, directions: Array) -> Array:
     """Return the radiance of an environment from directions (n, 3), linear sRGB (n, 3)."""
     values, waves = spectra_along(emitter, directions)
-    if values.shape[2] == 3:
+    if values.ndim == 3:
         return values[:, 0]
-    weights = np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
-    return np.asarray(values[:, :, 0] @ weights)
+    return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
 
 
 def spectra_along(emitter: Any, directions: Array) -> tuple[Array, Array]:
     """Return the spectral radiance of an environment from directions (n, 3).
 
-    Returns values (n, wavelengths, 1 or 3) relative to D65, and the wavelengths in nm.
+    Returns values as of `sampled_directions`, and the wavelengths in nm.
     """
     import drjit as dr
     import mitsuba as mi
 
     lanes = _Lanes(len(directions))
     si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
-    si.wi = mi.Vector3f(*(lanes.uploaded(-x) for x in directions.T))
+    si.wi = mi.Vector3f(*lanes.uploaded(-directions))
     lanes.set_wavelengths(si)
     return lanes.spectra(emitter.eval(si))
 
@@ -287,8 +256,12 @@ def area_of(shape: Any) -> float:
 def emitted_radiance(shape: Any) -> Array:
     """Return the mean radiance that a shape emits, linear sRGB (3,)."""
     values, _, _, waves = sampled_positions(shape.emitter(), 64)
-    mean = values.mean(axis=0) / area_of(shape)
-    return daylight_colour(waves, mean[:, 0] if mean.shape[1] == 1 else mean)
+    return daylight_colour(waves, values.mean(axis=0) / area_of(shape))
+
+
+def scaled(values: Array, factors: NDArray[Any]) -> Array:
+    """Return spectra of samples (samples, ...), each times its factor (samples,)."""
+    return np.asarray((values.T * factors).T)
 
 
 class _Lanes:
@@ -306,23 +279,19 @@ class _Lanes:
         import mitsuba as mi
 
         if mi.is_spectral:
-            waves = self._waves.astype(np.float32).reshape(4, self.quads)
-            each = (np.tile(four, self.samples) for four in waves)
-            si.wavelengths = mi.Spectrum(*(upload(mi.Float, four) for four in each))
+            waves = np.tile(self._waves.reshape(4, self.quads), self.samples)
+            si.wavelengths = mi.Spectrum(*uploaded(waves.T))
 
     def points(self, start: int) -> Any:
         """Return points of the plastic number's sequence in the unit square (Roberts 2018)."""
         import mitsuba as mi
 
         number = np.arange(start, start + self.samples)[:, None]
-        points = (0.5 + number * [0.7548776662, 0.5698402910]) % 1.0
-        return mi.Point2f(*(self.uploaded(p) for p in points.T))
+        return mi.Point2f(*self.uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
 
-    def uploaded(self, values: Array) -> Any:
-        """Upload one number per sample (samples,) to all lanes."""
-        import mitsuba as mi
-
-        return upload(mi.Float, np.repeat(values, self.quads).astype(np.float32))
+    def uploaded(self, vectors: Array) -> list[Any]:
+        """Upload the components of a vector per sample (samples, n) to all lanes."""
+        return uploaded(np.repeat(vectors, self.quads, axis=0))
 
     def vectors(self, values: Any) -> Array:
         """Read one vector per sample, (samples, 3)."""
@@ -330,7 +299,7 @@ class _Lanes:
         return np.broadcast_to(vectors, (self.count, 3))[:: self.quads]
 
     def spectra(self, values: Any) -> tuple[Array, Array]:
-        """Read (samples, wavelengths, 1 or 3) relative to D65, and the wavelengths."""
+        """Read values as of `sampled_directions`, and the wavelengths."""
         import mitsuba as mi
 
         flat = np.array(mi.unpolarized_spectrum(values), np.float64)
@@ -338,11 +307,4 @@ class _Lanes:
         if not mi.is_spectral:
             return np.repeat(flat.T[:, None], 2, axis=1), np.array([360.0, 830.0])
         spectra = flat.reshape(4, self.samples, self.quads).transpose(1, 0, 2)
-        relative = spectra.reshape(self.samples, -1) / daylight(self._waves)
-        return relative[:, :, None], self._waves
-
-
-def _irradiance(light: Lamp, point: Array) -> float:
-    """Return the irradiance of a light at a point, summed over the colours."""
-    distance = float(np.linalg.norm(light.place[:3] - point)) if light.place[3] else 1.0
-    return float(light.colour.sum()) / distance**2
+        return spectra.reshape(self.samples, -1) / daylight(self._waves), self._waves

@@ -5,17 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.colour import linear_srgb, response
 from ...plugin.description import Mix, Surface
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
+from .packing import daylight_weights
 
 Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
@@ -95,16 +95,9 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     return replace(result, spectra=evaluated(texture, uv[some], _LAM), colours=colours[some])
 
 
-@cache
-def _daylight_weights() -> Array:
-    """Return linear sRGB under daylight of each wavelength of `_LAM`, (36, 3)."""
-    return np.asarray(linear_srgb(response(_LAM)))
-
-
 def _weights(light: Spectrum) -> Array:
     """Return the matrix (36, 3) from reflectances over `_LAM` to colours under a light."""
-    weights = _daylight_weights() * np.interp(_LAM, *light)[:, None]
-    return np.asarray(weights / weights.sum(axis=0))
+    return daylight_weights(_LAM, np.interp(_LAM, *light))
 
 
 def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
@@ -231,8 +224,15 @@ def _interaction(uv: Array) -> Any:
     import mitsuba as mi
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
-    si.uv = mi.Point2f(*(upload(mi.Float, x.astype(np.float32)) for x in uv.T))
+    si.uv = mi.Point2f(*uploaded(uv))
     return si
+
+
+def uploaded(rows: NDArray[np.generic]) -> list[Any]:
+    """Upload the columns of an array (n, m) in single precision."""
+    import mitsuba as mi
+
+    return [upload(mi.Float, column.astype(np.float32)) for column in rows.T]
 
 
 def evaluated(texture: Any, uv: Array, wavelengths: Array) -> NDArray[np.float32]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -117,14 +117,6 @@ def pack_method(method: Method) -> Packed:
     )  # fmt: skip
 
 
-class Part(NamedTuple):
-    """Program of one surface, with its vertex array and tables."""
-
-    program: Any
-    array: Any
-    tables: Bindings
-
-
 class Prepared:
     """Programs and tables of one method for all surfaces of a scene.
 
@@ -143,57 +135,46 @@ class Prepared:
     ) -> None:
         self._context, self._method = context, method
         self._surfaces, self._buffers = surfaces, buffers
-        packed: dict[int, Packed] = {}
+        bound: dict[int, Bindings] = {}
+        self.nbytes = 0  # size of the method's textures
         for surface in scene.diffracting:
             key = id(surface.described.table)
-            if key not in packed:
-                packed[key] = method_tables(method, surface)
-        bound = {key: Bindings(context, tables) for key, tables in packed.items()}
+            if key not in bound:
+                packed = method_tables(method, surface)
+                bound[key] = Bindings(context, packed)
+                self.nbytes += packed.nbytes
         without = Bindings(context, Packed())
         # one for each surface
         self.tables = [
             without if surface is None else bound[id(surface.described.table)]
             for surface in (s.material.diffraction for s in scene.surfaces)
         ]
-        self.nbytes = sum(p.nbytes for p in packed.values())  # size of the method's textures
-        self._programs: dict[tuple[tuple[str, str], ...], Any] = {}
-        self._parts: dict[object, list[Part]] = {}
+        self._programs: dict[object, Any] = {}
+        self._arrays: dict[object, Any] = {}
 
-    def parts(
-        self, light: Mapping[str, str], extras: Sequence[Mapping[str, str]] = ()
-    ) -> list[Part]:
-        """Return the part of each surface under the definitions of a light; parts are cached.
+    def part(self, number: int, *further: Mapping[str, str]) -> tuple[Any, Any]:
+        """Return the program of a surface and its vertex array; both are cached.
 
-        extras : further definitions of each surface.
+        further : definitions of the light and its surroundings.
 
-        Raises a DiffractionError if a program does not compile.
+        Raises a DiffractionError if the program does not compile.
         """
-        further = list(extras) or [{}] * len(self._surfaces)
-        key = tuple(tuple(sorted({**light, **extra}.items())) for extra in further)
-        if key not in self._parts:
-            parts = []
-            for surface, tables, buffer, extra in zip(
-                self._surfaces, self.tables, self._buffers, further, strict=True
-            ):
-                definitions = {**surface.definitions, **tables.definitions, **light, **extra}
-                program = self.program(definitions)
-                parts.append(Part(program, vertex_array(self._context, program, buffer), tables))
-            self._parts[key] = parts
-        return self._parts[key]
-
-    def program(self, definitions: Mapping[str, str]) -> Any:
-        """Return the method's program with these definitions; programs are cached."""
-        key = tuple(sorted(definitions.items()))
+        definitions = {**self._surfaces[number].definitions, **self.tables[number].definitions}
+        for more in further:
+            definitions |= more
+        key = frozenset(definitions.items())
         if key not in self._programs:
             self._programs[key] = compile_program(self._context, self._method, definitions)
-        return self._programs[key]
+        program = self._programs[key]
+        if (number, key) not in self._arrays:
+            array = vertex_array(self._context, program, self._buffers[number])
+            self._arrays[number, key] = array
+        return program, self._arrays[number, key]
 
     def release(self) -> None:
-        for parts in self._parts.values():
-            for part in parts:
-                part.array.release()
-        for thing in (*{id(t): t for t in self.tables}.values(), *self._programs.values()):
-            thing.release()
+        for held in (self._arrays, {id(t): t for t in self.tables}, self._programs):
+            for thing in held.values():
+                thing.release()
 
 
 def method_tables(method: str, surface: Diffracting) -> Packed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,20 +114,16 @@ def _reflectance(material: Material | None) -> Packed:
     return pack_conductor(_INDEX_WAVELENGTHS, index.real, index.imag)
 
 
-class IndexSpectra(NamedTuple):
-    """Complex index of refraction η + ik over wavelengths, (n,) each."""
+def index_spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
+    """Evaluate the textures of an index η + ik; RGB values become three wavelengths.
 
-    wavelengths: Array  # nm
-    eta: Array
-    k: Array
-
-
-def index_spectra(eta: Any, k: Any) -> IndexSpectra:
-    """Evaluate the textures of an index; RGB values become three wavelengths."""
+    Returns wavelengths in nm, η and k, (n,) each.
+    """
     import mitsuba as mi
 
     # in RGB variants the wavelengths of sRGB's primaries, which textures list from red to blue
     lam = np.linspace(360.0, 830.0, 96) if mi.is_spectral else np.array([464.0, 549.0, 611.0])
     order = slice(None, None, 1 if mi.is_spectral else -1)
     uv = np.full((1, 2), 0.5)
-    return IndexSpectra(lam, *(evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k)))
+    of_eta, of_k = (evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k))
+    return lam, of_eta, of_k

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -23,6 +24,8 @@ from ...tables.layout import Record, cells_of, functions_at
 from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
+
+Array = NDArray[np.float64]
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
@@ -160,20 +163,29 @@ def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
     return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(ratios))})
 
 
-def _daylight_mean(table: DirectionalTable) -> NDArray[np.float64]:
+def _daylight_mean(table: DirectionalTable) -> Array:
     """Average over daylight's spectrum: linear sRGB on `FINE`, linear between the wavelengths."""
     place = np.interp(
         np.log(_LAM), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
     )
     shares = np.maximum(1.0 - np.abs(place - np.arange(len(table.wavelengths))[:, None]), 0.0)
     pages = [table.at(FINE.theta[:, None], FINE.phi, nm) for nm in table.wavelengths]
-    return np.tensordot(np.stack(pages, axis=-1), shares @ _daylight_weights(), 1)
+    return np.tensordot(np.stack(pages, axis=-1), shares @ daylight_weights(_LAM), 1)
 
 
-def _daylight_weights() -> NDArray[np.float64]:
-    """Return the matrix (n, 3) from values over `_LAM` to linear sRGB under daylight."""
-    weights = linear_srgb(response(_LAM))
+def daylight_weights(wavelengths: Array, relative: Array | float = 1.0) -> Array:
+    """Return the matrix (n, 3) from values over wavelengths in nm to linear sRGB under daylight.
+
+    relative : spectrum (n,) of another light, relative to daylight.
+    """
+    weights = (_daylight(wavelengths.tobytes()).T * relative).T
     return np.asarray(weights / weights.sum(axis=0))
+
+
+@functools.lru_cache(maxsize=8)
+def _daylight(wavelengths: bytes) -> Array:
+    """Return linear sRGB (n, 3) of daylight's wavelengths in nm, the bytes of an array (n,)."""
+    return np.asarray(linear_srgb(response(np.frombuffer(wavelengths))))
 
 
 def _grid(pages: int) -> dict[str, str]:
@@ -186,7 +198,7 @@ def _grid(pages: int) -> dict[str, str]:
     }
 
 
-def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
+def pack_responses(lights: Sequence[tuple[Array, Array]]) -> Packed:
     """Pack the contribution of each light's wavelengths to linear sRGB, for `exact`.
 
     lights : wavelengths (n,) in nm of each light, and its spectrum relative to D65 of luminance 1,
@@ -204,17 +216,13 @@ def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float6
     return Packed((Texture("responses", rows),), {"wavenumbers": WAVENUMBERS})
 
 
-def daylight_colour(
-    wavelengths: NDArray[np.float64], spectrum: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def daylight_colour(wavelengths: Array, spectrum: Array) -> Array:
     """Return linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
     values = np.stack([np.interp(_LAM, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
-    return np.asarray((linear_srgb(response(_LAM)) * values).sum(axis=0))
+    return np.asarray((_daylight(_LAM.tobytes()) * values).sum(axis=0))
 
 
-def pack_conductor(
-    wavelengths: NDArray[np.float64], eta: NDArray[np.float64], k: NDArray[np.float64]
-) -> Packed:
+def pack_conductor(wavelengths: Array, eta: Array, k: Array) -> Packed:
     """Pack a conductor's reflectance by angle and wavelength, and in linear sRGB under daylight.
 
     wavelengths : (n,) nm.
@@ -224,7 +232,7 @@ def pack_conductor(
     waves = np.linspace(*WAVENUMBERS, _WAVELENGTHS)
     lam = 2e3 * np.pi / waves
 
-    def reflectances(nm: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reflectances(nm: Array) -> Array:
         """Return the reflectance (n, angles) at wavelengths (n,)."""
         index = np.interp(nm, wavelengths, eta) + 1j * np.interp(nm, wavelengths, k)
         return reflectance(cosines, index[:, None])
@@ -234,7 +242,7 @@ def pack_conductor(
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = reflectances(_LAM)
-    rows[-1, :, :3] = fine.T @ _daylight_weights()
+    rows[-1, :, :3] = fine.T @ daylight_weights(_LAM)
     tint = metal_tint(_LAM, fine[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),

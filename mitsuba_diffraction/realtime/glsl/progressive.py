@@ -13,17 +13,16 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...extras import optional
 from .bounces import pack_bounces
 from .camera import Camera
-from .context import Bindings, Target, compile_plain, set_uniforms
+from .context import Bindings, Pass, Target, compile_plain, set_uniforms
 from .emitters import Emitters
-from .lights import Lamp, light_definitions
+from .lights import Lamp
 from .methods import vertex_array
 from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
@@ -42,52 +41,30 @@ _STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5,
 _WHITE = Lamp("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
 
 
-class Drawing(Protocol):
-    """Interface of `renderer.Renderer` in this module, which the renderer imports."""
-
-    context: Any
-    scene: RealtimeScene
-    mitsuba_scene: Any
-    view: str
-    buffers: list[Any]
-
-    def target(self, width: int, height: int) -> Target:
-        """Return a framebuffer of floats."""
-
-    @property
-    def draw_lights(self) -> Callable[..., None]:
-        """Function that draws lights or looked-up surroundings."""
-
-
 class Stage:
     """Emitters, surroundings and shadow casters of a scene, independent of the camera.
 
     Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
     """
 
-    def __init__(self, renderer: Drawing) -> None:
-        self._context, self._scene = renderer.context, renderer.scene
-        self._mitsuba_scene = renderer.mitsuba_scene
-        self._with_bounces: list[Joined] | None = None
+    def __init__(
+        self, context: Any, mitsuba_scene: Any, scene: RealtimeScene, buffers: list[Any]
+    ) -> None:
+        self.context, self._scene, self._mitsuba_scene = context, scene, mitsuba_scene
+        self._with_bounces: list[list[Bindings]] | None = None
         self._resources: list[Any] = []
-        self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
-        self._add_glowing(renderer.buffers)
-        flats = flat_shapes(renderer.mitsuba_scene)
-        around = [
-            self._bound(pack_surroundings(self._scene, self.emitters, flats)),
-            self._bound(pack_solid(self._scene, flats)),
-        ]
-        self._around = around[0]
-        self._background, self._triangle = None, None
+        self.emitters = Emitters(mitsuba_scene, scene.middle)
+        self._add_glowing(buffers)
+        flats = flat_shapes(mitsuba_scene)
+        self._around = self._bound(pack_surroundings(scene, self.emitters, flats))
+        self._background: Pass | None = None
         if self.emitters.environment is not None:
+            shared = ("library.glsl", "surroundings.glsl")
             self._background = self._register(
-                compile_plain(
-                    self._context, "whole.vert", "background.frag",
-                    ("library.glsl", "surroundings.glsl"), self._around.definitions,
-                )
-            )  # fmt: skip
-            self._triangle = self._register(self._context.vertex_array(self._background, []))
-        self.extras = self._with_lobes(around)  # bindings of each surface
+                Pass(context, "background.frag", shared, self._around.definitions)
+            )
+        # bindings of each surface
+        self.extras = self._with_lobes([self._around, self._bound(pack_solid(scene, flats))])
         # whether lobes can look up any light
         self.looks_up = self._scene.glows or self._background is not None
 
@@ -98,19 +75,18 @@ class Stage:
 
     def _bound(self, packed: Packed) -> Bindings:
         """Upload packed data."""
-        bindings: Bindings = self._register(Bindings(self._context, packed))
+        bindings: Bindings = self._register(Bindings(self.context, packed))
         return bindings
 
     def _add_glowing(self, buffers: list[Any]) -> None:
         """Add shapes that emit light, both as pictures and as shadow casters."""
-        context, scene = self._context, self._scene
+        context, scene = self.context, self._scene
         self._glow = self._register(compile_plain(context, "surface.vert", "glow.frag"))
         vertices = [self._register(context.buffer(g.vertices.tobytes())) for g in scene.emitting]
         self._glowing = [self._register(vertex_array(context, self._glow, v)) for v in vertices]
-        self._radiances = [tuple(float(x) for x in glow.radiance) for glow in scene.emitting]
         self.casters = self._register(Casters(context, scene.surfaces, buffers, vertices))
 
-    def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
+    def _with_lobes(self, around: list[Bindings]) -> list[list[Bindings]]:
         """Return the bindings of each surface: the surroundings, and its lobes if it diffracts."""
         lobes: dict[int, Bindings] = {}
         extras = []
@@ -121,40 +97,34 @@ class Stage:
                 if key not in lobes:
                     lobes[key] = self._bound(diffraction.lobes())
                 parts.append(lobes[key])
-            extras.append(Joined(parts))
+            extras.append(parts)
         return extras
 
-    def with_bounces(self) -> list[Joined]:
+    def with_bounces(self) -> list[list[Bindings]]:
         """Return `extras` with the light between surfaces, traced at the first call."""
         if self._with_bounces is None:
             traced = self._bound(pack_bounces(self._mitsuba_scene, self._scene))
-            self._with_bounces = [Joined([*extra.parts, traced]) for extra in self.extras]
+            self._with_bounces = [[*extra, traced] for extra in self.extras]
         return self._with_bounces
 
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
         """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
-        moderngl = optional("moderngl")
         matrix = camera.view_projection(self._scene.low, self._scene.high)
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
-        if bright and self._background is not None and self._triangle is not None:
-            self._context.enable_only(moderngl.NOTHING)
-            self._around.use(self._background)
-            behind: dict[str, Uniform] = {
-                "from_clip": tuple(np.linalg.inv(matrix).T.ravel().tolist()),
-                "eye": tuple(camera.eye.tolist()),
-                "picture_size": tuple(float(n) for n in camera.size),
-            }
-            set_uniforms(self._background, behind)
-            self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        self._context.enable_only(moderngl.DEPTH_TEST)
         shared: dict[str, Uniform] = {
-            "view_projection": tuple(matrix.T.ravel().tolist()), "eye": tuple(camera.eye.tolist())
-        }  # fmt: skip
+            "view_projection": tuple(matrix.T.ravel().tolist()),
+            "from_clip": tuple(np.linalg.inv(matrix).T.ravel().tolist()),
+            "eye": tuple(camera.eye.tolist()),
+            "picture_size": tuple(float(n) for n in camera.size),
+        }
+        if bright and self._background is not None:
+            self._background.draw(self._around.uniforms | shared, self._around.textures)
+        self.context.enable_only(self.context.DEPTH_TEST)
         set_uniforms(self._glow, shared)
-        for array, radiance in zip(self._glowing, self._radiances, strict=True):
-            set_uniforms(self._glow, {"radiance": radiance if bright else (0.0, 0.0, 0.0)})
-            array.render(moderngl.TRIANGLES)
+        for array, glow in zip(self._glowing, self._scene.emitting, strict=True):
+            set_uniforms(self._glow, {"radiance": tuple((bright * glow.radiance).tolist())})
+            array.render()
 
     def release(self) -> None:
         for resource in reversed(self._resources):
@@ -183,54 +153,36 @@ def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
     return pack_obstacles(np.concatenate(solid)) if solid else Packed()
 
 
-class Joined:
-    """Several bindings, used as one."""
-
-    def __init__(self, parts: list[Bindings]) -> None:
-        self.parts = parts
-        self.definitions = {k: v for part in parts for k, v in part.definitions.items()}
-
-    def use(self, program: Any, first_unit: int = 0) -> int:
-        """Bind all parts in a program, and return the next free texture unit."""
-        for part in self.parts:
-            first_unit = part.use(program, first_unit)
-        return first_unit
-
-
 class ProgressiveLight:
     """Picture that accumulates frames, created by `Renderer.progressive`.
 
+    draw : `Renderer.draw_lights` of a method.
+    view : view of pictures for a screen.
     lights : lights to draw instead of the scene's emitters and surroundings.
     shadow_size : texels a side of a shadow map.
     bounces : whether light between surfaces is added to light from the emitters.
     """
 
     def __init__(
-        self, renderer: Drawing, method: str, camera: Camera, stage: Stage, *,
+        self, stage: Stage, draw: Callable[..., None], camera: Camera, view: str, *,
         lights: Sequence[Lamp] = (), shadow_size: int = SIZE, bounces: bool = False,
     ) -> None:  # fmt: skip
-        self._renderer, self._method, self._camera = renderer, method, camera
-        self._stage = stage
+        self._stage, self._draw, self._camera = stage, draw, camera
         self._fixed = [replace(light, spectrum=len(lights) * light.spectrum) for light in lights]
         bounces = bounces and not lights
         self._looks_up = (stage.looks_up or bounces) and not lights
         self._surroundings = stage.with_bounces() if bounces else stage.extras
         self._surface: dict[str, float | None] = {}
-        context = renderer.context
+        context = stage.context
         self._map = ShadowMap(stage.casters, shadow_size)
-        width, height = camera.size
-        self._frame = renderer.target(width, height)
-        self._sums = [renderer.target(width, height) for _ in range(2)]  # one per kind of frame
+        self._frame = Target(context, *camera.size)
+        self._sums = [Target(context, *camera.size) for _ in range(2)]  # one per kind of frame
         self._counts = [0, 0]
         self._lights: Iterator[Lamp] = iter(())
         self.restart(camera)
-        self._add = compile_plain(context, "whole.vert", "add.frag")
-        self._triangle = context.vertex_array(self._add, [])
-        self._mean = compile_plain(
-            context, "whole.vert", "mean.frag", ("library.glsl", "formulas"),
-            display_definitions(renderer.view),
-        )  # fmt: skip
-        self._whole = context.vertex_array(self._mean, [])
+        self._add = Pass(context, "add.frag")
+        shared = ("library.glsl", "formulas")
+        self._mean = Pass(context, "mean.frag", shared, display_definitions(view))
 
     @property
     def frames(self) -> int:
@@ -267,7 +219,8 @@ class ProgressiveLight:
                 self._light(light, camera, numbers[4:6])
             else:
                 self._look_up(camera, numbers[6:8])
-            self._accumulate(self._sums[kind])
+            self._sums[kind].frame.use()
+            self._add.draw({}, {"frame": self._frame.colour}, adding=True)
             self._counts[kind] += 1
 
     def _light(self, light: Lamp, camera: Camera, shift: Array) -> None:
@@ -276,59 +229,38 @@ class ProgressiveLight:
             return
         uniforms, each = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
         uniforms["light_density"] = light.density
-        definitions = light_definitions(1, False) | {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
+        definitions = {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
-        self._renderer.draw_lights(
-            self._frame.frame, self._method, camera, [light], definitions, uniforms,
-            self._extras(each), **self._surface,
-        )  # fmt: skip
+        textures = {"shadow_map": self._map.texture}
+        self._draw_surfaces(light, camera, definitions, uniforms, each, textures)
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
-        self._renderer.draw_lights(
-            self._frame.frame, self._method, camera, [_WHITE],
-            light_definitions(1, False) | {"LOOKED_UP": ""},
-            {"sequence": tuple(numbers.tolist())}, self._extras(), **self._surface,
+        uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
+        each: list[dict[str, Uniform]] = [{} for _ in self._visible.solid]
+        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
+
+    def _draw_surfaces(
+        self, light: Lamp, camera: Camera, definitions: dict[str, str],
+        uniforms: dict[str, Uniform], each: list[dict[str, Uniform]], textures: dict[str, Any],
+    ) -> None:  # fmt: skip
+        """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
+        for surface, solid in zip(each, self._visible.solid, strict=True):
+            surface["solid"] = solid
+        self._draw(
+            self._frame.frame, camera, [light], definitions, uniforms,
+            self._surroundings, each, textures, **self._surface,
         )  # fmt: skip
-
-    def _extras(self, in_map: Sequence[dict[str, Uniform]] = ()) -> list[Extra]:
-        """Return the extras of each surface; in_map : their uniforms in the shadow map, if any."""
-        bodies: list[dict[str, Uniform]] = [{"solid": solid} for solid in self._visible.solid]
-        texture = self._map.texture if in_map else None
-        return [
-            Extra(extra, {**body, **shadow}, texture)
-            for extra, body, shadow in zip(
-                self._surroundings, bodies, in_map or [{}] * len(bodies), strict=True
-            )
-        ]
-
-    def _accumulate(self, target: Target) -> None:
-        """Add the frame to a sum."""
-        moderngl = optional("moderngl")
-        context: Any = self._renderer.context
-        target.frame.use()
-        context.enable_only(moderngl.BLEND)
-        context.blend_func = moderngl.ONE, moderngl.ONE
-        self._frame.colour.use(0)
-        self._add["frame"].value = 0
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        context.enable_only(moderngl.NOTHING)
 
     def show(self, frame: Any, exposure: float) -> None:
         """Draw the picture so far into a framebuffer of the same size, exposed, for a screen."""
-        moderngl = optional("moderngl")
-        context: Any = self._renderer.context
         frame.use()
-        context.enable_only(moderngl.NOTHING)
-        for unit, target in enumerate(self._sums):
-            target.colour.use(unit)
+        first, second = (target.colour for target in self._sums)
         weights = tuple(1.0 / max(count, 1) for count in self._counts)
-        uniforms: dict[str, Uniform] = {
-            "first": 0, "second": 1, "weights": weights, "exposure": exposure
-        }  # fmt: skip
-        set_uniforms(self._mean, uniforms)
-        self._whole.render(moderngl.TRIANGLES, vertices=3)
+        self._mean.draw(
+            {"weights": weights, "exposure": exposure}, {"first": first, "second": second}
+        )
 
     @property
     def image(self) -> NDArray[np.float32]:
@@ -336,31 +268,11 @@ class ProgressiveLight:
         width, height = self._camera.size
         total = np.zeros((height, width, 4), np.float32)
         for target, count in zip(self._sums, self._counts, strict=True):
-            pixels = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
-            total += pixels.reshape(height, width, 4)[::-1] / np.float32(max(count, 1))
+            total += target.read() / np.float32(max(count, 1))
         total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
         return total
 
     def release(self) -> None:
-        programs = (self._triangle, self._add, self._whole, self._mean)
-        for resource in (*programs, self._frame, *self._sums, self._map):
+        resources: list[Any] = [self._add, self._mean, self._frame, *self._sums, self._map]
+        for resource in resources:
             resource.release()
-
-
-class Extra:
-    """Bindings of a surface, its uniforms in one frame, and the light's shadow map, if any."""
-
-    def __init__(self, extra: Joined, uniforms: dict[str, Uniform], shadow_map: Any) -> None:
-        self._extra, self._uniforms, self._map = extra, uniforms, shadow_map
-        self.definitions = extra.definitions
-
-    def use(self, program: Any, first_unit: int = 0) -> int:
-        """Bind all in a program, and return the next free texture unit."""
-        first_unit = self._extra.use(program, first_unit)
-        set_uniforms(program, self._uniforms)
-        sampler = program.get("shadow_map", None)
-        if self._map is not None and sampler is not None:
-            self._map.use(first_unit)
-            sampler.value = first_unit
-            first_unit += 1
-        return first_unit

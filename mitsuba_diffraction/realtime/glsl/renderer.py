@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import check_choice, warn
-from ...extras import optional
 from ...optics.display import VIEWS
 from ...tables.directional import FINE
 from .camera import Camera
 from .context import (
     Bindings,
     Target,
+    bind,
     check_version,
     clock_of,
     headless_context,
     set_uniforms,
 )
-from .lights import Lamp, light_definitions
+from .lights import Lamp
 from .methods import Prepared, window
 from .packing import pack_energy, pack_responses
-from .progressive import Extra, ProgressiveLight, Stage
+from .progressive import ProgressiveLight, Stage
 from .scene import RealtimeScene, load, read_scene
-from .shader_materials import pack_conservation, pack_emission, pack_relief, pack_surface
+from .shader_materials import pack_conservation, pack_emission, pack_surface
 from .shadows import SIZE
-from .source import LIGHTS
+from .source import LIGHTS, display_definitions
 from .texels import Uniform
 
 Image = NDArray[np.float32]
@@ -74,7 +75,6 @@ class Renderer:
             Bindings(
                 self.context,
                 pack_surface(s.material)
-                | pack_relief(s.material)
                 | pack_conservation(s.material)
                 | pack_emission(s.radiance),
             )
@@ -113,9 +113,8 @@ class Renderer:
         n = supersampling
         target = self.target(width * n, height * n)
         self.draw(target.frame, method, self.camera.resized(width, height))
-        fine = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
+        fine = target.read().reshape(height, n, width, n, 4)
         target.release()
-        fine = fine.reshape(height, n, width, n, 4)[::-1, ::-1]
         return np.ascontiguousarray(fine.mean(axis=(1, 3), dtype=np.float32))
 
     def frame_time(
@@ -165,12 +164,15 @@ class Renderer:
         coherence_width : coherence width of all patches instead of the scene's, µm; not for `fast`
             and `pq`, whose tables include it.
         """
+        definitions = {"LIGHTS_LIT": str(len(self.lights))}
+        if np.any(self.sky != 0.0):
+            definitions["SKY"] = ""
+        if exposure is not None:
+            definitions |= display_definitions(self.view)
+        frame.use()
+        frame.clear(0.0, 0.0, 0.0, 0.0)
         self.draw_lights(
-            frame, method, camera or self.camera, self.lights,
-            light_definitions(
-                len(self.lights), bool(np.any(self.sky != 0.0)),
-                None if exposure is None else self.view,
-            ),
+            method, frame, camera or self.camera, self.lights, definitions,
             {"sky": np.asarray(self.sky, np.float32), "exposure": exposure or 1.0},
             scale=scale, coherence_width=coherence_width,
         )  # fmt: skip
@@ -201,26 +203,29 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
+        draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self, method, resized, self.stage(), lights=lights, shadow_size=shadow_size,
+            self.stage(), draw, resized, self.view, lights=lights, shadow_size=shadow_size,
             bounces=bounces,
         )  # fmt: skip
 
     def stage(self) -> Stage:
         """Return the scene's emitters, surroundings and shadow casters, built at the first call."""
         if self._stage is None:
-            self._stage = Stage(self)
+            self._stage = Stage(self.context, self.mitsuba_scene, self.scene, self.buffers)
         return self._stage
 
     def draw_lights(
         self,
-        frame: Any,
         method: str,
+        frame: Any,
         camera: Camera,
         lights: Sequence[Lamp],
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
-        extras: Sequence[Extra] | None = None,
+        extras: Sequence[Sequence[Bindings]] = (),
+        each: Sequence[dict[str, Uniform]] = (),
+        textures: Mapping[str, Any] | None = None,
         *,
         scale: float | None = None,
         coherence_width: float | None = None,
@@ -229,19 +234,14 @@ class Renderer:
 
         Parameters
         ----------
-        frame, method, camera, scale, coherence_width : as in `draw`.
+        method, frame, camera, scale, coherence_width : as in `draw`.
         lights : lights without extent.
-        definitions, uniforms : definitions and uniforms of the light.
-        extras : further bindings of each surface; without them the frame is cleared first.
+        definitions, uniforms, textures : definitions, uniforms and textures of the light.
+        extras, each : further bindings, and uniforms, of each surface.
         """
-        moderngl = optional("moderngl")
-        parts = self.prepared(method).parts(
-            definitions, [extra.definitions for extra in extras or ()]
-        )
+        prepared = self.prepared(method)
         frame.use()
-        if extras is None:
-            frame.clear(0.0, 0.0, 0.0, 0.0)
-        self.context.enable_only(moderngl.DEPTH_TEST)
+        self.context.enable_only(self.context.DEPTH_TEST)
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
         colours = np.zeros((LIGHTS, 3), np.float32)
@@ -258,14 +258,14 @@ class Renderer:
             "light_colour": colours,
             **uniforms,
         }
-        for n, (surface, bindings, part) in enumerate(
-            zip(self.scene.surfaces, self.bindings, parts, strict=True)
-        ):
-            program = part.program
+        for n, surface in enumerate(self.scene.surfaces):
+            further = extras[n] if extras else ()
+            program, array = prepared.part(n, definitions, *(part.definitions for part in further))
             set_uniforms(program, shared)
-            unit = part.tables.use(program, bindings.use(program))
-            if extras is not None:
-                unit = extras[n].use(program, unit)
+            unit = 0
+            for part in (self.bindings[n], prepared.tables[n], *further):
+                unit = part.use(program, unit)
+            unit = bind(program, each[n] if each else {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
@@ -275,8 +275,8 @@ class Renderer:
                 factor = own if scale is None else scale
                 set_uniforms(program, {"height_scale": factor})
                 if coherence_width is not None:
-                    set_uniforms(program, window(part.tables, coherence_width))
-            part.array.render(moderngl.TRIANGLES)
+                    set_uniforms(program, window(prepared.tables[n], coherence_width))
+            array.render()
 
     def energy_for(self, scale: float) -> None:
         """Take what conserves energy at another height scale: a second or so, where it is new."""
@@ -317,9 +317,7 @@ class Renderer:
             return
         pairs = [(light.wavelengths, light.spectrum) for light in lights or self.lights]
         spectra = [spectrum for _, spectrum in pairs]
-        same = len(spectra) == len(self._spectra) and all(
-            new is old for new, old in zip(spectra, self._spectra, strict=True)
-        )
+        same = list(map(id, spectra)) == list(map(id, self._spectra))
         if self._responses is None or not same:
             if self._responses is not None:
                 self._responses.release()

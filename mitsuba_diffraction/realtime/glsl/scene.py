@@ -114,35 +114,42 @@ def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, 
     position, normal, tangent = point(s.ravel(), t.ravel())
     index = grid_faces(np.arange(s.size).reshape(s.shape).T).ravel()
     uv = np.stack([s.ravel(), t.ravel()], axis=1)
+    # of a plane, normals and tangents are one vector
+    normal, tangent = (np.broadcast_to(x, position.shape) for x in (normal, tangent))
     return Triangles(position[index], normal[index], tangent[index], uv[index])
+
+
+_X, _Z = np.eye(3)[[0, 2]]
+
+
+def _around(turns: Array) -> tuple[Array, Array]:
+    """Return unit vectors (n, 3) at angles around the z axis, and those along the circle."""
+    cos, sin = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
+    return np.stack([cos, sin, 0.0 * cos], axis=1), np.stack([-sin, cos, 0.0 * cos], axis=1)
 
 
 def _rectangle(u: Array, v: Array) -> tuple[Array, ...]:
     """Return positions, normals and tangents of Mitsuba's rectangle."""
-    p = np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1)
-    return p, np.tile([0.0, 0.0, 1.0], (len(u), 1)), np.tile([2.0, 0.0, 0.0], (len(u), 1))
+    return np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1), _Z, 2.0 * _X
 
 
 def _sphere(u: Array, v: Array) -> tuple[Array, ...]:
     """Return positions, normals and tangents of Mitsuba's sphere."""
-    phi, theta = 2 * np.pi * u, np.pi * v
-    p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
-    return p, p, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+    outward, along = _around(u)
+    p = np.sin(np.pi * v)[:, None] * outward + np.cos(np.pi * v)[:, None] * _Z
+    return p, p, along
 
 
 def _disk(u: Array, v: Array) -> tuple[Array, ...]:
     """Return positions, normals and tangents of Mitsuba's disk."""
-    phi = 2 * np.pi * v  # Mitsuba's u is the radius, v the azimuth
-    radial = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
-    return u[:, None] * radial, np.tile([0.0, 0.0, 1.0], (len(u), 1)), radial
+    radial, _ = _around(v)  # Mitsuba's u is the radius, v the azimuth
+    return u[:, None] * radial, _Z, radial
 
 
 def _cylinder(u: Array, v: Array) -> tuple[Array, ...]:
     """Return positions, normals and tangents of Mitsuba's cylinder."""
-    phi = 2 * np.pi * u
-    p = np.stack([np.cos(phi), np.sin(phi), v], axis=1)
-    normal = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
-    return p, normal, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+    outward, along = _around(u)
+    return outward + v[:, None] * _Z, outward, along
 
 
 #: Rows, columns and parametrisation of each analytic shape.
@@ -208,8 +215,7 @@ class RealtimeScene:
     @property
     def middle(self) -> Array:
         """Middle (3,) of the box around all surfaces that diffract."""
-        low, high = self.subject
-        return 0.5 * (low + high)
+        return np.asarray(0.5 * np.add(*self.subject))
 
 
 def load(scene: Any) -> Any:
@@ -268,8 +274,13 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
             continue
         _check_texcoords(shape, name)
         supported.append((name, shape, triangles))
-    middle = _middle([t for _, shape, t in supported if diffracts(shape.bsdf())])
-    lighting = read_lights(scene, middle, LIGHTS)
+    subjects = [t.positions for _, shape, t in supported if diffracts(shape.bsdf())]
+    if not subjects:
+        raise DiffractionError(
+            "no supported shape of the scene diffracts; give a mesh, rectangle, sphere, disk or "
+            "cylinder a <bsdf type='diffraction'>"
+        )
+    lighting = read_lights(scene, 0.5 * np.add(*box_of(subjects)), LIGHTS)
     surfaces, emitting = [], []
     for name, shape, triangles in supported:
         before = len(omissions)
@@ -299,17 +310,6 @@ def _check_texcoords(shape: Any, name: str) -> None:
             f"{name}: the mesh has no texture coordinates, which define the patch's axes; add "
             "them (u along the patch's x axis), or generate them with 'tangents'"
         )
-
-
-def _middle(triangles: list[Triangles]) -> Array:
-    """Return the middle (3,) of all triangles that diffract."""
-    if not triangles:
-        raise DiffractionError(
-            "no supported shape of the scene diffracts; give a mesh, rectangle, sphere, disk or "
-            "cylinder a <bsdf type='diffraction'>"
-        )
-    low, high = box_of([t.positions for t in triangles])
-    return 0.5 * (low + high)
 
 
 def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:

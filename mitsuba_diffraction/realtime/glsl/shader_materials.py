@@ -16,7 +16,7 @@ from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_pictur
 from .modelled import Modelled, index_spectra
 from .packing import pack_conductor
 from .solved import Solved
-from .texels import Packed, Texture, Uniform, as_half
+from .texels import Packed, Texture, Uniform, as_half, four_channels
 
 _COSINES = 64  # nodes of transmittances
 _KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor", "Principled")
@@ -235,13 +235,18 @@ def pack_surface(material: Material) -> Packed:
     uniforms: dict[str, Uniform] = {"two_sided": material.two_sided}
     definitions: dict[str, str] = {}
     textures = []
-    maps = {"colour": material.pigment, "axis": material.axis, "mask": material.mask}
+    maps = {
+        "colour": material.pigment, "axis": material.axis, "mask": material.mask,
+        "bump": material.bumps, "normal": material.normals,
+    }  # fmt: skip
     for name, value in maps.items():
         if value is not None and value.picture is not None:
-            textures.append(Texture(f"{name}_map", as_half(_four(value.picture)), smooth=True))
+            smooth, picture = name != "bump", value.picture  # bumps are read texel by texel
+            packed_picture = as_half(four_channels(picture) if smooth else picture)
+            textures.append(Texture(f"{name}_map", packed_picture, smooth))
             uniforms[f"{name}_uv"] = tuple(value.to_uv.T.ravel().tolist())
             marks = {"MAPPED": True, "CLAMPED": value.clamped, "NEAREST": value.nearest}
-            definitions |= {f"{name.upper()}_{mark}": "" for mark, on in marks.items() if on}
+            definitions |= {f"{name.upper()}_{mark}": "true" for mark, on in marks.items() if on}
     packed = Packed(tuple(textures), uniforms, definitions)
     diffraction, gloss = material.diffraction, material.gloss
     if diffraction is None:
@@ -270,23 +275,6 @@ def pack_emission(radiance: Array | None) -> Packed:
     return Packed((), {"emission": tuple(radiance.tolist())}, {"EMITTING": ""})
 
 
-def pack_relief(material: Material) -> Packed:
-    """Pack the bump map and the normal map of a material."""
-    packed = Packed()
-    for name, relief in (("bump", material.bumps), ("normal", material.normals)):
-        if relief is None or relief.picture is None:
-            continue
-        smooth = name == "normal"  # bumps are read texel by texel
-        picture = as_half(_four(relief.picture) if smooth else relief.picture)
-        definition = {"bump": "BUMPED", "normal": "NORMAL_MAPPED"}[name]
-        packed |= Packed(
-            (Texture(f"{name}_map", picture, smooth=smooth),),
-            {f"{name}_uv": tuple(relief.to_uv.T.ravel().tolist())},
-            {definition: ""},
-        )
-    return packed
-
-
 def _is_bsdf(child: Any) -> bool:
     """Return whether a child of a BSDF is a BSDF."""
     import mitsuba as mi
@@ -313,9 +301,3 @@ def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map
             return colour_map(textures[key], light)
     omissions.append(f"the material of {name} ({kind}, shown as grey)")
     return Map(np.full(3, _OTHER_GREY))
-
-
-def _four(picture: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Pad a picture to four channels, which graphics cards store anyway."""
-    missing = 4 - picture.shape[2]
-    return np.pad(picture, [(0, 0), (0, 0), (0, missing)]).astype(np.float32)

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...extras import optional
 from .camera import Camera, box_corners
 from .context import Target, compile_plain, set_uniforms
 from .lights import Lamp
@@ -86,13 +85,6 @@ class Solid:
         return self.plane is not None and float(self.plane @ light.place) > 0.0
 
 
-class View(NamedTuple):
-    """Projection of a shadow map."""
-
-    matrix: Array  # (4, 4) from the scene to clip space
-    scale: float  # depth in clip space that equals the width of a texel
-
-
 class Casters:
     """Triangles of a scene that cast shadows, drawn by their positions alone.
 
@@ -121,18 +113,16 @@ class Casters:
 
     def draw(self, matrix: Array) -> None:
         """Draw all surfaces with a matrix (4, 4) from the scene to clip space."""
-        moderngl = optional("moderngl")
-        self.context.enable_only(moderngl.DEPTH_TEST)
+        self.context.enable_only(self.context.DEPTH_TEST)
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         for array in self._arrays:
-            array.render(moderngl.TRIANGLES)
+            array.render()
 
     def draw_map(self, matrix: Array, light: Lamp, visible: Visible) -> list[float]:
         """Draw a shadow map into the current framebuffer.
 
         Returns the depth bias of each surface in texels.
         """
-        moderngl = optional("moderngl")
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         parts = [
             "none" if shape == light.shape else _needed(solid, light, outside)
@@ -143,13 +133,13 @@ class Casters:
                 continue
             # the map looks along its z axis, which reverses the triangles' orientation
             self.context.cull_face = "back" if solid.winding > 0 else "front"
-            culled = moderngl.CULL_FACE if part == "away" else moderngl.NOTHING
-            self.context.enable_only(moderngl.DEPTH_TEST | culled)
-            array.render(moderngl.TRIANGLES)
-        self.context.enable_only(moderngl.DEPTH_TEST)
+            culled = self.context.CULL_FACE if part == "away" else self.context.NOTHING
+            self.context.enable_only(self.context.DEPTH_TEST | culled)
+            array.render()
+        self.context.enable_only(self.context.DEPTH_TEST)
         if light.place[3] == 0.0:
             for array in self._emitting:
-                array.render(moderngl.TRIANGLES)
+                array.render()
         return [
             solid.bias if part == "all" else _BIAS[0]
             for solid, part in zip(self.solids, parts, strict=True)
@@ -163,9 +153,8 @@ class Casters:
         target.frame.use()
         target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self.draw(camera.view_projection(self.low, self.high))
-        pixels = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
+        pixels = target.read()[::-1].reshape(-1, 4).astype(float)
         target.release()
-        pixels = pixels.reshape(-1, 4).astype(float)
         places = np.asarray(pixels[pixels[:, 3] > 0.0, :3], np.float64)
         solid = [s.winding != 0 and not s.encloses(camera.eye) for s in self.solids]
         return Visible(places, outline(places), solid)
@@ -240,10 +229,9 @@ class ShadowMap:
     def __init__(self, casters: Casters, size: int = SIZE) -> None:
         self.casters, self.size = casters, size
         context = casters.context
-        moderngl = optional("moderngl")
         self.texture = context.depth_texture((size, size))
         self.texture.compare_func = ""
-        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.texture.filter = (context.NEAREST, context.NEAREST)
         self._frame = context.framebuffer(depth_attachment=self.texture)
 
     def draw(
@@ -277,8 +265,10 @@ class ShadowMap:
         }
         return shared, [{"shadow_bias": bias * scale} for bias in biases]
 
-    def _perspective(self, eye: Array, places: Array, shift: tuple[float, float]) -> View:
-        """Return the perspective view from a point; its scale is that at the distance 1."""
+    def _perspective(
+        self, eye: Array, places: Array, shift: tuple[float, float]
+    ) -> tuple[Array, float]:
+        """Return the perspective view from a point, as `parallel_view`, its scale at distance 1."""
         away = places - eye
         away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
         mean = away.mean(axis=0)
@@ -296,16 +286,15 @@ class ShadowMap:
         nearest = float(np.linalg.norm(outside)) / slant
         near = max(nearest * 0.999, float(corners.min()) * 0.999, 1e-4 * far)
         matrix = np.zeros((4, 4))
-        for n in range(2):
-            matrix[n, :3] = axes[n] * 2.0 / (high[n] - low[n])
-            matrix[n, :3] -= axes[2] * (high[n] + low[n]) / (high[n] - low[n])
+        sides, sums = (high - low)[:, None], (high + low)[:, None]
+        matrix[:2, :3] = axes[:2] * 2.0 / sides - axes[2] * sums / sides
         matrix[2, :3] = axes[2] * (far + near) / (far - near)
         matrix[2, 3] = -2.0 * far * near / (far - near)
         matrix[3, :3] = axes[2]
         moved = np.eye(4)
         moved[:3, 3] = -eye
         scale = float((high - low).max()) / self.size * 2.0 * far * near / (far - near)
-        return View(matrix @ moved, scale)
+        return matrix @ moved, scale
 
     def release(self) -> None:
         self._frame.release()
@@ -318,8 +307,11 @@ def parallel_view(
     corners: Array,
     size: int,
     shift: tuple[float, float] = (0.5, 0.5),
-) -> View:
+) -> tuple[Array, float]:
     """Return the parallel view of a scene from a direction.
+
+    Returns the matrix (4, 4) from the scene to clip space, and the depth there that equals the
+    width of a texel.
 
     places : (n, 3) points within the map.
     corners : (m, 3) points between the near and the far plane.
@@ -328,14 +320,16 @@ def parallel_view(
     axes = frame_along(-towards / np.linalg.norm(towards))
     low, high = _bounds(places @ axes[:2].T, size, shift)
     depths = corners @ axes[2]
-    near, far = _planes(depths.min(), depths.max())
+    near, far = depths.min(), depths.max()
+    # distinct planes even around an empty range of depths
+    room = 1e-3 * (far - near) + 1e-6 * max(abs(near), abs(far), 1e-6)
+    near, far = near - room, far + room
     matrix = np.eye(4)
-    for n in range(2):
-        matrix[n, :3] = axes[n] * 2.0 / (high[n] - low[n])
-        matrix[n, 3] = -(high[n] + low[n]) / (high[n] - low[n])
+    matrix[:2, :3] = axes[:2] * 2.0 / (high - low)[:, None]
+    matrix[:2, 3] = -(high + low) / (high - low)
     matrix[2, :3] = axes[2] * 2.0 / (far - near)
     matrix[2, 3] = -(far + near) / (far - near)
-    return View(matrix, float((high - low).max()) / size * 2.0 / (far - near))
+    return matrix, float((high - low).max()) / size * 2.0 / (far - near)
 
 
 def frame_along(axis: Array) -> Array:
@@ -352,9 +346,3 @@ def _bounds(points: Array, size: int, shift: tuple[float, float]) -> tuple[Array
     half *= (size + 4.0) / size
     middle = 0.5 * (low + high) + (np.array(shift) - 0.5) * 2.0 * half / size
     return middle - half, middle + half
-
-
-def _planes(near: float, far: float) -> tuple[float, float]:
-    """Return near and far planes around a range of depths, distinct even if it is empty."""
-    room = 1e-3 * (far - near) + 1e-6 * max(abs(near), abs(far), 1e-6)
-    return near - room, far + room

@@ -16,8 +16,16 @@ from .texels import PAGE
 
 Dialect = Literal["desktop", "web"]
 
+#: Files of each method; the last one defines `diffracted`.
+_FILES = {
+    "fast": ["fast.glsl"],
+    "exact": ["responses.glsl", "exact.glsl"],
+    "flss": ["taylor.glsl", "spectrum.glsl"],
+    "nmm": ["taylor.glsl", "nmm.glsl"],
+    "pq": ["taylor.glsl", "spectrum.glsl"],
+}
 #: Methods of the fragment stage.
-METHODS = ("fast", "exact", "flss", "nmm", "pq")
+METHODS = tuple(_FILES)
 #: Methods of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
 THESIS_METHODS = METHODS[2:]
 
@@ -27,6 +35,8 @@ LIGHTS = 4
 _CONSTANTS = {
     "PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS),
     "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1", "TAPS_X": "1", "TAPS_Y": "1",
+    "COLOUR_CLAMPED": "false", "AXIS_CLAMPED": "false", "MASK_CLAMPED": "false",
+    "COLOUR_NEAREST": "false", "AXIS_NEAREST": "false", "MASK_NEAREST": "false",
 }  # fmt: skip
 
 _PREAMBLES = {
@@ -43,13 +53,13 @@ def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> s
     return _PREAMBLES[dialect] + shader_file(name)
 
 
-def fragment_source(
+def fragment_parts(
     method: str,
     definitions: Mapping[str, str],
     dialect: Dialect = "desktop",
     main: str = "surface.frag",
-) -> str:
-    """Return the source of a method's fragment stage.
+) -> list[tuple[str, str]]:
+    """Return names and texts of the parts of a method's fragment stage, which are to be joined.
 
     definitions : definitions of the surface, the tables and the light (`Packed.definitions`).
     dialect : "desktop" is GLSL 3.30 core, "web" GLSL ES 3.00.
@@ -57,38 +67,23 @@ def fragment_source(
 
     Raises a DiffractionError if the method is unknown.
     """
-    return "".join(text for _, text in fragment_parts(method, definitions, dialect, main))
-
-
-def fragment_parts(
-    method: str,
-    definitions: Mapping[str, str],
-    dialect: Dialect = "desktop",
-    main: str = "surface.frag",
-) -> list[tuple[str, str]]:
-    """Return names and texts of the parts of `fragment_source`; parameters and errors as there."""
     check_choice("method", method, METHODS)
+    files = [*surface_files(definitions), "frame.glsl"]
+    further = {"SHADOWED": "shadow.glsl", "GLOSS": "gloss.glsl"}
+    files += [name for definition, name in further.items() if definition in definitions]
+    if "WEIGHTED" in definitions or "LOOKED_UP" in definitions:
+        files += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
+    return _parts([*files, *method_files(method, definitions), main], definitions, dialect)
+
+
+def _parts(
+    files: Sequence[str], definitions: Mapping[str, str], dialect: Dialect
+) -> list[tuple[str, str]]:
+    """Return names and texts of a preamble with these definitions, and of files."""
     known = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
-    parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl", "formulas", "reflectance.glsl", "frame.glsl", "boundary.glsl"]
-    if method in THESIS_METHODS:
-        shared.append("taylor.glsl")
-    if "SHADOWED" in known:
-        shared.append("shadow.glsl")
-    shared.append("layers.glsl")
-    if "SECOND_ORDER" in known:
-        shared.append("second_order.glsl")
-    if "ORDERS" in known:
-        shared.append("orders.glsl")
-    elif "DIFFRACTING" in known:
-        shared.append("pair.glsl")
-    if "GLOSS" in known:
-        shared.append("gloss.glsl")
-    if "WEIGHTED" in known or "LOOKED_UP" in known:
-        shared += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
-    shared += method_files(method, known)
-    return parts + [(name, part(name, known)) for name in (*shared, main)]
+    preamble = _PREAMBLES[dialect] + "".join(lines)
+    return [("preamble", preamble), *((name, part(name, known)) for name in files)]
 
 
 def part(name: str, definitions: Mapping[str, str]) -> str:
@@ -96,13 +91,22 @@ def part(name: str, definitions: Mapping[str, str]) -> str:
     return formulas(definitions) if name == "formulas" else shader_file(name)
 
 
+def surface_files(definitions: Mapping[str, str]) -> list[str]:
+    """Return the files of a surface that all methods share, which come first."""
+    files = ["library.glsl", "formulas", "reflectance.glsl", "boundary.glsl", "layers.glsl"]
+    if "SECOND_ORDER" in definitions:
+        files.append("second_order.glsl")
+    if "ORDERS" in definitions:
+        return [*files, "orders.glsl"]
+    return [*files, "pair.glsl"] if "DIFFRACTING" in definitions else files
+
+
 def method_files(method: str, definitions: Mapping[str, str]) -> list[str]:
     """Return the files of a method's `diffraction`."""
-    files = ["responses.glsl"] if method == "exact" else []
     if "ORDERS" in definitions:
-        return [*files, "orders_light.glsl"]
-    files.append(f"{method}.glsl")
-    return [*files, "diffraction.glsl"] if "DIFFRACTING" in definitions else files
+        return [*_FILES[method][:-1], "orders_light.glsl"]
+    end = ["diffraction.glsl"] if "DIFFRACTING" in definitions else []
+    return [*_FILES[method], *end]
 
 
 def plain_source(
@@ -115,9 +119,8 @@ def plain_source(
 
     shared : files that it includes, or `formulas`.
     """
-    known = _CONSTANTS | dict(definitions or {})
-    lines = [f"#define {key} {value}\n" for key, value in known.items()]
-    return _PREAMBLES[dialect] + "".join((*lines, *(part(n, known) for n in (*shared, name))))
+    parts = _parts([*shared, name], definitions or {}, dialect)
+    return "".join(text for _, text in parts)
 
 
 def display_definitions(view: str) -> dict[str, str]:

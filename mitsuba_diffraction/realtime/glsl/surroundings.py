@@ -118,7 +118,7 @@ class Environment:
         sun, radiance = np.zeros(3), np.zeros(3)
         if "sun_direction" in parameters:
             sun = np.array(parameters["sun_direction"], float).ravel()
-            directions = _beside(sun, directions)
+            directions = beside(sun, directions)
             radiance = radiance_along(emitter, _disc(sun, _SUN_RADIUS)).mean(axis=0)
         with np.errstate(invalid="ignore"):
             picture = radiance_along(emitter, directions.reshape(-1, 3))
@@ -163,10 +163,6 @@ class Environment:
         cosine = edges[row[texel]] + down * np.diff(edges)[row[texel]]
         phi = 2.0 * np.pi * (column[texel] + across) / columns
         return _directions(np.arccos(cosine), phi), probability / self.areas[row[texel], 0]
-
-    def beside_sun(self, directions: Array) -> Array:
-        """Turn unit vectors (n, 3) that point to the sun aside, to the light of the sky alone."""
-        return _beside(self.sun, directions)
 
     def packed(self, share: float) -> Packed:
         """Pack the environment for shaders/surroundings.glsl.
@@ -234,8 +230,8 @@ def _directions(theta: Any, phi: Any) -> Array:
     return np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1)
 
 
-def _beside(sun: Array, directions: Array) -> Array:
-    """Turn directions (..., 3) that point to the sun, if any, aside."""
+def beside(sun: Array, directions: Array) -> Array:
+    """Turn unit vectors (..., 3) that point to the sun, if any, aside, to the sky's light alone."""
     if not sun.any():
         return directions
     aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]

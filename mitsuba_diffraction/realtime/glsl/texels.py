@@ -36,11 +36,6 @@ class Texture:
     # True: a picture, filtered and repeated; False: a list, read texel by texel
     smooth: bool = False
 
-    @property
-    def nbytes(self) -> int:
-        """Size in the graphics card's memory."""
-        return self.data.nbytes
-
 
 @dataclass(frozen=True)
 class Packed:
@@ -53,7 +48,7 @@ class Packed:
     @property
     def nbytes(self) -> int:
         """Size of all textures in bytes."""
-        return sum(texture.nbytes for texture in self.textures)
+        return sum(texture.data.nbytes for texture in self.textures)
 
     def __or__(self, other: Packed) -> Packed:
         return Packed(
@@ -88,6 +83,11 @@ def texels(values: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.ascontiguousarray(padded).reshape(-1, 4)
 
 
+def four_channels(picture: NDArray[Any]) -> NDArray[Any]:
+    """Pad a picture to four channels, which graphics cards store anyway, and some loaders need."""
+    return np.pad(picture, [(0, 0), (0, 0), (0, 4 - picture.shape[2])])
+
+
 def half_error(values: NDArray[np.floating]) -> float:
     """Return Σ|half(x) − x| / Σ|x|, the error of half floats, from at most a million numbers."""
     sample = values.ravel()
@@ -102,9 +102,10 @@ def as_half(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """Convert values to half floats if the error is small enough, else to single precision."""
     if values.dtype == np.float16:
         return values
+    values = values.astype(np.float32, copy=False)
     if np.abs(values).max(initial=0.0) < 6e4 and half_error(values) <= HALF_ERROR:
         return values.astype(np.float16)
-    return values.astype(np.float32, copy=False)
+    return values
 
 
 def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...extras import optional
 from .context import Bindings, clock_of, compile_program, set_uniforms
-from .lights import light_definitions
 from .methods import vertex_array
 from .renderer import Renderer
 from .source import LIGHTS
@@ -44,40 +41,33 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, dict
         for (method, kind), triangle in timed.items():
             fragment = _seconds(renderer, triangle) / SIDE**2
             seconds[method][kind] = min(seconds[method][kind], fragment)
-    for triangle in timed.values():
-        for resource in triangle.resources:
+    for _, _, resources in timed.values():
+        for resource in resources:
             resource.release()
     return seconds
 
 
-@dataclass
-class _Triangle:
-    """Triangle that covers the picture: vertex array, setter of uniforms, resources to release."""
-
-    array: Any
-    bind: Callable[[], object]
-    resources: tuple[Any, ...]
-    compiled: bool = False
+#: Vertex array of a triangle that covers the picture, setter of uniforms, resources to release.
+_Triangle = tuple[Any, Callable[[], object], tuple[Any, ...]]
 
 
 def _seconds(renderer: Renderer, triangle: _Triangle) -> float:
     """Return the seconds of one picture; a small picture before it compiles the program."""
+    array, bind, _ = triangle
     target = renderer.target(SIDE, SIDE)
     target.frame.use()
-    renderer.context.enable_only(optional("moderngl").NOTHING)  # no depth test
-    triangle.bind()
-    if not triangle.compiled:
-        target.frame.viewport = (0, 0, 8, 8)
-        triangle.array.render(vertices=3)
-        renderer.context.finish()
-        target.frame.viewport = (0, 0, SIDE, SIDE)
-        triangle.compiled = True
+    renderer.context.enable_only(renderer.context.NOTHING)  # no depth test
+    bind()
+    target.frame.viewport = (0, 0, 8, 8)
+    array.render(vertices=3)
+    renderer.context.finish()
+    target.frame.viewport = (0, 0, SIDE, SIDE)
     clock = clock_of(renderer.driver)
     times = 1
     while True:
         start = clock()
         for _ in range(times):
-            triangle.array.render(vertices=3)
+            array.render(vertices=3)
         renderer.context.finish()
         seconds = clock() - start
         if seconds >= _SHORTEST:
@@ -96,7 +86,7 @@ def _first_diffracting(renderer: Renderer, method: str) -> tuple[Bindings, Bindi
 def _whole(renderer: Renderer, method: str) -> _Triangle:
     """Prepare a triangle with the whole fragment stage of a method."""
     surface, tables = _first_diffracting(renderer, method)
-    definitions = {**surface.definitions, **tables.definitions, **light_definitions(1, False)}
+    definitions = surface.definitions | tables.definitions
     program = compile_program(renderer.context, method, definitions)
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
     vertices = np.zeros((3, 17), np.float32)
@@ -116,7 +106,7 @@ def _whole(renderer: Renderer, method: str) -> _Triangle:
         renderer.use_responses(program, tables.use(program, surface.use(program)))
 
     array = vertex_array(renderer.context, program, buffer)
-    return _Triangle(array, bind, (array, program, buffer))
+    return array, bind, (array, program, buffer)
 
 
 def _look_up(renderer: Renderer, method: str) -> _Triangle:
@@ -134,4 +124,4 @@ def _look_up(renderer: Renderer, method: str) -> _Triangle:
         renderer.use_responses(program, points.use(program, tables.use(program)))
 
     array = renderer.context.vertex_array(program, [])
-    return _Triangle(array, bind, (array, program, points))
+    return array, bind, (array, program, points)

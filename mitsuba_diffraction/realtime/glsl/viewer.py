@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,7 @@ class Viewer(moderngl_window.WindowConfig):
 
     def _camera(self, size: tuple[int, int]) -> Camera:
         """Return the orbit's camera with a picture of this size."""
-        return self._ready.camera.moved(self.orbit.to_world).resized(*size)
+        return replace(self._ready.camera, to_world=self.orbit.to_world, size=size)
 
     @property
     def _surface(self) -> dict[str, float | None]:
@@ -163,8 +164,7 @@ class Viewer(moderngl_window.WindowConfig):
             if self.light is not None:
                 self.light.release()
             self.light = renderer.progressive(self.method, camera=camera, lights=lights)
-            self.light.restart(camera, **self._surface)
-        elif view != self._shown[1]:
+        if (source, view) != self._shown:
             self.light.restart(camera, **self._surface)
         self._shown = source, view
         if self.light.frames < _ENOUGH:
@@ -236,11 +236,10 @@ class Viewer(moderngl_window.WindowConfig):
         target = self._ready.target(*self.wnd.fbo.size)
         try:
             self._draw(target.frame)
-            pixels = np.frombuffer(target.frame.read(components=3, dtype="f4"), np.float32)
+            picture = target.read()[..., :3]
         finally:
             target.release()
-        width, height = self.wnd.fbo.size
-        path = write_screenshot(pixels.reshape(height, width, 3)[::-1], self.folder, "view")
+        path = write_screenshot(picture, self.folder, "view")
         self.message = f"written: {path}"
         return path
 

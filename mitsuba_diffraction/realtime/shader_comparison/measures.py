@@ -47,24 +47,6 @@ def exposure_of(reference: Image) -> float:
     return 1.0 / white if white > 0.0 else 1.0
 
 
-def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.float32]:
-    """Return the error by FLIP, 0 to 1, (height, width).
-
-    Raises a DiffractionError if flip-evaluator is not installed.
-
-    Parameters
-    ----------
-    reference, other : (height, width, 3) linear sRGB.
-    exposure : factor on both pictures.
-    """
-    flip_evaluator = optional("flip_evaluator")
-    encoded = [
-        encode_srgb(exposure * np.asarray(a, float)).astype(np.float32) for a in (reference, other)
-    ]
-    errors, _, _ = flip_evaluator.evaluate(*encoded, "LDR", applyMagma=False)
-    return np.asarray(errors, np.float32).reshape(encoded[0].shape[:2])
-
-
 def difference(
     reference: Image, other: Image, mask: NDArray[np.bool_] | None, exposure: float
 ) -> Difference:
@@ -72,6 +54,8 @@ def difference(
 
     With a mask, nearly black pixels do not count for ΔE2000. FLIP's filters reach neighbouring
     pixels: outside the mask, both pictures are assumed to be equal.
+
+    Raises a DiffractionError if flip-evaluator is not installed.
     """
     least = 0.01 if mask is not None else 0.0
     if mask is None:
@@ -83,7 +67,12 @@ def difference(
     flip = math.nan
     if mask.any():
         inside = np.where(mask[..., None], other, reference)
-        flip = float(flip_map(reference, inside, exposure)[mask].mean())
+        encoded = [
+            encode_srgb(exposure * np.asarray(a, float)).astype(np.float32)
+            for a in (reference, inside)
+        ]
+        flips, *_ = optional("flip_evaluator").evaluate(*encoded, "LDR", applyMagma=False)
+        flip = float(np.asarray(flips, np.float32).reshape(mask.shape)[mask].mean())
     return Difference(
         pixels=int(mask.sum()),
         share=float(mask.mean()),

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import daylight
-from ...plugin.memory import upload
 from ..glsl.camera import Camera
 from ..glsl.lights import Lamp
+from ..glsl.maps import uploaded
 from .measures import Visibility
 
 _RAYS = 4  # rays along either side of a pixel in `visibility`
@@ -24,19 +24,8 @@ def direct_light(scene: Any, camera: Camera) -> Any:
 
     The result has one sensor, whose film averages evenly over each pixel.
     """
-    import mitsuba as mi
-
-    parts: dict[str, Any] = {
-        "type": "scene",
-        "integrator": {"type": "path", "max_depth": 2},
-        "sensor": box_sensor(camera),
-    }
-    for number, shape in enumerate(scene.shapes()):
-        parts[f"shape_{number}"] = shape
-    for number, emitter in enumerate(scene.emitters()):
-        if emitter.get_shape() is None:
-            parts[f"emitter_{number}"] = emitter
-    return mi.load_dict(parts)
+    emitters = [emitter for emitter in scene.emitters() if emitter.get_shape() is None]
+    return _joined({"type": "path", "max_depth": 2}, camera, scene.shapes(), emitters)
 
 
 def with_lights(scene: Any, camera: Camera, lights: Sequence[Lamp]) -> Any:
@@ -45,20 +34,22 @@ def with_lights(scene: Any, camera: Camera, lights: Sequence[Lamp]) -> Any:
     Shapes that emit light are left out: their light is among `lights`. The result has one sensor,
     whose film averages evenly over each pixel, as supersampling does.
     """
+    # rays never hit lights without extent: no BSDF samples
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
+    shapes = [shape for shape in scene.shapes() if not shape.is_emitter()]
+    return _joined(integrator, replace(camera, lens=0.0), shapes, [_emitter(n) for n in lights])
+
+
+def _joined(
+    integrator: dict[str, Any], camera: Camera, shapes: Sequence[Any], emitters: Sequence[Any]
+) -> Any:
+    """Return a scene of these parts, with a sensor for this camera."""
     import mitsuba as mi
 
-    parts: dict[str, Any] = {
-        "type": "scene",
-        # rays never hit lights without extent: no BSDF samples
-        "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
-        "sensor": box_sensor(replace(camera, lens=0.0)),
-    }
-    for number, shape in enumerate(scene.shapes()):
-        if not shape.is_emitter():
-            parts[f"shape_{number}"] = shape
-    for number, light in enumerate(lights):
-        parts[f"light_{number}"] = _emitter(light)
-    return mi.load_dict(parts)
+    parts = {f"shape_{number}": shape for number, shape in enumerate(shapes)}
+    parts |= {f"light_{number}": emitter for number, emitter in enumerate(emitters)}
+    sensor = box_sensor(camera)
+    return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **parts})
 
 
 def box_sensor(camera: Camera) -> Any:
@@ -94,10 +85,9 @@ def _emitter(light: Lamp) -> dict[str, Any]:
     """Return the Mitsuba emitter of a light."""
     place = np.asarray(light.place, float)
     if place[3] == 0.0:
-        towards = [-float(x) for x in place[:3]]
-        return {"type": "directional", "direction": towards, "irradiance": _spectrum(light)}
-    position = [float(x) for x in place[:3]]
-    return {"type": "point", "position": position, "intensity": _spectrum(light)}
+        direction = (-place[:3]).tolist()
+        return {"type": "directional", "direction": direction, "irradiance": _spectrum(light)}
+    return {"type": "point", "position": place[:3].tolist(), "intensity": _spectrum(light)}
 
 
 def _spectrum(light: Lamp) -> dict[str, Any]:
@@ -128,12 +118,9 @@ def visibility(scene: Any, lights: Sequence[Lamp]) -> Visibility:
     y, x = np.mgrid[:height, :width]
     for j in range(_RAYS):
         for i in range(_RAYS):
-            place = [(x + (i + 0.5) / _RAYS) / width, (y + (j + 0.5) / _RAYS) / height]
-            ray, _ = sensor.sample_ray(
-                0.0, 0.5,
-                mi.Point2f(*(upload(mi.Float, p.astype(np.float32)) for p in place)),
-                mi.Point2f(0.5),
-            )  # fmt: skip
+            places = np.stack([(x + (i + 0.5) / _RAYS) / width, (y + (j + 0.5) / _RAYS) / height])
+            place = mi.Point2f(*uploaded(places.reshape(2, -1).T))
+            ray, _ = sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
             si = scene.ray_intersect(ray)
             index = mi.Int32(-1)
             for number in range(len(shapes)):

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,12 +106,8 @@ class Halves:
         }
 
 
-class ProgressivePicture(NamedTuple):
-    """Picture in progressive light, with samples along a side of a pixel, and seconds."""
-
-    picture: Halves
-    side: int
-    seconds: float
+#: Picture in progressive light, samples along a side of a pixel, and seconds.
+ProgressivePicture = tuple[Halves, int, float]
 
 
 @dataclass
@@ -213,7 +209,7 @@ class Comparison:
         frames = self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
         picture, side, seconds = self._draw_progressive(method, frames)
         if method != _QUICK:
-            many, few = (self._draw_progressive(_QUICK, n).picture for n in (self.frames, frames))
+            many, few = (self._draw_progressive(_QUICK, n)[0] for n in (self.frames, frames))
             picture = Halves(
                 many.first + (picture.first - few.first),
                 many.second + (picture.second - few.second),
@@ -223,7 +219,7 @@ class Comparison:
         self._write(picture.mean, f"{method}_whole", self.frames)
         beside_full: dict[str, Any] = {"full": None, "dark_region": None}
         if full is not None:
-            bounced = self._draw_progressive(method, frames, bounces=True).picture.mean
+            bounced = self._draw_progressive(method, frames, bounces=True)[0].mean
             self._write(bounced, f"{method}_bounces", frames)
             beside_full["full"] = difference(full, bounced, None, exposure_of(full))
             beside_full["dark_region"] = dark_region(full, bounced)
@@ -267,7 +263,7 @@ class Comparison:
         seconds = clock() - start
         light.release()
         picture = Halves(halves[0], 2.0 * halves[1] - halves[0])
-        self._progressive[method, frames, bounces] = ProgressivePicture(picture, side, seconds)
+        self._progressive[method, frames, bounces] = picture, side, seconds
         return self._progressive[method, frames, bounces]
 
     def _compare_same_lights(

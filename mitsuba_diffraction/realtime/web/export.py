@@ -30,7 +30,6 @@ from ..glsl.shader_materials import (
     Material,
     pack_conservation,
     pack_emission,
-    pack_relief,
     pack_surface,
 )
 from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
@@ -312,7 +311,7 @@ def _coat(material: Material) -> float:
 def _common(surface: Surface) -> Packed:
     """Pack a surface without its table; energy conservation at all height scales of the slider."""
     material = surface.material
-    packed = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
+    packed = pack_surface(material) | pack_emission(surface.radiance)
     return packed | pack_conservation(material, [2.0**n for n in OCTAVES])
 
 

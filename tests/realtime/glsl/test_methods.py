@@ -35,7 +35,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 from mitsuba_diffraction.realtime.glsl.source import (
     METHODS,
     fragment_parts,
-    fragment_source,
     vertex_source,
 )
 from mitsuba_diffraction.realtime.glsl.texels import (
@@ -269,7 +268,7 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")
     gl.program(
         vertex_shader=vertex_source("web"),
-        fragment_shader=fragment_source(method, definitions, "web"),
+        fragment_shader="".join(text for _, text in fragment_parts(method, definitions, "web")),
     ).release()
 
 
@@ -296,7 +295,7 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
 
 def test_an_unknown_method_is_refused_with_the_choices() -> None:
     with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
-        fragment_source("phong", {})
+        fragment_parts("phong", {})
 
 
 def test_lists_keep_their_order_over_rows() -> None:

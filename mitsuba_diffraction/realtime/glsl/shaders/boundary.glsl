@@ -58,20 +58,24 @@ float height_statistic(float q) { return 0.0; }
 
 #endif
 
-#if SURFACE_KIND == DIELECTRIC
-
 // Prepare the values of a pair of directions above the structure that all wavelengths share.
 // outer: their cosines outside of a coat.
 void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
-#ifdef COATED
+#if SURFACE_KIND == DIELECTRIC && defined(COATED)
     begin_boundary(wi, wo, eta, coat, outer.x, outer.y);
-#else
+#elif SURFACE_KIND == DIELECTRIC
     begin_boundary(wi, wo, eta);
+#elif defined(COATED)
+    begin_boundary(wi, wo, coat, outer.x, outer.y);
+#else
+    begin_boundary(wi, wo);
 #endif
 }
 
 float boundary_at_all(float cos_half) { return 1.0; }
+
+#if SURFACE_KIND == DIELECTRIC
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
@@ -87,22 +91,9 @@ vec3 boundary(float cos_half, float r, float z)
 
 #else
 
-void begin_pair(vec3 wi, vec3 wo, vec2 outer)
-{
-#ifdef COATED
-    begin_boundary(wi, wo, coat, outer.x, outer.y);
-#else
-    begin_boundary(wi, wo);
-#endif
-}
-
-float boundary_at_all(float cos_half) { return 1.0; }
-
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    float last = float(textureSize(reflectances, 0).y - 2);
-    float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-    vec2 index = texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz;
+    vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
     return boundary_factor(index, k * z, height_statistic(k * r));
 }
 

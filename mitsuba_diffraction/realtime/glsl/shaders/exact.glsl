@@ -23,8 +23,6 @@ uniform int cells;
 uniform float inverse_scale;
 
 const float REACH = 2.6;         // half width of a lobe in 1/σ: erfc(2.6) = 2e-4 is left out
-const float WIDEST_LOBE = 0.35;  // widest lobe for steps from order to order, rad/µm: 17 nm at 550
-const float LARGEST_STEP = 0.25; // largest step in k, rad/µm, which resolves colour matching
 
 int interval_of(float kappa)
 {

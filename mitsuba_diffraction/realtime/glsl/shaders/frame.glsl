@@ -1,37 +1,25 @@
 // The patch's frame at a point of the surface, and whether a surface of a mix is drawn there.
 
-#ifdef AXIS_MAPPED
 uniform sampler2D axis_map;       // (cos, sin) of the patch's x axis, and its stretch
 uniform mat3 axis_uv;
-#endif
-#ifdef MASK_MAPPED
 uniform sampler2D mask_map;       // interval of [0, 1) that the surface's weight takes
 uniform mat3 mask_uv;
 uniform mat4 view_projection;
-#endif
-
-#ifdef LIVE
 uniform vec2 patch_turn;          // (cos, sin) of the page's control, by which all patches are turned
-#endif
 
-// Clamp texture coordinates to a picture.
-vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
-
-// Middle of the texel, for textures that are not interpolated.
-vec2 nearest(vec2 place, vec2 size) { return (floor(place * size) + 0.5) / size; }
+// Look up a picture. clamped: at its edges, else it repeats; nearest: without interpolation.
+vec3 looked_up(sampler2D map, mat3 to_uv, vec2 texcoord, bool clamped, bool nearest)
+{
+    vec2 place = (to_uv * vec3(texcoord, 1.0)).xy, size = vec2(textureSize(map, 0));
+    if (nearest) place = (floor(place * size) + 0.5) / size;
+    return texture(map, clamped ? clamp(place, 0.5 / size, 1.0 - 0.5 / size) : place).rgb;
+}
 
 // Rotation to the patch's axes times its stretch. axis: (cos, sin) and stretch of the vertex.
 vec2 patch_frame(vec2 texcoord, vec3 axis)
 {
 #ifdef AXIS_MAPPED
-    vec2 place = (axis_uv * vec3(texcoord, 1.0)).xy, size = vec2(textureSize(axis_map, 0));
-#ifdef AXIS_NEAREST
-    place = nearest(place, size);
-#endif
-#ifdef AXIS_CLAMPED
-    place = within(place, size);
-#endif
-    axis = texture(axis_map, place).rgb;
+    axis = looked_up(axis_map, axis_uv, texcoord, AXIS_CLAMPED, AXIS_NEAREST);
 #endif
     float turned = length(axis.xy);
     vec2 unit = turned > 1e-6 ? axis.xy / turned : vec2(1.0, 0.0);
@@ -47,14 +35,7 @@ vec2 patch_frame(vec2 texcoord, vec3 axis)
 bool masked(vec2 texcoord)
 {
 #ifdef MASK_MAPPED
-    vec2 place = (mask_uv * vec3(texcoord, 1.0)).xy, size = vec2(textureSize(mask_map, 0));
-#ifdef MASK_NEAREST
-    place = nearest(place, size);
-#endif
-#ifdef MASK_CLAMPED
-    place = within(place, size);
-#endif
-    vec2 interval = texture(mask_map, place).rg;
+    vec2 interval = looked_up(mask_map, mask_uv, texcoord, MASK_CLAMPED, MASK_NEAREST).rg;
     vec3 right = vec3(view_projection[0].x, view_projection[1].x, view_projection[2].x);
     vec3 up = vec3(view_projection[0].y, view_projection[1].y, view_projection[2].y);
     float shift = dot(right, vec3(7919.0, 6271.0, 5003.0)) + dot(up, vec3(4099.0, 8191.0, 6563.0));

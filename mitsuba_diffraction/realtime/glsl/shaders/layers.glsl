@@ -38,14 +38,6 @@ vec3 albedo(vec3 w, vec2 rotation)
 
 uniform sampler2D through;        // transmittance of a plain material's face, over cosθ
 
-float passed(float cosine)
-{
-    float last = float(textureSize(through, 0).x - 1);
-    float lower = min(floor(cosine * last), last - 1.0);
-    float left = texelFetch(through, ivec2(int(lower), 0), 0).r;
-    return mix(left, texelFetch(through, ivec2(int(lower) + 1, 0), 0).r, cosine * last - lower);
-}
-
 #endif
 
 #ifdef PRINCIPLED
@@ -70,7 +62,7 @@ float burley(vec3 wi, vec3 wo)
 vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
 {
 #if defined(THROUGH)
-    return vec3(passed(wi.z) * passed(wo.z));
+    return in_row(through, wi.z, 0).rrr * in_row(through, wo.z, 0).r;
 #elif defined(PRINCIPLED)
     return vec3((1.0 - metallic) * burley(wi, wo));
 #elif !defined(DIFFRACTING)

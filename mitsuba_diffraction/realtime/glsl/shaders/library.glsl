@@ -23,6 +23,15 @@ vec2 upper_halves(uint word)
 
 #endif
 
+// Interpolate along a row of a texture; share: from 0 in its first column to 1 in its last one.
+vec4 in_row(sampler2D table, float share, int row)
+{
+    float last = float(textureSize(table, 0).x - 1), x = clamp(share, 0.0, 1.0) * last;
+    float lower = min(floor(x), last - 1.0);
+    vec4 left = texelFetch(table, ivec2(int(lower), row), 0);
+    return mix(left, texelFetch(table, ivec2(int(lower) + 1, row), 0), x - lower);
+}
+
 // Angle from the x axis in turns, 0 to 1. Minimax polynomial, 3e-7: drivers' atan costs twice as much.
 float turn_of(vec2 p)
 {

@@ -77,9 +77,6 @@ vec3 all_orders(vec2 uv, int light)
 
 #else
 
-const float WIDEST_LOBE = 0.35;  // widest lobe for steps from order to order, rad/µm: 17 nm at 550
-const float LARGEST_STEP = 0.25; // largest step in k, rad/µm, which resolves colour matching
-
 // All lobes under the light's spectrum. Far from the mirror direction they are narrow in k: two points
 // at one standard deviation yield a lobe's mean to third order. Near it, the loop steps in k.
 vec3 all_orders(vec2 uv, int light)

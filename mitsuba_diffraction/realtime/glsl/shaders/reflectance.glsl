@@ -10,19 +10,16 @@
 uniform vec2 wavenumbers;        // ends of the visible range, rad/µm
 uniform vec3 channel_wavenumbers;  // at the mean wavelengths of red, green and blue, rad/µm
 
-#if SURFACE_KIND == DIELECTRIC
+// Place of a wavenumber in the visible range, 0 and 1 at its ends.
+float in_visible_range(float k)
+{
+    return (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x);
+}
 
-uniform float eta;               // index inside over index outside
+// `reflectance` is R in linear sRGB, under daylight. R at one wavenumber is the product of
+// `reflectance_at_all` for all wavenumbers and `reflectance_at` for this wavenumber.
 
-// R in linear sRGB, under daylight.
-vec3 reflectance(float cos_i) { return vec3(interface_reflectance(cos_i, eta)); }
-vec3 tinted(vec3 colour) { return colour; }  // R is nearly constant within a channel
-
-// R at one wavenumber: the product of a factor for all wavenumbers and one for this wavenumber.
-float reflectance_at_all(float cos_i) { return interface_reflectance(cos_i, eta); }
-float reflectance_at(float cos_i, float k) { return 1.0; }
-
-#elif SURFACE_KIND == CONDUCTOR
+#if SURFACE_KIND == CONDUCTOR
 
 uniform sampler2D reflectances;  // columns over cosθ, rows over k, the last row in linear sRGB; the
                                  // other channels have the index n + ik of the row
@@ -30,38 +27,35 @@ uniform vec3 channel_eta;        // the index at the mean wavelengths of red, gr
 uniform vec3 channel_k;
 uniform vec3 tint_0, tint_1, tint_2;  // columns of optics/colour.py's metal_tint
 
-vec4 conductor_row(float cos_i, int row)
-{
-    float last = float(textureSize(reflectances, 0).x - 1);
-    float x = clamp(cos_i, 0.0, 1.0) * last;
-    float lower = min(floor(x), last - 1.0);
-    vec4 left = texelFetch(reflectances, ivec2(int(lower), row), 0);
-    vec4 right = texelFetch(reflectances, ivec2(int(lower) + 1, row), 0);
-    return mix(left, right, x - lower);
-}
-
 vec3 reflectance(float cos_i)
 {
-    return conductor_row(cos_i, textureSize(reflectances, 0).y - 1).rgb;
+    return in_row(reflectances, cos_i, textureSize(reflectances, 0).y - 1).rgb;
 }
 
 vec3 tinted(vec3 colour) { return tint_0 * colour.r + tint_1 * colour.g + tint_2 * colour.b; }
 
 float reflectance_at_all(float cos_i) { return 1.0; }
 
-float reflectance_at(float cos_i, float k)
+// Row of the wavenumber nearest to k.
+int row_at(float k)
 {
     float last = float(textureSize(reflectances, 0).y - 2);
-    float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-    return conductor_row(cos_i, int(y + 0.5)).r;
+    return int(clamp(in_visible_range(k), 0.0, 1.0) * last + 0.5);
 }
+
+float reflectance_at(float cos_i, float k) { return in_row(reflectances, cos_i, row_at(k)).r; }
 
 #else
 
-vec3 reflectance(float cos_i) { return vec3(1.0); }
-vec3 tinted(vec3 colour) { return colour; }
-
+#if SURFACE_KIND == DIELECTRIC
+uniform float eta;               // index inside over index outside
+float reflectance_at_all(float cos_i) { return interface_reflectance(cos_i, eta); }
+#else
 float reflectance_at_all(float cos_i) { return 1.0; }
+#endif
+
+vec3 reflectance(float cos_i) { return vec3(reflectance_at_all(cos_i)); }
+vec3 tinted(vec3 colour) { return colour; }  // R is nearly constant within a channel
 float reflectance_at(float cos_i, float k) { return 1.0; }
 
 #endif

@@ -13,37 +13,19 @@ uniform vec3 view_axis;           // direction to an orthographic camera; zero o
 uniform vec4 light_place[LIGHTS];   // w = 0: direction to the light; w = 1: position
 uniform vec3 sky[4];              // irradiance over π: mean, and gradient along x, y, z
 
+// used only with the definitions of a feature
 uniform bool two_sided;
-#ifdef COLOUR_MAPPED
 uniform sampler2D colour_map;
 uniform mat3 colour_uv;
-#endif
-
-#ifdef LIVE
 uniform vec4 live_pigment;        // colour of the page's control; w = 1 where it replaces the scene's
-#endif
-
-#ifdef BUMPED
 uniform sampler2D bump_map;       // heights along the normal, in the scene's unit
 uniform mat3 bump_uv;
-#endif
-#ifdef NORMAL_MAPPED
 uniform sampler2D normal_map;
 uniform mat3 normal_uv;
-#endif
-#ifdef EMITTING
 uniform vec3 emission;            // radiance, on the side that the normal points to
-#endif
-#ifdef PIGMENT_IN_LIGHT
 uniform mat3 pigment_in_light;    // from a pigment's colour to its colour under this light
-#endif
-#ifdef WEIGHTED
 uniform float light_density;      // `lights.Light.density`
-#endif
-#if defined(SHADOWED) || defined(LOOKED_UP)
 uniform bool solid;               // closed surface, seen from outside: rays inwards are blocked
-#endif
-
 uniform float exposure;           // factor, for a display
 
 out vec4 fragment;
@@ -65,7 +47,7 @@ vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
 
 #endif
 
-#if defined(BUMPED) || defined(NORMAL_MAPPED)
+#if defined(BUMP_MAPPED) || defined(NORMAL_MAPPED)
 #define TURNED
 
 // Flip the slope of a perturbed normal that faces away from the eye, like Mitsuba's
@@ -89,7 +71,7 @@ float kept_by_facet(vec3 turned, vec3 n, vec3 direction)
 float kept_by_facet(vec3 turned, vec3 n, vec3 direction) { return 1.0; }
 #endif
 
-#ifdef BUMPED
+#ifdef BUMP_MAPPED
 
 float bump_at(ivec2 texel)
 {
@@ -134,11 +116,11 @@ void main()
     s *= inversesqrt(max(dot(s, s), 1e-20));
     vec3 t = cross(n, s);
     vec3 smooth_normal = n;
-#ifdef BUMPED
+#ifdef BUMP_MAPPED
     n = bumped(n);
 #endif
 #ifdef NORMAL_MAPPED
-    vec3 mapped = texture(normal_map, (normal_uv * vec3(v_texcoord, 1.0)).xy).xyz;
+    vec3 mapped = looked_up(normal_map, normal_uv, v_texcoord, false, false);
     n = normalize(mapped.x * s + mapped.y * t + mapped.z * n);
 #endif
     vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
@@ -154,11 +136,7 @@ void main()
 
     vec3 pigment = v_colour;
 #ifdef COLOUR_MAPPED
-    vec2 of_colour = (colour_uv * vec3(v_texcoord, 1.0)).xy;
-#ifdef COLOUR_CLAMPED
-    of_colour = within(of_colour, vec2(textureSize(colour_map, 0)));
-#endif
-    pigment = texture(colour_map, of_colour).rgb;
+    pigment = looked_up(colour_map, colour_uv, v_texcoord, COLOUR_CLAMPED, COLOUR_NEAREST);
 #endif
 #if defined(LIVE) && defined(DIFFRACTING)
     pigment = mix(pigment, live_pigment.rgb, live_pigment.a);

@@ -20,12 +20,7 @@ uniform vec2 repeats;               // copies of the patch, for pq
 vec3 response(float wavelength, int light)
 {
     float k = 2.0 * PI / wavelength;
-    float last = float(textureSize(responses, 0).x - 1);
-    float x = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-    float lower = min(floor(x), last - 1.0);
-    vec3 left = texelFetch(responses, ivec2(int(lower), light), 0).rgb;
-    vec3 right = texelFetch(responses, ivec2(int(lower) + 1, light), 0).rgb;
-    return mix(left, right, x - lower) * (k * k / (2.0 * PI));
+    return in_row(responses, in_visible_range(k), light).rgb * (k * k / (2.0 * PI));
 }
 
 float kernel(float apart, float exponent)
@@ -106,20 +101,4 @@ vec3 of_wavelength(vec2 uv, float z, float cos_half, float wavelength, int light
 {
     float reflected = reflectance_at(cos_half, 2.0 * PI / wavelength);
     return window_power(uv, z, wavelength) * reflected * response(wavelength, light);
-}
-
-// Trapezoidal rule over the whole spectrum; the last interval may be shorter.
-vec3 over_spectrum(vec2 uv, float z, float cos_half, int light)
-{
-    vec3 sum = vec3(0.0);
-    float intervals = ceil((last_wavelength - first_wavelength) / wavelength_step - 1e-3);
-    float before = 0.0;
-    for (int n = 0; n <= int(intervals); ++n) {
-        float wavelength = min(first_wavelength + float(n) * wavelength_step, last_wavelength);
-        float next = min(wavelength + wavelength_step, last_wavelength);
-        float weight = 0.5 * (before + next - wavelength);
-        before = next - wavelength;
-        sum += weight * of_wavelength(uv, z, cos_half, wavelength, light);
-    }
-    return reflectance_at_all(cos_half) * sum;
 }
