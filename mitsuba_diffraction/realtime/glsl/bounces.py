@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .maps import uploaded
 from .scene import RealtimeScene
-from .texels import Packed, listed
+from .texels import Packed, pack_grid
 
 Array = NDArray[np.float64]
 
@@ -56,15 +56,7 @@ def pack_bounces(mitsuba_scene: Any, scene: RealtimeScene) -> Packed:
     # entries of a cell: kind, axis, sign
     entries = light.transpose(3, 4, 5, 0, 2, 1, 6).reshape(-1, 3)
     half = np.minimum(np.pad(entries, [(0, 0), (0, 1)]), 6e4).astype(np.float16)
-    return Packed(
-        (listed("bounces", half),),
-        {
-            "bounces_low": tuple(low.tolist()),
-            "bounces_cell": cell,
-            "bounces_size": tuple(size.tolist()),
-        },
-        {"BOUNCES": ""},
-    )
+    return pack_grid("bounces", half, low, cell, size) | Packed(definitions={"BOUNCES": ""})
 
 
 #: Places of surfaces, directions that light leaves along or normals that it arrives at, and its

@@ -265,12 +265,10 @@ class ProgressiveLight:
     @property
     def image(self) -> NDArray[np.float32]:
         """Picture so far (height, width, 4): linear sRGB, and the coverage of each pixel."""
-        width, height = self._camera.size
-        total = np.zeros((height, width, 4), np.float32)
-        for target, count in zip(self._sums, self._counts, strict=True):
-            total += target.read() / np.float32(max(count, 1))
+        sums = zip(self._sums, self._counts, strict=True)
+        total = np.sum([target.read() / np.float32(max(count, 1)) for target, count in sums], 0)
         total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
-        return total
+        return np.asarray(total, np.float32)
 
     def release(self) -> None:
         resources: list[Any] = [self._add, self._mean, self._frame, *self._sums, self._map]

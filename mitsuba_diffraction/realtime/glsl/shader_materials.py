@@ -25,8 +25,8 @@ _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spe
 
 Array = NDArray[np.float64]
 
-#: Classes of BSDFs around another one, and the feature that is not supported, if any.
-_WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "", "NormalMap": "", "MaskBSDF": "mask"}
+#: Classes of BSDFs around another one; masks are not supported.
+_WRAPPERS = ("TwoSidedBRDF", "BumpMap", "NormalMap", "MaskBSDF")
 _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 
 #: Features that the shaders draw.
@@ -186,10 +186,10 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
 
     two_sided, bumps, normals = False, None, None
     while bsdf.class_name() in _WRAPPERS:
-        kind, lost = bsdf.class_name(), _WRAPPERS[bsdf.class_name()]
+        kind = bsdf.class_name()
         two_sided = two_sided or kind == "TwoSidedBRDF"
-        if lost:
-            omissions.append(f"the {lost} of {name}")
+        if kind == "MaskBSDF":
+            omissions.append(f"the mask of {name}")
         if kind == "BumpMap":
             bumps = raw_picture(bsdf, "nested_texture", 1, float(mi.traverse(bsdf)["scale"]))
         if kind == "NormalMap":

@@ -25,7 +25,7 @@ from ...plugin.properties import name_of
 from .lights import area_of, emitted_radiance, radiance_along
 from .scene import sample_normal
 from .shadows import frame_along
-from .texels import Packed, Texture, Uniform, as_half, listed
+from .texels import Packed, Texture, Uniform, as_half, pack_grid
 
 Array = NDArray[np.float64]
 
@@ -58,15 +58,8 @@ def pack_obstacles(triangles: Array) -> Packed:
         empty[z, y, x] = False
     distances = scipy.ndimage.distance_transform_edt(empty)
     steps = np.minimum(np.floor(_PER_CELL * distances), 255.0).astype(np.uint8)
-    return Packed(
-        (listed("obstacles", steps.reshape(-1, 1)),),
-        {
-            "obstacles_low": tuple(low.tolist()),
-            "obstacles_cell": cell,
-            "obstacles_size": tuple(size.tolist()),
-        },
-        {"OBSTACLES": str(255.0 / _PER_CELL)},
-    )
+    packed = pack_grid("obstacles", steps.reshape(-1, 1), low, cell, size)
+    return packed | Packed(definitions={"OBSTACLES": str(255.0 / _PER_CELL)})
 
 
 def _places(triangles: Array) -> Iterator[Array]:

@@ -75,6 +75,18 @@ def listed(name: str, entries: NDArray[np.generic]) -> Texture:
     return Texture(name, data.reshape(rows, PAGE, channels))
 
 
+def pack_grid(
+    name: str, entries: NDArray[np.generic], low: NDArray[Any], cell: float, size: NDArray[Any]
+) -> Packed:
+    """Pack entries of cells, x fastest, with a grid's lowest corner, side of a cell, and size."""
+    uniforms: dict[str, Uniform] = {
+        f"{name}_low": tuple(low.tolist()),
+        f"{name}_cell": cell,
+        f"{name}_size": tuple(size.tolist()),
+    }
+    return Packed((listed(name, entries),), uniforms)
+
+
 def texels(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """Arrange numbers (n, m) as texels of four, (n·⌈m/4⌉, 4), padded with zeros."""
     numbers = values.shape[1]

@@ -10,12 +10,6 @@
 uniform vec2 wavenumbers;        // ends of the visible range, rad/µm
 uniform vec3 channel_wavenumbers;  // at the mean wavelengths of red, green and blue, rad/µm
 
-// Place of a wavenumber in the visible range, 0 and 1 at its ends.
-float in_visible_range(float k)
-{
-    return (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x);
-}
-
 // `reflectance` is R in linear sRGB, under daylight. R at one wavenumber is the product of
 // `reflectance_at_all` for all wavenumbers and `reflectance_at` for this wavenumber.
 
@@ -40,7 +34,8 @@ float reflectance_at_all(float cos_i) { return 1.0; }
 int row_at(float k)
 {
     float last = float(textureSize(reflectances, 0).y - 2);
-    return int(clamp(in_visible_range(k), 0.0, 1.0) * last + 0.5);
+    float place = (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x);
+    return int(clamp(place, 0.0, 1.0) * last + 0.5);
 }
 
 float reflectance_at(float cos_i, float k) { return in_row(reflectances, cos_i, row_at(k)).r; }
@@ -49,13 +44,13 @@ float reflectance_at(float cos_i, float k) { return in_row(reflectances, cos_i, 
 
 #if SURFACE_KIND == DIELECTRIC
 uniform float eta;               // index inside over index outside
-float reflectance_at_all(float cos_i) { return interface_reflectance(cos_i, eta); }
+vec3 reflectance(float cos_i) { return vec3(interface_reflectance(cos_i, eta)); }
 #else
-float reflectance_at_all(float cos_i) { return 1.0; }
+vec3 reflectance(float cos_i) { return vec3(1.0); }
 #endif
 
-vec3 reflectance(float cos_i) { return vec3(reflectance_at_all(cos_i)); }
 vec3 tinted(vec3 colour) { return colour; }  // R is nearly constant within a channel
+float reflectance_at_all(float cos_i) { return reflectance(cos_i).r; }
 float reflectance_at(float cos_i, float k) { return 1.0; }
 
 #endif

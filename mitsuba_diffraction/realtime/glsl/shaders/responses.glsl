@@ -8,6 +8,6 @@ const float LARGEST_STEP = 0.25; // largest step in k, rad/µm, which resolves c
 vec3 response(float k, int light)
 {
     float last = float(textureSize(responses, 0).x - 1);
-    float x = in_visible_range(k) * last + 0.5;
+    float x = (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x) * last + 0.5;
     return texelFetch(responses, ivec2(int(clamp(x, 0.0, last)), light), 0).rgb;  // 0 at both ends
 }

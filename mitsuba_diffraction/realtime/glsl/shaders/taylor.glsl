@@ -20,7 +20,8 @@ uniform vec2 repeats;               // copies of the patch, for pq
 vec3 response(float wavelength, int light)
 {
     float k = 2.0 * PI / wavelength;
-    return in_row(responses, in_visible_range(k), light).rgb * (k * k / (2.0 * PI));
+    float place = (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x);
+    return in_row(responses, place, light).rgb * (k * k / (2.0 * PI));
 }
 
 float kernel(float apart, float exponent)
