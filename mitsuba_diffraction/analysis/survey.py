@@ -84,17 +84,16 @@ class Measured:
 
 def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
     """Measure one scan in this process; the row's `reason` has the error, if any."""
-    job.files.keep(contents or {})
-    lacking = job.files.missing()
-    if lacking:
-        raise MissingFiles(lacking)
     start = time.perf_counter()
     row: dict[str, Any] = {"reason": ""}
     files: dict[str, bytes] = {}
     try:
+        job.files.require(contents or {})
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DiffractionWarning)  # the row has the table's warnings
             files = _measure(job, row)
+    except MissingFiles:
+        raise
     except DiffractionError as error:
         row["reason"] = str(error)
     except Exception as error:  # one scan must not end a survey of a thousand

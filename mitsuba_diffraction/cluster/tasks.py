@@ -128,12 +128,7 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
         After any other error.
     """
     with failures():
-        task.files.keep(contents or {})
-        lacking = task.files.missing()
-        if {*lacking} & {*(contents or {})}:
-            raise DiffractionError("its files changed since the command began; run it again")
-        if lacking:
-            raise MissingFiles(lacking)
+        task.files.require(contents or {})
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
@@ -262,6 +257,18 @@ class SceneFiles:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 with atomic_path(copy) as temporary:
                     temporary.write_bytes(contents[digest])
+
+    def require(self, contents: Mapping[str, bytes]) -> None:
+        """Write copies of missing files, and check that none is missing. contents: by digest.
+
+        Raises `MissingFiles`, or a DiffractionError if contents are not those of their digests.
+        """
+        self.keep(contents)
+        lacking = self.missing()
+        if {*lacking} & {*contents}:
+            raise DiffractionError("its files changed since the command began; run it again")
+        if lacking:
+            raise MissingFiles(lacking)
 
     def here(self) -> tuple[Path, dict[str, str]]:
         """Return the scene and its values on this machine: in place, or copies of all."""

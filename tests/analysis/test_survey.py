@@ -21,6 +21,7 @@ from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_re
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
 from mitsuba_diffraction.tables.store import VARIABLE
 from mitsuba_diffraction.tables.table import DiffractionTable
 from tests.support.directions import rough_patch
@@ -311,3 +312,17 @@ def test_scans_of_different_sizes_are_measured_on_crops_of_one(survey, tmp_path)
         wide, narrow = csv.DictReader(file)
     assert float(wide["range_um_se"]) > 0.0
     assert narrow["range_um_se"] == ""
+
+
+def test_a_file_that_changed_since_the_survey_began_is_a_row(tmp_path):
+    """A worker asks for its content once, not again and again."""
+    file = tmp_path / "scan.npy"
+    np.save(file, np.zeros((16, 16)))
+    digests = SceneFiles.from_scene(file, {})
+    job = module.Job(digests, Treatment(), 30.0, 16, "llvm_ad_spectral", 1)
+    file.write_bytes(b"of another scan")
+    with pytest.raises(MissingFiles) as missing:
+        module.measure(job)
+    (digest,) = missing.value.digests
+    row = module.measure(job, {digest: file.read_bytes()}).row
+    assert row["reason"] == "its files changed since the command began; run it again"
