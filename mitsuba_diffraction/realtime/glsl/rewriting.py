@@ -6,6 +6,7 @@ Sources for other programs omit the code of features that a surface lacks, and p
 from __future__ import annotations
 
 import functools
+import operator
 import re
 from collections.abc import Iterable, Mapping
 from importlib import resources
@@ -28,7 +29,7 @@ def declared_names() -> frozenset[str]:
     return frozenset(name for file in files for name in global_names(shader_file(file.name)))
 
 
-_CONDITIONS = {"#ifdef": "defined({})", "#ifndef": "!defined({})", "#if": "{}"}
+_COMPARISONS = {"==": operator.eq, "!=": operator.ne, ">": operator.gt, "<": operator.lt}
 
 
 def resolved(source: str, definitions: Mapping[str, str]) -> str:
@@ -39,15 +40,15 @@ def resolved(source: str, definitions: Mapping[str, str]) -> str:
     macros, kept = dict(definitions), []
     nest: list[tuple[bool, bool]] = []  # whether a branch is active, whether one has been
     for line in source.splitlines():
-        word, _, rest = line.partition("//")[0].strip().partition(" ")
+        word, _, rest = line.strip().partition(" ")
         active = all(now for now, _ in nest)
-        if word in _CONDITIONS:
-            holds = active and _holds(_CONDITIONS[word].format(rest), macros)
+        if word in ("#ifdef", "#ifndef", "#if"):
+            holds = active and _holds(word, rest, macros)
             nest.append((holds, holds))
         elif word in ("#elif", "#else"):
             _, done = nest.pop()
             outer = all(now for now, _ in nest)
-            holds = outer and not done and (word == "#else" or _holds(rest, macros))
+            holds = outer and not done and (word == "#else" or _holds("#if", rest, macros))
             nest.append((holds, done or holds))
         elif word == "#endif":
             nest.pop()
@@ -59,13 +60,28 @@ def resolved(source: str, definitions: Mapping[str, str]) -> str:
     return re.sub(r"\n{3,}", "\n\n", "\n".join(kept)).strip() + "\n"
 
 
-def _holds(condition: str, macros: Mapping[str, str]) -> bool:
-    """Evaluate terms `defined(A)`, `!defined(A)` and comparisons of integers, joined by &&."""
-    condition = re.sub(r"defined\((\w+)\)", lambda m: str(m[1] in macros), condition)
-    while (replaced := _NAME.sub(lambda m: macros.get(m[0], m[0]), condition)) != condition:
-        condition = replaced
-    condition = condition.replace("&&", " and ").replace("!F", "not F").replace("!T", "not T")
-    return bool(eval(condition, {"__builtins__": {}}))  # of the package's own files
+def _holds(word: str, rest: str, macros: Mapping[str, str]) -> bool:
+    """Evaluate a condition: `A`, or terms `defined(A)` and comparisons joined by &&."""
+    if word != "#if":
+        return (rest.split()[0] in macros) == (word == "#ifdef")
+    return all(_term(term.strip(), macros) for term in rest.split("&&"))
+
+
+def _term(term: str, macros: Mapping[str, str]) -> bool:
+    """Evaluate `defined(A)`, `!defined(A)` or a comparison of integers."""
+    match = re.fullmatch(r"(!?)defined\((\w+)\)", term)
+    if match:
+        return (match[2] in macros) != bool(match[1])
+    left, sign, right = term.split()
+    a, b = _number(left, macros), _number(right, macros)
+    return bool(_COMPARISONS[sign](a, b))
+
+
+def _number(word: str, macros: Mapping[str, str]) -> int:
+    """Value of an integer literal, or of a macro that stands for one."""
+    while word in macros:
+        word = macros[word].split()[0]
+    return int(word)
 
 
 def global_names(source: str) -> set[str]:
