@@ -261,7 +261,7 @@ class SceneFiles:
     def require(self, contents: Mapping[str, bytes]) -> None:
         """Write copies of missing files, and check that none is missing. contents: by digest.
 
-        Raises `MissingFiles`, or a DiffractionError if contents are not those of their digests.
+        Raises `MissingFiles`, or a DiffractionError if a content has another digest.
         """
         self.keep(contents)
         lacking = self.missing()
