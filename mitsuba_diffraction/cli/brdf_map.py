@@ -105,7 +105,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if there is no such look, the pigment is a picture, or an option for
+    Raises a DiffractionError if no look has the name, the pigment is a picture, or an option for
     reading heights does not fit.
     """
     if (args.source is None) == (args.preset is None):

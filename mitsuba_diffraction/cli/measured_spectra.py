@@ -66,7 +66,7 @@ class Measurement:
         return [self._with_band(self._of_heights(patches, file, how), patches, file, how)]
 
     def say_notes(self) -> None:
-        """Print on how many scans there are notes beside the first one's."""
+        """Print the number of scans with notes, beside the notes of the first scan."""
         if self._noted > 1:
             others = "1 more scan" if self._noted == 2 else f"{self._noted - 1} more scans"
             say(f"notes on {others}: 'mitsuba-diffraction info' prints them")

@@ -102,7 +102,7 @@ def rendered(
                 scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
             )
     if result.spp == 0:
-        raise KeyboardInterrupt  # before the first pass: there is no picture
+        raise KeyboardInterrupt  # interrupted before the first pass, without a picture
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         args.code = INTERRUPTED

@@ -92,7 +92,7 @@ def shape_of(table: DiffractionTable) -> tuple[int, ...]:
 def with_coefficients(table: DiffractionTable, coefficients: NDArray[Any]) -> DiffractionTable:
     """Return a table read by `parse_document` with its coefficients.
 
-    Raises a ValueError if they are not finite, or larger than any surface's.
+    Raises a ValueError if numbers are not finite, or larger than any surface has.
     """
     _check_sizes(coefficients, table.expansion, table.scale)
     return dataclasses.replace(table, coefficients=coefficients)

@@ -144,7 +144,8 @@ def means(
     lobe = 1.0 / (math.sqrt(2.0) * sigma * float(wavenumber(wavelengths[0])))
     x, y, band = sub_samples(min(max(math.ceil(0.5 * (size / lobe) ** 2), 1), _MOST_SAMPLES)).T
     step = float(wavelengths[1] - wavelengths[0]) if len(wavelengths) > 1 else 0.0
-    pattern = np.stack([_tent(x), _tent(y), (band - 0.5) * step, band], axis=1)
+    # a fourth number, so that one packet load fetches a place
+    pattern = np.stack([_tent(x), _tent(y), (band - 0.5) * step, np.zeros(len(x))], axis=1)
     places, packet = upload(mi.Float, pattern.astype(np.float32)), len(mi.UnpolarizedSpectrum())
     count = len(cells.nodes[0])
     result = np.empty((count, len(wavelengths)), np.float32)

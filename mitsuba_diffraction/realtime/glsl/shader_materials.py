@@ -25,7 +25,7 @@ _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spe
 
 Array = NDArray[np.float64]
 
-#: Classes of BSDFs around another one; masks are not supported.
+#: Classes of BSDFs that wrap another BSDF; masks are not supported.
 _WRAPPERS = ("TwoSidedBRDF", "BumpMap", "NormalMap", "MaskBSDF")
 _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 

@@ -272,7 +272,7 @@ class _Part:
     Attributes
     ----------
     source : the interval of κ.
-    targets : those of z that it adds to, a run of them.
+    targets : consecutive intervals of z that the contribution is added to.
     wavelengths : the run of wavelengths.
     matrix : (wavelengths·terms, targets·3·terms).
     """

@@ -110,7 +110,7 @@ def _written(
 
 
 def _add(file: Any, name: str, axes: Sequence[str], numbers: NDArray[np.int16]) -> None:
-    """Add packed efficiencies, and those of their dimensions that the file lacks."""
+    """Add packed efficiencies, and the dimensions that the file lacks."""
     for axis, size in zip(axes, numbers.shape, strict=True):
         if axis not in file.dimensions:
             file.createDimension(axis, size)
