@@ -180,7 +180,7 @@ def test_modules_that_it_names_exist(page):
     ids=lambda value: value if value in PAGES else "",
 )
 def test_xml_blocks_set_parameters_that_exist(page, text, some_variant):
-    from mitsuba_diffraction.plugin.surface_parameters import NAMES
+    from mitsuba_diffraction.plugin.parameters import NAMES
 
     root = ElementTree.fromstring(f"<scene>{text}</scene>")
     for plugin, names in NAMES.items():

@@ -49,7 +49,7 @@ def test_xml_example_loads():
 
 def test_its_table_of_parameters_names_those_of_the_plugin():
     mi.set_variant("llvm_ad_spectral")
-    from mitsuba_diffraction.plugin.surface_parameters import NAMES
+    from mitsuba_diffraction.plugin.parameters import NAMES
 
     known = set(NAMES["diffraction"])
     assert any(len(names) >= 10 and names <= known for names in first_columns("README.md"))

@@ -12,7 +12,7 @@ from ..errors import DiffractionError
 from ..optics.materials import PERFECT, lets_light_through, material_named
 from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.pigment import pigment_range
-from ..plugin.support import CONDUCTOR, refusal
+from ..plugin.parameters import refusal
 
 Reals = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
     least, most = pigment_range(pigment)
     if pigment not in (None, "none") and material is not None and not lets_light_through(material):
         choice = f"material={material}, which lets no light through"
-        raise DiffractionError(refusal("the pigment", replace(CONDUCTOR, choice=choice)))
+        raise DiffractionError(refusal("the pigment", choice))
     return max(first, least), min(last, most)
 
 

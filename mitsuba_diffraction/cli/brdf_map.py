@@ -322,10 +322,9 @@ def _surface(bsdf: Any) -> str:
     if described.solved:
         width = f"coherence width {described.coherence_width:g} µm"
         return "; ".join([described.text, width, *turned])
-    model = f"{described.model}, second order" if described.second_order else described.model
     return "; ".join(
         [
-            "R = 1" if described.text == "none" else f"{described.text}, {model}",
+            "R = 1" if described.text == "none" else f"{described.text}, {described.model}",
             f"{described.coherence}, coherence width {described.patch.width_text}",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *turned,

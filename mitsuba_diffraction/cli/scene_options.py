@@ -144,7 +144,7 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
 def _change_look(args: argparse.Namespace) -> None:
     """Put parameters of the surface behind the look that replaces the studio's surface."""
-    from ..plugin.surface_parameters import NAMES, REFLECTING
+    from ..plugin.parameters import NAMES, REFLECTING
 
     changes = [f",{name}={value}" for name, value in args.parameters if name in NAMES[REFLECTING]]
     args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]

@@ -59,10 +59,6 @@ OSL = Consumer(
         "as its stretch",
         Feature.TRANSMISSION: "export a table of the reflecting side, or render it with Mitsuba",
     },
-    left_out={
-        Feature.SECOND_ORDER: "colours in oblique light differ by several per cent; gratings can "
-        "be solved instead (docs/orders.md)"
-    },
 )  # fmt: skip
 
 #: Words of OSL's grammar, in use and kept for later (OSL language specification, section 2).

@@ -43,6 +43,11 @@ def float_of(index: Index) -> Float:
     return mi.Float(mi.Int32(index))
 
 
+def plain(number: Float) -> float:
+    """Return the number that all lanes share, without derivatives."""
+    return float(dr.slice(dr.detach(number)))
+
+
 class _Kernel:
     """Arithmetic of the numbers of the current variant."""
 

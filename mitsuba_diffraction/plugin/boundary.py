@@ -29,11 +29,9 @@ from ..optics.boundary import (
 )
 from ..optics.coat import Crossing, coated_power, crossing, transmitted
 from .arithmetic import clip, index_of, maximum
-from .directions import Pair, TablePoint
-from .fresnel import Inside, Perfect, Reflectance
-from .layers import CoatedPair, UnderFilm
+from .directions import CoatedPair, Pair, TablePoint
+from .materials import Material, Perfect
 from .memory import index_between, read_record, upload
-from .stack import UnderStack
 from .types import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The model of flat faces and of a perfect reflector, which has no index.
@@ -76,10 +74,10 @@ class Boundary:
     """
 
     model: Model
-    material: Reflectance | Inside | UnderFilm | UnderStack
+    material: Material
     statistic: HeightStatistic | None = None
 
-    def of(self, material: Inside) -> Boundary:
+    def of(self, material: Material) -> Boundary:
         """Return the model of another material on the same heights."""
         return replace(self, material=material)
 
@@ -101,16 +99,15 @@ class Boundary:
             return mi.depolarizer(mi.UnpolarizedSpectrum(dr.square(pair.one_plus_dot)))
         light = LightPath.of(pair, mode)
         indices = self.material.indices(si, active)
-        if isinstance(self.material, UnderFilm):
-            wavenumbers = self.material.wavenumbers(wavenumbers)
-        heights = self.heights(pair, height_scale, wavenumbers)
+        heights = self.heights(pair, height_scale, self.material.wavenumbers(wavenumbers))
         if len(indices) == 1:  # one index at all wavelengths
             indices = indices * len(heights)
         elif len(heights) == 1:
             heights = heights * len(indices)
         channels = list(zip(indices, heights, strict=True))
         if self.model.power is not None and not (mi.is_polarized or light.passed):
-            return self._channels([self.model.power(light.pair, index) for index in indices])
+            powers = [self.model.power(light.pair, index) for index in indices]
+            return self.material.channels(powers)
         matrices = [self.model.jones(light.pair, *channel) for channel in channels]
         if light.passed:
             outside = transmitted if mi.is_polarized else coated_power
@@ -120,7 +117,7 @@ class Boundary:
             ]
         else:
             results = matrices if mi.is_polarized else [power(jones) for jones in matrices]
-        return light.mueller(results) if mi.is_polarized else self._channels(results)
+        return light.mueller(results) if mi.is_polarized else self.material.channels(results)
 
     def heights(
         self, pair: Pair | TablePoint, height_scale: Float, wavenumbers: list[Float]
@@ -130,18 +127,11 @@ class Boundary:
             return [None]
         return [*self.statistic.at(pair, height_scale, wavenumbers)]
 
-    def _channels(self, powers: list[Float]) -> Spectrum:
-        if isinstance(self.material, UnderFilm):
-            powers = self.material.summed(powers)
-        return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
-
     def __str__(self) -> str:
         return self.model.name
 
 
-def boundary_of(
-    model: str, material: Reflectance | UnderFilm | UnderStack, roughness: RoughnessTable
-) -> Boundary:
+def boundary_of(model: str, material: Material, roughness: RoughnessTable) -> Boundary:
     """Return the boundary of a model; a perfect reflector, without an index, has Kirchhoff's."""
     chosen = KIRCHHOFF if isinstance(material, Perfect) else model_of(model)
     if chosen.statistic is None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.materials import METALS, TISSUES
+from .parameter_changes import children
 from .types import Texture
 
 Array = NDArray[Any]
@@ -61,39 +62,25 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
     return nodes, np.asarray(eta + 1j * k)
 
 
-def parameters_of(material: str) -> dict[str, Any]:
-    """Return a material as parameters of Mitsuba's BSDF `conductor`."""
-    tissue = TISSUES.get(material)
-    if tissue is None:
-        return {"material": material}
-    parts = {"eta": tissue.index(tissue.nodes).real, "k": tissue.index(tissue.nodes).imag}
-    pairs = {
-        name: list(zip(tissue.nodes.tolist(), part.tolist(), strict=True))
-        for name, part in parts.items()
-    }
-    spectra = {name: {"type": "spectrum", "value": values} for name, values in pairs.items()}
-    # Mitsuba refuses spectra that are 0 everywhere
-    return spectra if tissue.absorbs else spectra | {"k": {"type": "uniform", "value": 0.0}}
+def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
+    """Return a number over wavelength as a texture, constant beyond its nodes (nm).
 
-
-def texture_at(material: str, name: str, wavelength: float) -> Texture:
-    """Part of a material's index at one wavelength, as a texture."""
-    value = float(tabulated(material, name, wavelength))
-    return mi.load_dict({"type": "uniform", "value": value})
-
-
-def extended_texture(material: str, name: str) -> Texture:
-    """Part of a material's index as a texture, constant beyond the ends of the table.
-
-    Mitsuba's own has the index 0 there.
+    wavelength : nm, where mono variants take it; Mitsuba's is a mean over the spectrum.
     """
-    nodes, _ = _table(material, name)
-    nodes = np.union1d(nodes, [SHORTEST, LONGEST])
-    wavelengths, values = (
-        ", ".join(map(str, numbers.tolist()))
-        for numbers in (nodes, tabulated(material, name, nodes))
-    )
-    return mi.load_dict({"type": "irregular", "wavelengths": wavelengths, "values": values})
+    if mi.is_monochromatic or not values.any():  # Mitsuba refuses spectra that are 0 everywhere
+        value = float(np.interp(wavelength, nodes, values))
+        return mi.load_dict({"type": "uniform", "value": value})
+    ends = np.union1d(nodes, [SHORTEST, LONGEST])  # Mitsuba has 0 beyond
+    extended = np.interp(ends, nodes, values)
+    if mi.is_spectral:
+        lists = (", ".join(map(str, numbers.tolist())) for numbers in (ends, extended))
+        return mi.load_dict(
+            {"type": "irregular", **dict(zip(("wavelengths", "values"), lists, strict=True))}
+        )
+    # a conductor's spectra are without bounds in RGB variants
+    eta = {"type": "spectrum", "value": list(zip(nodes.tolist(), values.tolist(), strict=True))}
+    none = {"type": "uniform", "value": 0.0}
+    return children(mi.load_dict({"type": "conductor", "eta": eta, "k": none}))["eta"]
 
 
 def tabulated(material: str, name: str, wavelengths: Array | float) -> Array:

@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Mapping
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -15,9 +14,9 @@ from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 from .arithmetic import clip
 from .description import Surface, describe
-from .parameter_changes import Bounded, Changeable, ObjectValues
-from .textures import range_of, require_raw
-from .types import BSDF, Float, Interaction, Mask, Properties, Texture
+from .properties import number
+from .types import BSDF, Float, Interaction, Mask, Properties
+from .varying import Varying
 
 #: Parameter of `diffraction_mix`, and header of a table.
 DEPTH = "depth"
@@ -53,32 +52,15 @@ class DepthWeights:
                 )
         self._ordered = ordered
         self.ends = self._depths[ordered[0]], self._depths[ordered[-1]]
-        value = props.get(DEPTH)
-        self.depth: Bounded | Texture
-        if isinstance(value, mi.Texture):
-            require_raw(value, DEPTH, "depths, µm")
-            self.depth = value
-        else:
-            self.depth = self._bounded(value)
-
-    @property
-    def parameters(self) -> list[Changeable]:
-        """The depth, for `mi.traverse`."""
-        bounded = isinstance(self.depth, Bounded)
-        return [self.depth if bounded else ObjectValues(DEPTH, self.depth)]
-
-    @property
-    def textures(self) -> list[Texture]:
-        """The depth, if it varies."""
-        return [] if isinstance(self.depth, Bounded) else [self.depth]
+        value: Any = dict(props.objects()).get(DEPTH)
+        value = number(props, DEPTH, 0.0) if value is None else value
+        # bounds are of single precision, and so are values but in scalar variants
+        ends = (float(np.float32(end)) for end in self.ends)
+        self.depth = Varying(DEPTH, value, *ends, advice=" µm, the depths of the surfaces")
 
     def at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the weights, in the order of the surfaces."""
-        low, high = self.ends
-        if isinstance(self.depth, Bounded):
-            depth = clip(self.depth.value, low, high)
-        else:
-            depth = clip(self.depth.eval_1(si, active), low, high)
+        depth = clip(self.depth.at(si, active), *self.ends)
         steps = [
             clip((depth - self._depths[a]) * (1.0 / (self._depths[b] - self._depths[a])), 0.0, 1.0)
             for a, b in itertools.pairwise(self._ordered)
@@ -89,36 +71,6 @@ class DepthWeights:
             zip(self._ordered, (a - b for a, b in itertools.pairwise(shares)), strict=True)
         )
         return [weights[name] for name in self._depths]
-
-    def refusal(self) -> str | None:
-        """Reason to refuse a texture's numbers, or None."""
-        if isinstance(self.depth, Bounded) or (known := range_of(self.depth)) is None:
-            return None
-        wrong = [value for value in known if not self._holds(value)]
-        return self._message(wrong[0]) if wrong else None
-
-    def _holds(self, value: float) -> bool:
-        low, high = (float(np.float32(end)) for end in self.ends)
-        return low <= value <= high
-
-    def _message(self, value: float) -> str:
-        low, high = self.ends
-        return f"{DEPTH}={value:g} µm must be {low:g} to {high:g} µm, the depths of the surfaces"
-
-    def _bounded(self, value: Any) -> Bounded:
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = np.nan
-        if not self.ends[0] <= number <= self.ends[1]:
-            raise DiffractionError(self._message(number))
-        # bounds are of single precision, and so are values but in scalar variants
-        return Bounded(DEPTH, float(np.float32(number)), *self.ends, self._message)
-
-    def __str__(self) -> str:
-        if isinstance(self.depth, Bounded):
-            return f"{dr.slice(self.depth.value):g} µm"
-        return " ".join(str(self.depth).split())
 
 
 def _table_of(name: str, bsdf: BSDF) -> OrderTable | CrossedTable:

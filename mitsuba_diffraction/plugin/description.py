@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, warn
 from ..heights.field import HeightField
 from ..optics.geometry import sigma_of
-from ..optics.slope_ratios import SlopeRatios
 from ..tables.directional import DirectionalTable
 from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
@@ -44,7 +43,6 @@ class Feature(Enum):
     SMALL_SLOPE = "model", "model='small_slope'"
     KIRCHHOFF = "model", "model='kirchhoff'"
     OWN_MODEL = "model", "model='{model}'"
-    SECOND_ORDER = "", "the second order of small slope (second_order)"
     ENERGY_SCALE = "", "a scale of energy (energy_conserving)"
     SHADOWING = "", "shadowing='vcavity'"
     PATCH = "coherence", "speckle (coherence='patch')"
@@ -56,7 +54,8 @@ class Feature(Enum):
     ORIENTATION = "", "an orientation other than 0"
     VARYING_ORIENTATION = "", "an orientation that varies"
     NESTED = "", "a BSDF beneath"
-    THESIS = "", "layering='thesis'"
+    OPAQUE = "", "a material or layer that absorbs the light that is not reflected"
+    COLOURS = "", "an RGB variant, whose light has no wavelengths to tell speckle by"
 
     def phrase(self, model: str = "") -> str:
         """Return the feature as messages call it; model : name of the boundary model."""
@@ -108,36 +107,8 @@ class Film:
     thickness: float
 
 
-@dataclass(frozen=True)
-class SecondOrder:
-    """Second order of small slope: index of its coefficients, and slope ratios of the heights."""
-
-    index: float
-    ratios: SlopeRatios
-
-
-@dataclass(frozen=True)
-class Energy:
-    """Scales of directions, as functions of the height scale.
-
-    Attributes
-    ----------
-    scale : s of wavelengths and directions on `tables.directional.FINE`; None where all are 1. The
-        BSDF is multiplied by s(ωi) s(ωo).
-    reflected : albedo over the flat interface's reflectance, by which light goes on to a nested
-        BSDF; None where the flat reflectance decides.
-    """
-
-    scale: Callable[[float], DirectionalTable | None]
-    reflected: Callable[[float], DirectionalTable | None]
-
-
-@dataclass(frozen=True)
-class Nested:
-    """BSDF beneath a surface; `weight` is the diffuse weight of layering `thesis`, else None."""
-
-    bsdf: BSDF
-    weight: float | None = None
+def _none(height_scale: float) -> DirectionalTable | None:
+    return None
 
 
 def _unturned(si: Interaction) -> tuple[Any, Any, Any]:
@@ -162,7 +133,11 @@ class Surface:
     largest_scale : largest height scale of the table.
     material, coat, film : material of the structure; index of a coat over the medium above it.
     model : name of the boundary model; empty for solved orders.
-    second_order, energy, nested : see their classes; None where the surface has none.
+    energy_scale : scale s of directions and wavelengths as a function of the height scale, on
+        `tables.directional.FINE`; None where all are 1. The BSDF is multiplied by s(ωi) s(ωo).
+    reflected : likewise, albedo over the flat interface's reflectance, by which light goes on to a
+        nested BSDF; None where the flat reflectance decides.
+    nested : the BSDF beneath, or None.
     shadowing : whether grooves shadow each other (`vcavity`).
     transmits : whether light goes through.
     stacked : whether a stack of layers lies on the structure.
@@ -182,9 +157,9 @@ class Surface:
     coat: float | None = None
     film: Film | None = None
     model: str = ""
-    second_order: SecondOrder | None = None
-    energy: Energy | None = None
-    nested: Nested | None = None
+    energy_scale: Callable[[float], DirectionalTable | None] = _none
+    reflected: Callable[[float], DirectionalTable | None] = _none
+    nested: BSDF | None = None
     shadowing: bool = False
     transmits: bool = False
     stacked: bool = False
@@ -219,7 +194,6 @@ class Surface:
         """Return all features that the surface has."""
         known = {"": None, "small_slope": Feature.SMALL_SLOPE, "kirchhoff": Feature.KIRCHHOFF}
         turned, tall, wide = self.orientation, self.height_scale, self.lateral_scale
-        scales = self.energy is not None and not tall.texture
         present = {
             Feature.ORDERS: self.orders is not None,
             Feature.CROSSED: isinstance(self.table, CrossedTable),
@@ -229,8 +203,7 @@ class Surface:
             Feature.COAT: self.coat is not None,
             Feature.FILM: self.film is not None,
             Feature.STACK: self.stacked,
-            Feature.SECOND_ORDER: self.second_order is not None,
-            Feature.ENERGY_SCALE: scales and self.energy_scale(tall.number) is not None,
+            Feature.ENERGY_SCALE: not tall.texture and self.energy_scale(tall.number) is not None,
             Feature.SHADOWING: self.shadowing,
             Feature.PATCH: self.coherence == "patch",
             Feature.PLACED: self.coherence == "surface",
@@ -241,16 +214,11 @@ class Surface:
             Feature.ORIENTATION: turned.texture is None and turned.number != 0.0,
             Feature.VARYING_ORIENTATION: turned.texture is not None,
             Feature.NESTED: self.nested is not None,
-            Feature.THESIS: self.nested is not None and self.nested.weight is not None,
         }
         kind = None if self.material is None else self.material.kind
         chosen = (kind, known.get(self.model, Feature.OWN_MODEL))
         found = {feature for feature, has in present.items() if has}
         return found | {feature for feature in chosen if feature is not None}
-
-    def energy_scale(self, height_scale: float) -> DirectionalTable | None:
-        """See `Energy.scale`; None without scales of energy."""
-        return None if self.energy is None else self.energy.scale(height_scale)
 
 
 @dataclass(frozen=True)

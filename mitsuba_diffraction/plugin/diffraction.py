@@ -120,9 +120,7 @@ film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
     alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
     above it. The index relative to the medium above is the differentiable parameter `film_eta`.
-    Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
-    costs a second or two at loading, is cached, and follows the film in steps of 1 nm and 0.01,
-    or 0.001 of thick films. Derivatives with respect to the film include it.
+    Excludes a coat.
 film_thickness : float ∂ [none]
     Thickness of the film along the vertical, nm. 2 n d is at most 12 µm, the coherence length. RGB
     variants sum the film's colours over wavelengths, apart from the orders.
@@ -140,18 +138,7 @@ model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
     matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
-    index, and of layering `thesis`.
-second_order : string or boolean [auto]
-    Multiplies orders by the second order of small slope (Voronovich 1994), a factor of directions
-    and of the heights' slopes. `auto` applies it if the second order changes the table's colours by
-    5 % or more: on discs and blazed gratings, not on skins. `true` applies it wherever it is known:
-    light that a dielectric denser than the medium above it reflects, bare or under a coat, by model
-    `small_slope`, in an ensemble, without layering `thesis`; elsewhere it is refused. `false`
-    leaves it out. The change is measured when the table is built, for index 1.5 in light from 60°
-    and heights as they are (`mitsuba-diffraction info`). For light from 60° it lowers the error of
-    colours on a CD's pits from a third to a tenth (docs/validation.md). Polarised variants multiply
-    matrices by the factor for unpolarised light. Order 0, sampled directions and the light for what
-    lies beneath are the same without it. Coefficients follow the index in steps of 0.01.
+    index.
 energy_conserving : boolean [true]
     Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
     The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
@@ -166,21 +153,14 @@ shadowing : string [none]
 The light beneath
 -----------------
 (nested) : BSDF ∂
-    BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected.
+    BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected:
+    T(ωi) T(ωo) with T = 1 − a and a the albedo of the surface; under a coat, of both flat faces.
     Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; the nested BSDF's
     components follow.
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
     or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
     picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
-layering : string [transmission]
-    Share of the light for the nested BSDF. `transmission`: T(ωi) T(ωo) with T = 1 − a and a the
-    albedo of the diffracting surface; under a coat, the reflectance of both flat faces. `thesis`:
-    (1 − w) f_diffraction + (1 − F + w) f_nested with F at the half vector, as in the thesis of 2014
-    that the method comes from. It gains energy and is for comparisons with the thesis only.
-diffuse_weight : float [0]
-    Weight w of layering `thesis`.
-
 Variants
 --------
 wavelength : float [550]
@@ -232,48 +212,46 @@ import drjit as dr
 import mitsuba as mi
 
 from ..optics.geometry import vcavity
-from ..tables.directional import DirectionalTable
-from .arithmetic import maximum
+from . import parameters as read
+from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
-from .description import Energy, Nested, SecondOrder, Surface
-from .diffraction_parameters import read_parameters
-from .directions import Pair, Site
-from .energy import EnergyModel
-from .layers import Blend, CoatedPair, Transmission, UnderFilm, plain
+from .description import Feature, Surface
+from .directions import SHADOWINGS, CoatedPair, Pair, Site
+from .energy import ReflectedEnergy
+from .layers import UnderCoat
+from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
-from .sources import TableProvider, from_cache
-from .support import ABSORBING, refusal
 from .surface import DiffractingSurface
-from .types import (
-    Colour,
-    Context,
-    Float,
-    Mask,
-    Properties,
-    Spectrum,
-    Vector2f,
-    Vector3f,
-)
+from .types import Colour, Context, Float, Mask, Properties, Spectrum, Vector2f, Vector3f
 
 
 class Diffraction(DiffractingSurface):
     """Reflection by a surface that diffracts, in the symbols and equations of `reference.model`.
 
     f cosθo = N' ⟨|P|²⟩ / (λ² A w² cosθi),   N' = (2 cosθi cosθo)² N,   is eq. 4 times cosθo.
+
+    Attributes
+    ----------
+    coat : the clear layer over the structure, or None; mirror : its face.
+    vcavity : whether the surface shadows itself like V-shaped grooves.
     """
 
     title = "Diffraction"
 
-    def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
-        read = read_parameters(props, provider)
-        super().__init__(props, read.surface, read.reflectance, read.nested)
-        # self.fresnel is the flat surface with its layers, self.boundary the structure alone
-        self.boundary, self.coat = read.boundary, read.coat
-        self.mirror = None if self.coat is None else Boundary(KIRCHHOFF, self.coat)
-        self.layering, self.vcavity = read.layering, read.vcavity
-        self._second_order = read.second_order
-        mean, conserving = read.surface.mean_table, read.surface.energy_conserving
-        self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving, self.coat)
+    def __init__(self, props: Properties) -> None:
+        nested = read.nested_of(props, read.REFLECTING)
+        coat = read.coat_of(props)
+        optical = 1.0 if coat is None else plain(coat.eta)
+        super().__init__(props, nested, read.material_of(props, coat), optical)
+        self.coat = coat
+        self.vcavity = choice(props, "shadowing", SHADOWINGS) == "vcavity"
+        if self.coat is not None:
+            self.fresnel = UnderCoat(self.boundary.material, self.coat)
+            self.mirror = Boundary(KIRCHHOFF, self.coat)
+        self.energy: ReflectedEnergy = ReflectedEnergy(
+            self.mean_table, self.wavelength, self.boundary, self.coat, self.energy_conserving,
+            beneath=nested is not None and self.coat is None,
+        )  # fmt: skip
         self.ready()
 
     # ------------------------------------------------------------------ the diffraction
@@ -281,33 +259,22 @@ class Diffraction(DiffractingSurface):
     def diffracted(
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `NestingBSDF.diffracted`."""
-        # Eq. 1: (u, v, w) = ωi + ωo
-        pair = self._pair(site, wo, active)
+        """See `SurfaceBSDF.diffracted`."""
+        # Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one
+        pair = Pair(site.si, wo, site.frame, active)
+        if self.coat is not None:
+            pair = CoatedPair(pair, self.coat.eta)
         drawing = self._drawing_scale(site)
         if kinds == "d":
-            return mi.Spectrum(0.0), with_even_share(
-                self.power.density(pair.outer, drawing, site.si)
-            )
+            density = self.power.density(pair.outer, drawing, site.si)
+            return mi.Spectrum(0.0), with_even_share(density)
         # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
         if kinds == "v":
             power, density = self.power.power(pair, site.scale, site.si), mi.Float(0.0)
         else:
             power, density = self.power.both(pair, site.scale, drawing, site.si)
-        # Eq. 4 to 10: times N' of the material and the rest
-        value = self.light(ctx, site, pair, power, active)
-        return self.layering.diffraction_share * value, with_even_share(density)
-
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `NestingBSDF.normal_reflectance`."""
-        reflectance = super().normal_reflectance(site, active)
-        if self.nested is not None:
-            reflectance *= self.layering.diffraction_share
-        return reflectance
-
-    def reflected_share(self, site: Site, active: Mask) -> Colour:
-        """See `NestingBSDF.reflected_share`."""
-        return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
+        # Eq. 4 to 9: times N' of the material and the rest
+        return self.light(ctx, site, pair, power, active), with_even_share(density)
 
     def light(self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask) -> Spectrum:
         """Return f cosθo of the structure, and of the coat's face where there is one.
@@ -318,143 +285,83 @@ class Diffraction(DiffractingSurface):
         factor = self.geometry(pair)
         if self.vcavity:
             factor *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        if self._second_order is not None:
-            # Eq. 10: Σ F_j |a_j|². Only power beyond a mirror's lobe is taken for orders other than
-            # 0: order 0 cannot exceed that lobe. Weaker orders beneath it stay uncorrected
-            mirror = dr.abs(self.power.flat(pair, site.si))
-            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
-            added = self._second_order.added(pair, site.scale, site.wavenumbers)
-            power = power + others * mi.UnpolarizedSpectrum(added)
         if not mi.is_rgb:
-            power = dr.maximum(power, 0.0)  # cut series, and the second order, may be below
+            power = dr.maximum(power, 0.0)  # cut series may be below
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, site, pair, self.boundary, factor * power, active)
-        if self.mirror is not None:
+        if self.coat is not None:
             value += self.face(ctx, site, pair.outer, self.mirror, active)
-        if self._energy.active_factors:
-            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
-            value *= mi.Spectrum(self._energy.factor(pair, site.wavenumbers, site.scale))
+        if self.energy.scales:
+            # s(ωi) s(ωo), so that no direction reflects more than it receives
+            value *= mi.Spectrum(self.energy.factor(site, pair.outer.wo))
         return value
 
-    def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
-        """See `NestingBSDF.beneath`."""
-        ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
-        if self._light_beneath:
-            ratios = tuple(
-                self._energy.reflected(direction, site.frame, site.wavenumbers, site.scale)
-                for direction in (site.si.wi, wo)
-            )
-        return self.layering.beneath(site.si, wo, active, ratios)
+    def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
+        """See `SurfaceBSDF.draw`."""
+        wi = site.si.wi
+        ordered = maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0)
+        scale = dr.detach(self._drawing_scale(site))
+        uv = self.power.draw(mi.Frame3f.cos_theta(wi), scale, ordered, sample2, site.si)
+        direction = direction_of(site.frame.from_table(uv) - mi.Vector2f(wi.x, wi.y))
+        return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction)
 
     def _drawing_scale(self, site: Site) -> Float:
         """Height scale to draw directions for: under a coat κ is as if heights were larger."""
         return site.scale if self.coat is None else site.scale * self.coat.eta
 
-    def _pair(self, site: Site, wo: Vector3f, active: Mask) -> Pair:
-        """Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one."""
-        pair = Pair(site.si, wo, site.frame, active)
-        return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
+    def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
+        """See `SurfaceBSDF.beneath`: T = 1 − a, with a the flat reflectance times a smooth ratio.
 
-    def draw(self, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
-        """See `NestingBSDF.draw`."""
-        uv = self.power.draw(
-            mi.Frame3f.cos_theta(site.si.wi),
-            dr.detach(self._drawing_scale(site)),
-            maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
-            sample2,
-            site.si,
+        a is the albedo of the diffraction, so that what is not reflected goes on, and a white pair
+        reflects at most what it gets. Under a coat it is the flat reflectance alone.
+        """
+        inwards, outwards = (
+            dr.maximum(1.0 - self.energy.reflected(w, site) * flat, 0.0)
+            for w in (site.si.wi, wo)
+            for flat in [self.fresnel.reflectance(mi.Frame3f.cos_theta(w), site.si, active)]
         )
-        total = site.frame.from_table(uv)
-        ordered = direction_of(total - mi.Vector2f(site.si.wi.x, site.si.wi.y))
-        return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
+        return inwards * outwards
 
     # ------------------------------------------------------------------ changes of parameters
 
     def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
+        """See `PluginBSDF.refusals`."""
         yield from super().refusals()
         if self.coat is not None:
             yield self.optical_refusal(self.coat.eta, "coat_eta", "coat_ior")
-        if isinstance(self.fresnel, UnderFilm):
-            yield self.fresnel.refusal()
-            if self.nested is not None and self.fresnel.absorbs:
-                yield refusal("a nested BSDF", ABSORBING)
+        if self.nested is not None and self.boundary.material.absorbs:
+            yield read.refusal(Feature.NESTED.phrase(), Feature.OPAQUE.phrase())
 
-    def derive(self) -> None:
-        """Compute what depends on the parameters: indices, scales of energy, the second order."""
-        self.fresnel.derive()
-        self._energy.update(self.scale_range(), self._light_beneath)
-        if self._second_order is not None:
-            self._second_order.update()
-        material = self.boundary.material
-        self.freeze(
-            (self._energy, self.fresnel, self.boundary, self.mirror, self._second_order),
-            self.vcavity,
-            str(self.layering),
-            str(self.boundary),
-            self.coat is None,
-            self._second_order is None,
-            self._energy.active_factors,
-            # these choose other kernels
+    def kernel_constants(self) -> tuple[object, ...]:
+        """See `PluginBSDF.kernel_constants`."""
+        material: Any = self.boundary.material
+        other_kernels = (
             getattr(material, "reflects_all", False),
-            getattr(material, "channels", None),
-            getattr(material, "tint", None) is None,
+            getattr(material, "sums", None),
+            material.tint is None,
         )
+        own = self.vcavity, self.coat is None, self.energy.scales
+        return *super().kernel_constants(), *own, *other_kernels
 
-    @property
-    def _light_beneath(self) -> bool:
-        """Whether light that is not reflected goes on to a nested BSDF, by the albedo."""
-        beneath = self.nested is not None and isinstance(self.layering, Transmission)
-        return beneath and self.coat is None
-
-    # ------------------------------------------------------------------ for people and shaders
-
-    @property
-    def model(self) -> str:
-        """Name of the boundary model, for people."""
-        return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
+    # ------------------------------------------------------------------ for shaders and people
 
     def describe(self) -> Surface:
         """See `DiffractingSurface.describe`."""
-        energy, nested, second_order = None, None, None
-        if self._second_order is not None and (ratios := self.table.slope_ratios) is not None:
-            second_order = SecondOrder(self._second_order.index, ratios)
-        if self._energy.conserving | self._light_beneath:
-            energy = Energy(self._energy_scale, self._reflected_ratio)
-        if self.nested is not None:
-            blend = self.layering
-            nested = Nested(self.nested, blend.weight if isinstance(blend, Blend) else None)
+        energy = self.energy
         return replace(
             super().describe(),
             coat=None if self.coat is None else plain(self.coat.eta),
-            second_order=second_order,
-            energy=energy,
-            nested=nested,
+            nested=self.nested,
             shadowing=self.vcavity,
+            # shaders have no scale under a coat, where it is near 1
+            **({"energy_scale": energy.scale} if energy.conserving and self.coat is None else {}),
+            **({"reflected": energy.ratio} if energy.beneath else {}),
         )
-
-    @property
-    def energy_conserving(self) -> bool:
-        """Whether the BSDF is scaled so that it never reflects more than it receives."""
-        return self._energy.conserving
-
-    def _energy_scale(self, height_scale: float) -> DirectionalTable | None:
-        """See `description.Energy.scale`; shaders have none under a coat, where it is near 1."""
-        shown = self._energy.conserving and self.coat is None
-        return self._energy.scale(height_scale) if shown else None
-
-    def _reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
-        """See `description.Energy.reflected`."""
-        if not self._light_beneath:
-            return None
-        return self._energy.ratio(height_scale)
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
-        more = {"shadowing": "vcavity" if self.vcavity else "none", "layering": self.layering}
-        if self.nested is not None:
-            more["nested"] = self.nested
-        return {**super().shown(), **more}
+        more = {"shadowing": "vcavity" if self.vcavity else "none"}
+        return {**super().shown(), **more, **({"nested": self.nested} if self.nested else {})}
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -33,15 +33,13 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from ..errors import DiffractionError
+from .base import ALL_COMPONENTS, PluginBSDF, ask
 from .depth_weights import DEPTH, DepthWeights
 from .description import Mix
-from .lifecycle import ALL_COMPONENTS, PluginBSDF, ask
-from .memory import index_between
-from .parameter_changes import Bounded, Changing, ObjectValues
-from .textures import is_attribute, range_of, require_raw, uv_square
+from .properties import number
+from .textures import is_attribute, uv_square
 from .types import (
     BSDF,
     Callback,
@@ -52,10 +50,10 @@ from .types import (
     Properties,
     Sample,
     Spectrum,
-    Texture,
     Vector2f,
     Vector3f,
 )
+from .varying import Varying
 
 _PREFIX = "weight_"
 #: A sum of such weights is far from the largest number there is.
@@ -76,16 +74,9 @@ class DiffractionMix(PluginBSDF):
         self.bsdfs = {name: bsdf for name, bsdf in objects.items() if isinstance(bsdf, mi.BSDF)}
         self.depths = _depths(props, self.bsdfs)
         self.weights = {} if self.depths else _weights(props, list(self.bsdfs), objects)
-        self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
-        self.parameters = (
-            self.depths.parameters
-            if self.depths
-            else [
-                weight if isinstance(weight, Bounded) else ObjectValues(_PREFIX + name, weight)
-                for name, weight in self.weights.items()
-                if weight is not None
-            ]
-        )
+        # where `dr.freeze` finds them
+        self._held, self._varied = list(self.bsdfs.values()), self._numbers()
+        self.parameters = [each for weight in self._varied for each in weight.changeable]
         self.ready()
         for surface in self._held:
             if hasattr(surface, "mix"):
@@ -159,33 +150,37 @@ class DiffractionMix(PluginBSDF):
         super().traverse(callback)
 
     @property
-    def together(self) -> list[Changing]:
+    def together(self) -> list[PluginBSDF]:
         """This BSDF and the surfaces in it, whose changes are refused together."""
         return [self, *(bsdf for bsdf in self._held if hasattr(bsdf, "mix"))]
 
     def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
-        for name, weight in self.weights.items():
-            if weight is not None and not isinstance(weight, Bounded):
-                yield _texture_refusal(_PREFIX + name, weight)
-        yield self.depths.refusal() if self.depths else self._sum_refusal()
-
-    def derive(self) -> None:
-        """Collect what `dr.freeze` must know."""
-        self.freeze([self.depths.depth] if self.depths else self.weights.values())
+        """See `PluginBSDF.refusals`."""
+        for weight in self._varied:
+            yield weight.refusal()
+        if not self.depths:
+            yield self._sum_refusal()
 
     def describe(self) -> Mix:
         """Return the description of the surfaces and weights (`description.describe`)."""
-        varying = [weight for weight in self.weights.values() if isinstance(weight, mi.Texture)]
-        textures = self.depths.textures if self.depths else varying
+        textures = [weight.texture for weight in self._varied if weight.texture is not None]
         return Mix(self.bsdfs, textures, lambda si: self.weights_at(si, mi.Mask(True)))
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
-        weights = {_PREFIX + name: _text(weight) for name, weight in self.weights.items()}
-        return {**self.bsdfs, **({DEPTH: self.depths} if self.depths else weights)}
+        if self.depths:
+            return {**self.bsdfs, DEPTH: f"{self.depths.depth} µm"}
+        rest = "the rest"
+        weights = {_PREFIX + name: weight or rest for name, weight in self.weights.items()}
+        return {**self.bsdfs, **weights}
 
     # ------------------------------------------------------------------ the weights
+
+    def _numbers(self) -> list[Varying]:
+        """Return the weights that a scene gives, or the depth."""
+        if self.depths:
+            return [self.depths.depth]
+        return [weight for weight in self.weights.values() if weight is not None]
 
     def weights_at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
@@ -193,7 +188,7 @@ class DiffractionMix(PluginBSDF):
             return [
                 dr.select(active, weight, 0.0) for weight in self.depths.at(si, mi.Mask(active))
             ]
-        explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
+        explicit = [weight and weight.at(si, active) for weight in self.weights.values()]
         rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
         weights = [rest if weight is None else weight for weight in explicit]
         total: Float = sum(weights, mi.Float(0.0))
@@ -241,7 +236,8 @@ class DiffractionMix(PluginBSDF):
 
     def _sum_refusal(self) -> str | None:
         """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
-        if any(weight is None or is_attribute(weight) for weight in self.weights.values()):
+        textures = [weight.texture for weight in self._varied if weight.texture is not None]
+        if None in self.weights.values() or any(map(is_attribute, textures)):
             return None
         totals = [sum(self.weights_at(si, True), mi.Float(0.0)) for si in uv_square()]
         if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
@@ -289,7 +285,7 @@ def _depths(props: Properties, bsdfs: dict[str, BSDF]) -> DepthWeights | None:
 
 def _weights(
     props: Properties, names: list[str], objects: dict[str, Any]
-) -> dict[str, Bounded | Texture | None]:
+) -> dict[str, Varying | None]:
     """Return the weight of each surface; None for the surface that gets the rest.
 
     Raises a DiffractionError for names that do not fit, and for invalid weights.
@@ -310,46 +306,11 @@ def _weights(
     return {name: _weight(props, _PREFIX + name, objects) for name in names}
 
 
-def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Bounded | Texture | None:
+def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Varying | None:
     if name not in props:
         return None
-    if name not in objects:
-        try:
-            number = float(props.get(name))
-        except (TypeError, ValueError):
-            number = np.nan
-        refusal = f"{name}={props.get(name)!r} must be between 0 and {_MOST_WEIGHT:g}"
-        if not 0.0 <= number <= _MOST_WEIGHT:
-            raise DiffractionError(refusal)
-        return Bounded(
-            name, number, 0.0, _MOST_WEIGHT,
-            lambda wrong: f"{name}={wrong:g} must be between 0 and {_MOST_WEIGHT:g}",
-        )  # fmt: skip
-    texture = objects[name]
-    require_raw(texture, name, "weights")
-    return texture
-
-
-def _texture_refusal(name: str, texture: Texture) -> str | None:
-    """Reason why a texture's numbers cannot be weights, or None."""
-    known = range_of(texture)
-    if known is None or known[0] >= 0.0:
-        return None
-    return f"{name}: its least number is {known[0]:g}; weights are at least 0"
-
-
-def _weight_at(weight: Bounded | Texture | None, si: Interaction, active: Mask) -> Float | None:
-    if weight is None or isinstance(weight, Bounded):
-        return weight and weight.value
-    return index_between(weight.eval_1(si, active), 0.0, _MOST_WEIGHT)
-
-
-def _text(weight: Bounded | Texture | None) -> str:
-    if weight is None:
-        return "the rest"
-    if isinstance(weight, Bounded):
-        return f"{dr.slice(weight.value):g}"
-    return " ".join(str(weight).split())
+    value = objects[name] if name in objects else number(props, name, 0.0)
+    return Varying(name, value, 0.0, _MOST_WEIGHT)
 
 
 mi.register_bsdf("diffraction_mix", DiffractionMix)

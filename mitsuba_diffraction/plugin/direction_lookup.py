@@ -14,7 +14,7 @@ from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
 from .arithmetic import clip, float_of, index_of
-from .directions import PatchFrame
+from .directions import Site
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
@@ -43,14 +43,11 @@ class DirectionLookup:
         tables: list[DirectionalTable] | None,
         nodes: list[float],
         scales: ScaleRange,
-        slopes: Sequence[tuple[Float, list[DirectionalTable]]] = (),
     ) -> None:
         """Take the tables at evenly spaced height scales, or none, where all values are 1.
 
         While derivatives are taken, values of 1 stand for no tables after there were some: an
         optimisation compiles no other kernel.
-
-        slopes : differentiable numbers, and derivatives of the tables with respect to them.
         """
         if tables is None and self._ones is not None and scales.differentiable:
             tables = [self._ones] * len(nodes)
@@ -60,17 +57,15 @@ class DirectionLookup:
         if scales.differentiable:
             self._ones = DirectionalTable(tables[0].wavelengths, np.ones_like(tables[0].values))
         height_scale, varies = scales.height_scale, scales.varies
-        maps = _maps(tables, scales.centre)
-        rates = [(number, _maps(rate, scales.centre)) for number, rate in slopes]
+        maps = np.stack([_cells(table, scales.centre) for table in tables])
         self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
             share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-            here = [(x, rate[0] * (1 - share) + rate[1] * share) for x, rate in rates]
-            self._values = _attached(maps[0] * (1 - share) + maps[1] * share, here)
+            self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
         # Where there is but one node nothing varies with the height scale
-        self._nodes = _attached(maps, rates) if varies or width > 0.0 else None
+        self._nodes = upload(mi.Float, maps) if varies or width > 0.0 else None
         wavelengths = tables[0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
@@ -79,20 +74,14 @@ class DirectionLookup:
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
 
-    def at(
-        self,
-        direction: Vector3f,
-        cosine: Float,
-        frame: PatchFrame,
-        wavenumbers: list[Float],
-        height_scale: Float,
-    ) -> list[Float]:
+    def at(self, direction: Vector3f, cosine: Float, site: Site) -> list[Float]:
         """Return the value of each channel for a direction in the shading frame.
 
         cosine : of its angle to the normal, on the side that the function is of.
         """
+        frame, wavenumbers = site.frame, site.wavenumbers
         tangential, share = frame.turned(direction), None
-        height_scale = height_scale * dr.rcp(frame.stretch)
+        height_scale = site.scale * dr.rcp(frame.stretch)
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
         cell, s, t = self._cell(*self._place(tangential, cosine))
@@ -171,20 +160,6 @@ def between(
     width = nodes[1] - nodes[0]
     share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
-
-
-def _attached(values: Array, slopes: Sequence[tuple[Float, Array]]) -> Buffer:
-    """Upload values that have these derivatives with respect to differentiable numbers."""
-    buffer = upload(mi.Float, values)
-    for number, rate in slopes:
-        buffer += (number - dr.detach(number)) * upload(mi.Float, rate)
-    dr.eval(buffer)
-    return buffer
-
-
-def _maps(tables: list[DirectionalTable], stretch: float) -> Array:
-    """Cells of tables, see `_cells`."""
-    return np.stack([_cells(table, stretch) for table in tables])
 
 
 def _cells(table: DirectionalTable, stretch: float) -> Array:

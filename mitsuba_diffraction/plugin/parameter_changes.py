@@ -126,45 +126,30 @@ class ObjectValues:
         callback.put(self._name, self.thing, mi.ParamFlags.Differentiable)
 
 
-class Changing(Protocol):
-    """A BSDF whose parameters change.
-
-    parameters : everything that its `traverse` exposes.
-    """
-
-    parameters: Sequence[Changeable]
-
-    def refusals(self) -> Iterator[str | None]:
-        """Reasons to refuse values that are allowed each by itself; None for none."""
-
-    def derive(self) -> None:
-        """Compute what depends on the parameters. It may refuse them too."""
-
-
-def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
+def take_changes(changed: Any, together: Sequence[Any]) -> None:
     """Accept all changes of a BSDF's parameters, or reject all.
 
     Raises a DiffractionError with all that is refused. Everything is then as it was before.
 
     Parameters
     ----------
-    changed : the BSDF, whose derived quantities are computed.
+    changed : the `base.PluginBSDF`, whose derived quantities are computed.
     together : all BSDFs that are refused together, this one among them: the surfaces of a mix.
     """
     try:
         check_parameters(together)
-        changed.derive()
+        changed.changed()
     except BaseException:  # an interrupted computation leaves nothing half done either
         for each in together:
             for parameter in each.parameters:
                 parameter.restore()
-            each.derive()
+            each.changed()
         raise
     for parameter in changed.parameters:
         parameter.keep()
 
 
-def check_parameters(together: Sequence[Changing]) -> None:
+def check_parameters(together: Sequence[Any]) -> None:
     """Refuse parameters that are not allowed, each by itself or with each other.
 
     Raises a DiffractionError with all that is refused.
@@ -173,7 +158,7 @@ def check_parameters(together: Sequence[Changing]) -> None:
         raise DiffractionError("; ".join(refused))
 
 
-def _refused(changed: Changing) -> list[str]:
+def _refused(changed: Any) -> list[str]:
     refused = [line for each in changed.parameters if (line := each.refusal())]
     return refused or [line for line in changed.refusals() if line]
 

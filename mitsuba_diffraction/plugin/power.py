@@ -15,10 +15,9 @@ import mitsuba as mi
 from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
 from .device_table import device_table
-from .directions import Pair, TablePoint
+from .directions import Crossing, Pair, TablePoint
 from .rgb import rgb_power
 from .sampling import order_sampler
-from .transmission.crossing import Crossing
 from .types import Colour, Float, Index, Interaction, Mask, Vector2f
 from .window_positions import Window, WindowPositions
 

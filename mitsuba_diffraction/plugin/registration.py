@@ -15,7 +15,7 @@ from . import arithmetic
 
 # Base classes first
 _MODULES = (
-    "lifecycle", "nesting", "surface", "diffraction", "transmission.diffraction_dielectric",
+    "base", "surface", "diffraction", "diffraction_dielectric",
     "orders.diffraction_orders", "orders.orders_sheet", "orders.orders_block", "diffraction_mix",
     "presets",
 )  # fmt: skip

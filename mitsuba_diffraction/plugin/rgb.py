@@ -20,11 +20,10 @@ from ..tables.colour.table import PACKET, TERMS, ColourTable
 from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
-from .directions import Pair, TablePoint
+from .directions import Crossing, Pair, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
-from .transmission.crossing import Crossing
 from .types import Buffer, Colour, Float, Index, Interaction, Vector2f
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -68,11 +69,18 @@ class Factors(NamedTuple):
 
 #: Gets the table that is asked for.
 TableProvider = Callable[[TableRequest], DiffractionTable]
+#: Providers of the scenes that are being loaded, the current one last.
+_providers: list[TableProvider] = [lambda request: request.cached(request.settings)]
 
 
-def from_cache(request: TableRequest) -> DiffractionTable:
-    """The `TableProvider` of all scenes that are not being planned."""
-    return request.cached(request.settings)
+@contextmanager
+def tables_by(provider: TableProvider) -> Iterator[None]:
+    """Let a provider choose the tables of all scenes that are loaded inside."""
+    _providers.append(provider)
+    try:
+        yield
+    finally:
+        _providers.remove(provider)
 
 
 def table_of_file(
@@ -81,7 +89,6 @@ def table_of_file(
     options: LoadOptions,
     asked: Mapping[str, Any],
     factors: Factors,
-    provider: TableProvider,
 ) -> DiffractionTable:
     """Return the table of a file: a table, a recipe, or a height field of any format.
 
@@ -92,7 +99,6 @@ def table_of_file(
     options : how to read heights.
     asked : the fields of `TableSettings` that the scene sets, checked.
     factors : the factors that are asked for.
-    provider : gets the tables of heights.
     """
     kind = kind_of(path)
     if kind is FileKind.ORDERS:
@@ -118,7 +124,7 @@ def table_of_file(
             )
     elif kind is FileKind.RECIPE:
         recipe = Recipe.load(path)
-        table = provider(
+        table = _providers[-1](
             _request(
                 _recipe_digest(recipe, options),
                 lambda: recipe.fields(options),
@@ -128,7 +134,7 @@ def table_of_file(
             )
         )
     else:
-        table = provider(
+        table = _providers[-1](
             _request(
                 _file_digest(path, options),
                 lambda: [load_heights(path, options)],
@@ -184,11 +190,11 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
 
 
 def table_of_heights(
-    heights: HeightField, asked: Mapping[str, Any], height_scale: float, provider: TableProvider
+    heights: HeightField, asked: Mapping[str, Any], height_scale: float
 ) -> DiffractionTable:
     """Return the table of a height field."""
     factors = Factors(height_scale, 1.0)
-    return provider(_request(heights.digest(), lambda: [heights], asked, factors, None))
+    return _providers[-1](_request(heights.digest(), lambda: [heights], asked, factors, None))
 
 
 def _request(
@@ -262,11 +268,7 @@ def _check_agreement(
         "windows": table.settings.windows,
     }
     asked = dict(asked)
-    if asked.pop("second_order", None) is True and table.slope_ratios is None:
-        raise DiffractionError(
-            f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
-            "it out, or build the table with second_order=true, for coherence='ensemble'"
-        )
+    asked.pop("second_order", None)
     for name, value in asked.items():
         if value != tabulated[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(

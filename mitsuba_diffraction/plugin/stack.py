@@ -20,9 +20,9 @@ from ..optics.colour import linear_srgb, response
 from ..optics.materials import PERFECT, TISSUES, material_named
 from ..optics.stack import Stacked, mean_powers, nodes, packed, path_of
 from .conductors import tabulated_index
-from .fresnel import Conductor, Dielectric
+from .materials import Material
 from .memory import read_record, upload
-from .types import Callback, Colour, Float, Interaction, Mask, Number
+from .types import Float, Interaction, Mask, Number
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -125,29 +125,25 @@ def _index_of(material: object, where: str) -> Callable[[Real], Complex]:
     return lambda wavelengths: np.asarray(np.interp(wavelengths, places, values), np.complex128)
 
 
-class UnderStack:
-    """Material under a stack, with the interface of a material; its numbers cannot change.
+class UnderStack(Material):
+    """Material under a stack; its numbers cannot change.
 
     Parameters
     ----------
-    material : the material itself, and its index over wavelengths relative to the medium above.
-    layers : the stack; medium : index of the medium above.
+    material : the material itself; layers : the stack; medium : index of the medium above.
     wavelength : nm, of mono variants; wavelengths : that the table serves.
     """
 
-    changeable = ()
-
     def __init__(
         self,
-        material: Dielectric | Conductor,
-        substrate: Callable[[Real], Complex],
+        material: Material,
         layers: Layers,
         medium: float,
         wavelength: float,
         wavelengths: tuple[float, float],
     ) -> None:
         self.material, self.layers = material, layers
-        self._substrate, self._medium = substrate, medium
+        self._medium = medium
         rows, self._columns = nodes(layers.path, wavelengths)
         if mi.is_rgb:
             table = packed(_of_channels(self._powers(_VISIBLE)))
@@ -168,19 +164,12 @@ class UnderStack:
 
     def _powers(self, wavelengths: Real) -> Complex:
         indices = np.concatenate(
-            [[self._substrate(wavelengths)], self.layers.indices(wavelengths) / self._medium]
+            [[self.material.at(wavelengths)], self.layers.indices(wavelengths) / self._medium]
         )
         return mean_powers(
             np.linspace(0.0, 1.0, self._columns), wavelengths / self._medium, indices,
             self.layers.thicknesses, self.layers.spread,
         )  # fmt: skip
-
-    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """R of the flat stack for the cosine of the angle of incidence, unpolarised."""
-        pairs = (index.amplitudes(cos_theta) for index in self.indices(si, active))
-        return mi.UnpolarizedSpectrum(
-            [0.5 * (dr.squared_norm(r_s) + dr.squared_norm(r_p)) for r_s, r_p in pairs]
-        )
 
     def indices(self, si: Interaction, active: Mask) -> list[Any]:
         """Return the stack of each channel."""
@@ -191,14 +180,8 @@ class UnderStack:
         size = {"columns": self._columns, "rows": self._rows}
         return [_Row(self._table, **size, place=place) for place in places]
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose nothing."""
-
-    def derive(self) -> None:
-        """Derive nothing."""
-
     @property
-    def absorbs(self) -> bool:
+    def absorbs(self) -> bool:  # type: ignore[override]
         """Whether a layer or the material absorbs light."""
         return self.layers.absorbs
 

@@ -1,89 +1,104 @@
-"""A surface that diffracts: the part that the plugins share, whichever way the light leaves."""
+"""Surface with a table of heights: what `diffraction` and `diffraction_dielectric` share (Dr.Jit)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from .boundary import Boundary
+from ..errors import DiffractionError
+from . import parameters as read
+from .arithmetic import plain
+from .base import SurfaceBSDF
+from .boundary import Boundary, boundary_of
 from .conductors import tabulated_range
-from .description import Feature, Film, Material, Quantity, Surface
-from .directions import Pair, PatchFrame, Site
-from .energy import indices_of
+from .description import Film, Surface
+from .description import Material as DescribedMaterial
+from .directions import CoatedPair, Pair, PatchFrame, Site
+from .energy import EnergyModel
 from .energy_factors import ScaleRange
-from .factors import LEAST_SCALE, VaryingFactor
-from .fresnel import Conductor, Perfect, Reflectance, tinted
-from .layers import CoatedPair, UnderCoat, UnderFilm
-from .nesting import NestingBSDF
-from .parameter_changes import Bounded, Changeable
+from .layers import UnderFilm
+from .materials import Material, Perfect, tinted
 from .power import power_model
+from .properties import flag
 from .stack import UnderStack
-from .surface_parameters import SurfaceParameters
 from .types import BSDF, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
+from .varying import LEAST_SCALE, MOST_SCALE, LateralScale, Varying, largest_of
 
 
-class DiffractingSurface(NestingBSDF):
-    """Table, factors, orientation and power of a surface; the lobe that they make.
+class DiffractingSurface(SurfaceBSDF):
+    """Table, factors, orientation and material of a surface; the lobe that they make.
+
+    Parameters
+    ----------
+    material : of the structure, without film and stack, which are read here.
+    optical : index of the medium that heights are in, relative to the medium above.
 
     Attributes
     ----------
     table : the diffraction table.
     heights : function that reads the heights that the table is made of.
     window_positions : positions of windows, or None where the table averages over them.
-    fresnel : reflectance of the flat surface, with its layers.
-    orientation : angle from the first tangent to the patch's x axis.
-    lateral_scale : factor on lengths in the patch's plane.
-    height_scale : mi.Float; the largest, where it varies.
+    orientation, lateral_scale, height_scale : the patch as it lies on the surface.
+    boundary : model of the structure's material; fresnel : flat surface with all layers.
     power : `power.PowerModel` of the variant.
     wavelength : nm, of mono variants.
     """
 
+    energy: EnergyModel | None = None
+    fresnel: Material
+
     def __init__(
         self,
         props: Properties,
-        surface: SurfaceParameters,
-        fresnel: Reflectance | UnderCoat | UnderFilm | UnderStack,
-        nested: BSDF = None,
+        nested: BSDF | None,
+        material: Material,
+        optical: float,
     ) -> None:
         super().__init__(props, nested)
-        self.table, self.heights = surface.table, surface.heights
-        self.window_positions, self.wavelength = surface.window_positions, surface.wavelength
-        self.fresnel, self.orientation = fresnel, surface.orientation
-        self.lateral_scale = surface.lateral_scale
+        model = read.model_of(props, material)
+        read.check_combination(props, material, nested)
+        scale, largest = largest_of(props, "height_scale", LEAST_SCALE, MOST_SCALE)
+        varies = isinstance(scale, mi.Texture)
+        if "height_scale_max" in props and not varies:
+            raise DiffractionError("height_scale_max is for a height_scale that is a texture")
+        self.lateral_scale = LateralScale(props)
+        # κ grows by the index, as if heights did
+        stretch = self.lateral_scale.of_table
+        self.table, self.heights = read.read_patch(props, largest * optical, stretch)
+        most = largest if varies else self.table.height_scale_max / optical
+        advice = "; load the plugin anew with that height_scale"
+        self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)
+        self.orientation = read.orientation_of(props)
+        self.wavelength = read.mono_wavelength(props, self.table.wavelength_range)
+        self.energy_conserving = flag(props, "energy_conserving", True)
+        self.window_positions = read.window_positions(props, self.table)
         self.power = power_model(self.table, self.wavelength, self.window_positions)
-        # Heights are in a medium of this optical index
-        self._set_height_scale(surface.height_scale, surface.optical)
-        self.parameters += [
-            *self._scale_changeable,
-            *self.orientation.changeable,
-            *self.lateral_scale.changeable,
-            *fresnel.changeable,
-        ]
+        material = read.layered(props, material, self.table)
+        read.check_combination(props, material, nested)
+        read.warn_of_film(material, self.table, largest)
+        self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
         self.area_factor = 4.0 * dr.pi * self.table.sigma**2
 
-    def _set_height_scale(self, factor: float | VaryingFactor, optical: float) -> None:
-        """Keep a bounded number; or factors that vary, of which `height_scale` is the largest."""
-        if isinstance(factor, VaryingFactor):
-            self._scale: VaryingFactor | Bounded = factor
-            self._varying: VaryingFactor | None = factor
-            self._scale_changeable: tuple[Changeable, ...] = factor.changeable
-            self.height_scale: Float = mi.Float(factor.high)
-            return
-        most = self.table.height_scale_max / optical
-        bounded = Bounded("height_scale", factor, LEAST_SCALE, most, partial(_scale_refusal, most))
-        self._scale, self._varying, self.height_scale = bounded, None, bounded.value
-        self._scale_changeable = (bounded,)
+    def ready(self) -> None:
+        """See `PluginBSDF.ready`."""
+        owners = self.height_scale, self.orientation, self.lateral_scale.factor, self.fresnel
+        self.parameters += [each for owner in owners if owner for each in owner.changeable]
+        super().ready()
 
     @property
     def sigma(self) -> float:
         """Standard deviation of the amplitude window, µm."""
         return self.table.sigma
+
+    @property
+    def mean_table(self) -> Any:
+        """Table of the mean over all positions of the window."""
+        return self.table if self.window_positions is None else self.table.averaged
 
     # ------------------------------------------------------------------ the model
 
@@ -118,13 +133,17 @@ class DiffractingSurface(NestingBSDF):
         power = self.geometry(pair) * self.power.flat(pair, site.si)
         return self.lobe(ctx, replace(site, scale=mi.Float(0.0)), pair, mirror, power, active)
 
+    def reflected_share(self, site: Site, active: Mask) -> Colour:
+        """See `SurfaceBSDF.reflected_share`."""
+        return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
+
     def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `NestingBSDF.normal_reflectance`."""
+        """See `SurfaceBSDF.normal_reflectance`."""
         return mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), site.si, active))
 
     def site_at(self, si: Interaction, active: Mask) -> Site:
-        """See `NestingBSDF.site_at`."""
-        scale = self._varying.at(si, active) if self._varying else self.height_scale
+        """See `SurfaceBSDF.site_at`."""
+        scale = self.height_scale.at(si, active)
         return Site(si, self.frame_at(si, active), scale, self.power.wavenumbers(si))
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
@@ -136,16 +155,17 @@ class DiffractingSurface(NestingBSDF):
     # ------------------------------------------------------------------ changes of parameters
 
     def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
-        if self._varying is not None:
-            yield self._varying.refusal()
+        """See `PluginBSDF.refusals`."""
+        yield self.height_scale.refusal()
+        yield self.lateral_scale.factor and self.lateral_scale.factor.refusal()
+        yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
         """Reason why heights times the index that they are in are beyond the table, or None.
 
         name, parameter : of the index, as it changes and as it is loaded.
         """
-        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * index))))
+        optical = self.height_scale.number * plain(index)
         if optical <= self.table.height_scale_max * (1.0 + 1e-6):
             return None
         return (
@@ -153,37 +173,35 @@ class DiffractingSurface(NestingBSDF):
             f"{self.table.height_scale_max:g}; load the plugin anew with that {parameter}"
         )
 
+    def derive(self) -> None:
+        """Compute what depends on the parameters: indices and scales of energy."""
+        self.fresnel.derive()
+        if self.energy is not None:
+            self.energy.update(self.scale_range())
+
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""
-        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-        lowest = self._varying.range()[0] if self._varying else largest
-        stretch = self.lateral_scale.range_over_table()
-        differentiable = dr.grad_enabled(self.height_scale) or self.lateral_scale.differentiable
-        varies = bool(self._varying or self.lateral_scale.varying)
-        return ScaleRange((lowest, largest), stretch, varies, differentiable)
+        height, lateral = self.height_scale, self.lateral_scale
+        heights = height.range()[0], height.number
+        varies = bool(height.texture or lateral.texture)
+        numbers = [each for each in (height, lateral.factor) if each is not None]
+        differentiable = any(each.differentiable for each in numbers)
+        return ScaleRange(heights, lateral.range_over_table(), varies, differentiable)
 
-    def freeze(self, holders: Iterable[Any], *constants: object) -> None:
-        """See `PluginBSDF.freeze`; adds the fields of all surfaces."""
-        factors = self._varying, self.lateral_scale
-        textures = str(self._varying), str(self.lateral_scale.varying)
-        placed = str(self.window_positions)
-        super().freeze(
-            (self.power, self.orientation, self.fresnel, *factors, *holders),
-            self.table.digest(), placed, *textures, *constants,
-        )  # fmt: skip
+    def kernel_constants(self) -> tuple[object, ...]:
+        """See `PluginBSDF.kernel_constants`."""
+        textures = str(self.height_scale.texture), str(self.lateral_scale.texture)
+        return self.table.digest(), str(self.window_positions), *textures, str(self.boundary)
 
     # ------------------------------------------------------------------ for people and shaders
 
     def describe(self) -> Surface:
         """Return the description of the surface (`description.describe`)."""
         structure: Any = self.boundary.material
-        film = None
-        if isinstance(structure, UnderFilm):
-            film, structure = Film(*structure.numbers()), structure.material
+        film = Film(*structure.numbers()) if isinstance(structure, UnderFilm) else None
         stacked = isinstance(structure, UnderStack)
-        if stacked:
+        if film or stacked:
             structure = structure.material
-        largest = float(dr.slice(dr.max(dr.detach(self.height_scale))))
         placed = self.window_positions is not None
         return Surface(
             table=self.table,
@@ -196,24 +214,25 @@ class DiffractingSurface(NestingBSDF):
             ),
             coherence="surface" if placed else self.table.coherence,
             heights=self.heights,
-            height_scale=Quantity(largest, self._varying and self._varying.texture),
+            height_scale=self.height_scale.quantity,
             lateral_scale=self.lateral_scale.quantity,
             largest_scale=float(self.table.height_scale_max),
-            material=_described(structure),
+            material=DescribedMaterial(
+                structure.kind,
+                None if isinstance(structure, Perfect) else structure.at,
+                tabulated_range(structure.name) if structure.name else None,
+                structure.name,
+            ),
             film=film,
             model=str(self.boundary),
             stacked=stacked,
+            transmits=self.transmits,
         )
 
     @property
     def model(self) -> str:
         """Name of the boundary model, for people."""
         return str(self.boundary)
-
-    @property
-    def energy_conserving(self) -> bool:
-        """Whether the BSDF is scaled so that it never reflects more than it receives."""
-        return self._energy is not None
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
@@ -228,25 +247,8 @@ class DiffractingSurface(NestingBSDF):
             "tolerance": f"{self.table.tolerance:g}",
             "surface": self.fresnel,
             "model": self.model,
-            "height_scale": self._varying or f"{dr.slice(self.height_scale):g}",
+            "height_scale": self.height_scale,
             "energy_conserving": "true" if self.energy_conserving else "false",
             "orientation": self.orientation,
             "lateral_scale": self.lateral_scale,
         }
-
-
-def _described(material: Any) -> Material:
-    """Return the record of a structure's material."""
-    if isinstance(material, Perfect):
-        return Material(Feature.MIRROR)
-    index: Any = partial(indices_of, material)
-    if isinstance(material, Conductor):
-        return Material(Feature.CONDUCTOR, index, tabulated_range(material.name), material.name)
-    return Material(Feature.RARER if material.reflects_all else Feature.DIELECTRIC, index)
-
-
-def _scale_refusal(most: float, height_scale: float) -> str:
-    return (
-        f"height_scale={height_scale:g} is outside the table's range, above 0 and up to "
-        f"{most:g}; load the plugin anew with that height_scale"
-    )

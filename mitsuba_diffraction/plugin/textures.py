@@ -14,11 +14,12 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .arithmetic import plain
 from .description import Quantity
 from .meshes import has_texcoords
-from .parameter_changes import Bounded, ObjectValues
+from .parameter_changes import Bounded, Changeable, ObjectValues
 from .properties import name_of
-from .types import Callback, Interaction, Mask, Rotation, Texture
+from .types import Interaction, Mask, Rotation, Texture
 
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
@@ -125,63 +126,48 @@ def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
 MOST_DEGREES = 36_000.0
 
 
-class ConstantOrientation:
-    """A constant angle, degrees from the first tangent to the patch's x axis."""
+class Orientation:
+    """Angle from the first tangent to the patch's x axis: degrees, or a texture of (cos, sin).
 
-    def __init__(self, degrees: float) -> None:
-        self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
-        self.degrees = self._angle.value
-        self.traverse, self.changeable = self._angle.traverse, (self._angle,)
-
-    def rotation(self, si: Interaction, active: Mask) -> Rotation:
-        """(cos, sin) of the angle."""
-        sin, cos = dr.sincos(dr.deg2rad(self.degrees))
-        return cos, sin
-
-    @property
-    def quantity(self) -> Quantity:
-        """The angle in degrees, for descriptions."""
-        return Quantity(float(dr.slice(dr.detach(self.degrees))))
-
-    def __str__(self) -> str:
-        return f"{dr.slice(self.degrees):g}°"
-
-
-def _refusal(degrees: float) -> str:
-    return f"orientation={degrees:g} must be between -{MOST_DEGREES:g} and {MOST_DEGREES:g} degrees"
-
-
-class OrientationTexture:
-    """(cos, sin) of the angle in the first two channels of a raw texture or mesh attribute.
-
-    Two channels instead of an angle, so that interpolation has no seam at 360°. They need not be of
-    unit length; where both are 0 the patch is not turned.
+    A raw texture or mesh attribute has (cos, sin) in its first two channels instead of an angle, so
+    that interpolation has no seam at 360°. They need not be of unit length; where both are 0 the
+    patch is not turned.
     """
 
-    def __init__(self, texture: Texture) -> None:
-        self.texture = texture
-        self.changeable = (ObjectValues("orientation", texture),)
-        _check(texture)
+    def __init__(self, value: float | Texture) -> None:
+        self.texture = value if isinstance(value, mi.Texture) else None
+        self.changeable: tuple[Changeable, ...]
+        if self.texture is not None:
+            _check(self.texture)
+            self.changeable = (ObjectValues("orientation", self.texture),)
+            return
+        angle = Bounded("orientation", value, -MOST_DEGREES, MOST_DEGREES, _refusal)
+        self._degrees, self.changeable = angle.value, (angle,)
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
-        """(cos, sin) of the angle at the surface point."""
+        """Return (cos, sin) of the angle at points of the surface."""
+        if self.texture is None:
+            sin, cos = dr.sincos(dr.deg2rad(self._degrees))
+            return cos, sin
         value = self.texture.eval_3(si, active)
         length = dr.sqrt(dr.square(value.x) + dr.square(value.y))
         turned = length > 1e-6
         scale = dr.rcp(dr.select(turned, length, 1.0))
         return dr.select(turned, value.x * scale, 1.0), dr.select(turned, value.y * scale, 0.0)
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the texture."""
-        callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
-
     @property
     def quantity(self) -> Quantity:
-        """The texture, for descriptions."""
-        return Quantity(0.0, self.texture)
+        """The angle in degrees, or the texture, for descriptions."""
+        return Quantity(plain(self._degrees) if self.texture is None else 0.0, self.texture)
 
     def __str__(self) -> str:
-        return " ".join(str(self.texture).split())
+        if self.texture is not None:
+            return " ".join(str(self.texture).split())
+        return f"{plain(self._degrees):g}°"
+
+
+def _refusal(degrees: float) -> str:
+    return f"orientation={degrees:g} must be between -{MOST_DEGREES:g} and {MOST_DEGREES:g} degrees"
 
 
 def _check(texture: Texture) -> None:
@@ -207,6 +193,3 @@ def _check(texture: Texture) -> None:
             "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
             "negative numbers; save (cos, sin) in a float format, as EXR"
         )
-
-
-Orientation = ConstantOrientation | OrientationTexture

@@ -7,12 +7,11 @@ Contents
 --------
 model         the default model in one file: the equations, numbered as in docs/theory.md
 bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
-coat, film    wrappers of the model
+coat          wrapper of the model
 fresnel, boundary, through  float64 judges of the formulas of the same names in `optics`
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
-second_order  whether "auto" applies the second order
 arguments     checks of the arguments
 """
 

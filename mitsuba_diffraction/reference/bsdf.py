@@ -7,7 +7,7 @@ its equation (4).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,10 @@ from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..settings import COHERENCES
 from . import boundary
 from . import coat as coats
-from . import film as films
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
 from .integral import window_power
 from .model import Light
-from .second_order import resolved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,8 +33,7 @@ Complex = NDArray[np.complex128]
 Measure = Callable[[Complex], Real]
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """Material of a surface, and the model of its boundary.
 
     Attributes
@@ -45,13 +42,11 @@ class Material:
     index : (n,) n + ik relative to the medium above it, under a film where there is one; None for
         a perfect reflector.
     coat : index of a clear coat over the surface, relative to the medium above it, or None.
-    second_order : whether orders are multiplied by the second order of small slope.
     """
 
     model: str
     index: Complex | Filmed | None
     coat: float | None
-    second_order: bool
 
 
 def brdf(
@@ -68,11 +63,10 @@ def brdf(
     k: ArrayLike = 0.0,
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
-    second_order: str | bool = "auto",
 ) -> Real:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
-    Equations (1) to (10) of `reference.model`; defaults as in the BSDF `diffraction`.
+    Equations (1) to (9) of `reference.model`; defaults as in the BSDF `diffraction`.
     Below the surface the BRDF is 0.
 
     Raises a DiffractionError for an unknown coherence or model, a width that is not positive and
@@ -97,16 +91,10 @@ def brdf(
         (`optics.coat`); it needs eta, and its own reflection is the lobe of a flat patch.
     film : index n + ik, relative to the medium above, and thickness in nm of a film that follows
         the heights, coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
-        Small slope has the mean of the second order then (`optics.mean_second_order`).
-    second_order : whether orders are multiplied by the second order of small slope, eq. (10):
-        True, False, or "auto" for where it changes the colours of these heights by 5 % or more
-        (`optics.second_order_change`). It is known for a dielectric, bare or under a coat, by model
-        "small_slope", in an ensemble; True is refused elsewhere.
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
-    index = index_of(eta, k, light.wavelength, film)
-    material = _material(field, model_of(model, index), index, coat, window, second_order)
+    material = _material(model, index_of(eta, k, light.wavelength, film), coat)
     if material.index is None:
         power = window_power(field, *light, *window)
         return kirchhoff_factor(*light, window.sigmas.orders) * power
@@ -127,7 +115,6 @@ def mueller(
     model: str | None = None,
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
-    second_order: str | bool = "auto",
 ) -> Real:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
@@ -136,22 +123,14 @@ def mueller(
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
-    index = index_of(eta, k, light.wavelength, film)
-    material = _material(field, model_of(model, index), index, coat, window, second_order)
+    material = _material(model, index_of(eta, k, light.wavelength, film), coat)
     if material.index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
     return _reflected(boundary.mueller, field, light, material, window)
 
 
-def _material(
-    field: HeightField,
-    model: str,
-    index: Complex | Filmed | None,
-    coat: float | None,
-    window: Window,
-    second_order: str | bool,
-) -> Material:
-    """Check what goes together, and decide "auto"."""
+def _material(model: str | None, index: Complex | Filmed | None, coat: float | None) -> Material:
+    """Check what goes together."""
     if coat is not None:
         if index is None:
             raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
@@ -161,8 +140,7 @@ def _material(
             )
         if not (np.isfinite(coat) and coat >= 1.0):
             raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    applied = resolved(second_order, field, model, window.coherence, index, coat)
-    return Material(model, index, coat, applied)
+    return Material(model_of(model, index), index, coat)
 
 
 def _reflected(
@@ -188,43 +166,27 @@ def _lit(
     window: Window,
 ) -> Real:
     """Measured light of directions above the surface."""
-    if isinstance(index, Filmed):
-        jones = (
-            films.jones(field, light, index)
-            if material.model == "small_slope"
-            else _matrices(field, light, index, material.model)
-        )
-        power = window_power(field, *light, *window)
-        return models.reflected(light, window.sigmas.orders, power, jones, measure)
     if material.coat is not None:
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
-        power, jones = _structure(field, inside, relative, material, window)
+        jones = _matrices(field, inside, relative, material.model)
+        power = window_power(field, *inside, *window)
         return coats.reflected(light, window.sigmas, material.coat, relative, power, jones, measure)
     if material.model == "small_slope" and window.coherence == COHERENCES[0]:
-        return models.default_brdf(
-            field, light, index, window.sigmas, material.second_order, measure
-        )
-    power, jones = _structure(field, light, index, material, window)
+        if not isinstance(index, Filmed):
+            return models.default_brdf(field, light, index, window.sigmas, measure)
+    jones, power = (
+        _matrices(field, light, index, material.model),
+        window_power(field, *light, *window),
+    )
     return models.reflected(light, window.sigmas.orders, power, jones, measure)
 
 
-def _structure(
-    field: HeightField, light: Light, index: Complex, material: Material, window: Window
-) -> tuple[Real, Complex]:
-    """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
-    if material.model != "small_slope":
-        return window_power(field, *light, *window), _matrices(field, light, index, material.model)
-    s = models.share(field, light, index)
-    jones = models.blended(models.kirchhoff(light, index), models.small_slope(light, index), s)
-    if material.second_order:
-        return models.ensemble_power(field, light, window.sigmas, (index, s)), jones
-    return window_power(field, *light, *window), jones
-
-
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:
-    """J of Kirchhoff's facets, or of another model by its own formula."""
+    """J of the heights, in the medium where `light` and `index` are given."""
     if name == "kirchhoff":
         return boundary.kirchhoff(light.wi, light.wo, index)
+    if name == "small_slope":
+        return boundary.blended(light.wi, light.wo, index, models.share(field, light, index))
     return registered(registered_model(name), field, light, index)
 
 

@@ -63,7 +63,7 @@ def screen_power(
     sigma = sigmas.orders
     orders = orders_near((alpha, beta), sigma, screen, pixel_size)
     if coherence == "ensemble":
-        return window_sum(orders, (alpha, beta), sigmas, 1.0)
+        return window_sum(orders, (alpha, beta), sigmas)
     ny, nx = screen.shape
     x, y = centre or (0.5 * nx * pixel_size[0], 0.5 * ny * pixel_size[1])
     window_x = np.exp(-0.5 * (sigma * (alpha - orders.qx)) ** 2) * np.exp(-1j * orders.qx * x)

@@ -6,7 +6,7 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
 
     (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
     a_j(κ) = mean of exp(iκh) exp(i q_j·r) over the pixels                                      (2)
-    ⟨|P|²⟩ = 4π²σ² Σ_j F_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²),   σ_j = σ for j ≠ 0               (3)
+    ⟨|P|²⟩ = 4π²σ² Σ_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²),   σ_j = σ for j ≠ 0                   (3)
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩,   A = πσ²                                         (4)
     N = ½ Σ |J|² over the four entries of J                                                     (5)
     J = (1 − s) K + s B                                                                         (6)
@@ -14,7 +14,6 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
     B = (ε − 1) · [the four entries in `small_slope`],   ε = n²                                 (8)
     s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),   R₀ = |(n − 1)/(n + 1)|²                                (9)
     σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),   h_q' the heights' spectrum
-    F_j = |1 + x_j|²,   x_j = s G (c_l r_l + c_t r_t), |x_j| at most ½,   F_0 = 1              (10)
 
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
@@ -22,10 +21,8 @@ over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, t
 window has the light's σ₀; a small scan limits σ of other orders alone. K is Kirchhoff's tangent
 plane: Fresnel's r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|,
 p = d×s of light along d. Rows and columns of J are s and p, outgoing and incoming. B is first-order
-small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
-on directions and index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and
-across q_j, slopes filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays
-(n,) as in `Light`. coat.py, film.py and transmission.py wrap this.
+small slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py
+and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -39,8 +36,6 @@ from numpy.typing import NDArray
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Index
-from ..optics.second_order import slope_coefficients
-from ..optics.slope_ratios import Slopes, along
 from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
 from .fresnel import amplitudes, decaying_root, reflectance
 
@@ -73,14 +68,12 @@ def default_brdf(
     light: Light,
     index: Complex,
     sigmas: Sigmas,
-    second_order: bool,
     measure: Callable[[Complex], Real] = unpolarised,
 ) -> Real:
     """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
     s = share(field, light, index)
     jones = blended(kirchhoff(light, index), small_slope(light, index), s)
-    power = ensemble_power(field, light, sigmas, (index, s) if second_order else None)
-    return reflected(light, sigmas.orders, power, jones, measure)
+    return reflected(light, sigmas.orders, ensemble_power(field, light, sigmas), jones, measure)
 
 
 def reflected(
@@ -93,22 +86,13 @@ def reflected(
     return (factor * power * measure(jones).T).T
 
 
-def ensemble_power(
-    field: HeightField, light: Light, sigmas: Sigmas, second: tuple[Complex, Real] | None
-) -> Real:
-    """⟨|P|²⟩ of (3) in µm⁴; second : index and share s for the factors of (10), else F_j = 1."""
+def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
+    """⟨|P|²⟩ of (3) in µm⁴."""
     k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
-    slopes = None if second is None else Slopes.from_heights(field.heights, field.pixel_size)
-    for n, (wi, wo) in enumerate(zip(light.wi, light.wo, strict=True)):
-        u, v, w = wi + wo  # (1): frequency q, and phase per height κ
-        q, kappa = (k[n] * u, k[n] * v), k[n] * w
+    for n, (u, v, w) in enumerate(light.wi + light.wo):
+        q, kappa = (k[n] * u, k[n] * v), k[n] * w  # (1): frequency q, and phase per height κ
         screen = np.exp(1j * kappa * field.heights)
-        orders = orders_near(q, sigmas.orders, screen, field.pixel_size)
-        factors: Real | float = 1.0
-        if second is not None and slopes is not None:
-            c = slope_coefficients(wi, wo[None], second[0][n])[0]
-            factors = second_order_factors(orders, screen, slopes, c, second[1][n])
-        power[n] = window_sum(orders, q, sigmas, factors)
+        power[n] = window_sum(orders_near(q, sigmas.orders, screen, field.pixel_size), q, sigmas)
     return power
 
 
@@ -143,34 +127,16 @@ def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Com
     return j * spacing, np.exp(2j * np.pi / n * turns)
 
 
-def window_sum(
-    orders: Orders, q: tuple[float, float], sigmas: Sigmas, factors: Real | float
-) -> float:
-    """4π²σ² Σ_j F_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²) of (3)."""
+def window_sum(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> float:
+    """4π²σ² Σ_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²) of (3)."""
     sigma, ratio = sigmas.orders, (sigmas.zeroth / sigmas.orders) ** 2
     window_x = np.exp(-0.5 * (sigma * (q[0] - orders.qx)) ** 2)
     window_y = np.exp(-0.5 * (sigma * (q[1] - orders.qy)) ** 2)
-    powers = factors * np.abs(orders.a) ** 2
+    powers = np.abs(orders.a) ** 2
     total = window_y**2 @ powers @ window_x**2
     lobe = np.exp(-(sigma**2) * (q[0] ** 2 + q[1] ** 2))  # of order 0, with σ₀ in place of σ:
     total += (ratio * lobe**ratio - lobe) * powers[orders.qy == 0][:, orders.qx == 0].sum()
     return float(4 * np.pi**2 * sigma**4 * total)
-
-
-def second_order_factors(
-    orders: Orders, screen: Complex, slopes: Slopes, c: Complex, s: float
-) -> Real:
-    """F_j of (10), (y, x); c : c_l and c_t, the second order's kernel for these directions."""
-    # Spectra of the products xx, xy, yy of the filtered slopes times the screen: D of (10)
-    spectra = orders.waves_y @ (slopes.products * screen) @ orders.waves_x.T / screen.size
-    q = np.stack(np.meshgrid(orders.qx, orders.qy), axis=-1)
-    others = np.any(q != 0, axis=-1) & (orders.a != 0)  # F_0 = 1
-    d = along(q[others], np.moveaxis(spectra[:, others], 0, -1))
-    r = np.conj(d / orders.a[others][:, None])  # a D*/|a|²
-    x = s * (slopes.gate * r @ c)
-    factors = np.ones(orders.a.shape)
-    factors[others] = np.abs(1.0 + x / np.maximum(1.0, np.abs(x) / 0.5)) ** 2
-    return factors
 
 
 def blended(tangent_plane: Complex, gentle: Complex, s: Real) -> Complex:

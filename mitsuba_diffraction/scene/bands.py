@@ -80,7 +80,7 @@ def wider_tables(first: float) -> Iterator[None]:
     first : nm; default tables begin at 360.
     """
     from ..plugin.diffraction import Diffraction
-    from ..plugin.transmission.diffraction_dielectric import DiffractionDielectric
+    from ..plugin.diffraction_dielectric import DiffractionDielectric
 
     first = min(first, SHORTEST_WAVELENGTH)
 

@@ -22,7 +22,7 @@ from mitsuba_diffraction.plugin.description import (
     Material,
     Nested,
     Quantity,
-    SecondOrder,
+
     Surface,
     describe,
 )
@@ -58,7 +58,6 @@ def base() -> Surface:
 
 
 CONDUCTOR = Material(Feature.CONDUCTOR, lambda lam: 0.01 * lam / 5 + 6j)
-SECOND = SecondOrder(1.5, TABLE.slope_ratios)
 #: Change of the description that gives a surface the feature.
 CHANGES: Mapping[Feature, dict] = {
     Feature.TRANSMISSION: {"transmits": True},
@@ -69,7 +68,6 @@ CHANGES: Mapping[Feature, dict] = {
     Feature.FILM: {"film": Film(1.3 + 0j, 100.0)},
     Feature.KIRCHHOFF: {"model": "kirchhoff"},
     Feature.OWN_MODEL: {"model": "level"},
-    Feature.SECOND_ORDER: {"second_order": SECOND},
     Feature.ENERGY_SCALE: {"energy": Energy(half, lambda scale: None)},
     Feature.SHADOWING: {"shadowing": True},
     Feature.PATCH: {"coherence": "patch"},
@@ -81,7 +79,6 @@ CHANGES: Mapping[Feature, dict] = {
     Feature.ORIENTATION: {"orientation": Quantity(30.0)},
     Feature.VARYING_ORIENTATION: {"orientation": Quantity(0.0, TEXTURE)},
     Feature.NESTED: {"nested": Nested(None)},
-    Feature.THESIS: {"nested": Nested(None, 0.2)},
 }
 
 
@@ -150,7 +147,6 @@ PARAMETERS = [
     ({"coat_ior": 1.3}, Feature.COAT),
     ({"film_ior": 1.3, "film_thickness": 100.0}, Feature.FILM),
     ({"model": "kirchhoff"}, Feature.KIRCHHOFF),
-    ({"second_order": True}, Feature.SECOND_ORDER),
     ({"shadowing": "vcavity"}, Feature.SHADOWING),
     ({"coherence": "patch"}, Feature.PATCH),
     ({"coherence": "surface", "uv_scale": 10.0}, Feature.PLACED),
@@ -158,7 +154,6 @@ PARAMETERS = [
     ({"lateral_scale": 0.5}, Feature.LATERAL_SCALE),
     ({"orientation": 30.0}, Feature.ORIENTATION),
     ({"beneath": {"type": "diffuse"}}, Feature.NESTED),
-    ({"beneath": {"type": "diffuse"}, "layering": "thesis"}, Feature.THESIS),
     ({"plugin": "diffraction_dielectric"}, Feature.TRANSMISSION),
 ]
 

@@ -37,6 +37,8 @@ class Surface:
             raise error
         self.derived = sum(self.values())
 
+    changed = derive
+
     def assign(self, number: float, value: float) -> None:
         mi.set_property(self.number.value, mi.Float(number))
         mi.traverse(self.spectrum).update({"value": value})

@@ -10,7 +10,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.plugin.presets import find_preset, presets
-from mitsuba_diffraction.plugin.surface_parameters import NAMES
+from mitsuba_diffraction.plugin.parameters import NAMES
 
 PRESETS = presets()
 

@@ -12,7 +12,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
-from mitsuba_diffraction.plugin import fresnel
+from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import Array, as_single, rough_patch, uniform_directions
 from tests.support.variants import evaluate, interaction, runs
@@ -229,7 +229,7 @@ def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) ->
     for tinted in (True, False):
         with monkeypatch.context() as patch:
             if not tinted:
-                patch.setattr(fresnel, "metal_tint", lambda *_: np.eye(3))
+                patch.setattr(materials, "metal_tint", lambda *_: np.eye(3))
             si = interaction(wi, lines)
             found = np.array(load(material="Au").eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))).T
         errors.append(delta_e(truth, found, least=1e-3))

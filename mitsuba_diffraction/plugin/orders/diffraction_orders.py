@@ -65,9 +65,9 @@ import mitsuba as mi
 from ...errors import warn
 from ...optics.geometry import sigma_of
 from ...tables.orders import CrossedTable, OrderTable
-from ..description import Nested, Surface
+from ..base import SurfaceBSDF
+from ..description import Surface
 from ..directions import Pair, PatchFrame, Site
-from ..nesting import NestingBSDF
 from ..sampling import direction_of
 from ..types import (
     Colour,
@@ -86,7 +86,7 @@ from .lobes import DaylightLobes, Lobes, SpectralLobes, Window
 from .polarised_lobes import PolarisedLobes, PolarisedLookup
 
 
-class DiffractionOrders(NestingBSDF):
+class DiffractionOrders(SurfaceBSDF):
     """Reflection by a grating with solved orders.
 
     Attributes
@@ -116,18 +116,18 @@ class DiffractionOrders(NestingBSDF):
     # ------------------------------------------------------------------ the diffraction
 
     def site_at(self, si: Interaction, active: Mask) -> Site:
-        """See `NestingBSDF.site_at`."""
+        """See `SurfaceBSDF.site_at`."""
         return Site(si, PatchFrame(self.orientation.rotation(si, active)))
 
     def diffracted(
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `NestingBSDF.diffracted`."""
+        """See `SurfaceBSDF.diffracted`."""
         light = self._lobes.reflected(Pair(site.si, wo, site.frame, active), site.si, None, ctx)
         return light.value, light.density
 
-    def draw(self, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
-        """Draw an order by its efficiency, and a direction in its lobe; see `NestingBSDF.draw`."""
+    def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
+        """Draw an order by its efficiency, and a direction in its lobe; see `SurfaceBSDF.draw`."""
         return self._drawn(site, sample1, sample2)[0]
 
     def _drawn(self, site: Site, sample1: Float, sample2: Vector2f) -> tuple[Vector3f, Mask]:
@@ -146,18 +146,18 @@ class DiffractionOrders(NestingBSDF):
         return dr.detach(direction)
 
     def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
-        """See `NestingBSDF.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
+        """See `SurfaceBSDF.beneath`: T(ωi) T(ωo), T = 1 − Σ η_m."""
         inwards, outwards = (
             dr.maximum(1.0 - self._albedo(direction, site), 0.0) for direction in (site.si.wi, wo)
         )
         return inwards * outwards
 
     def reflected_share(self, site: Site, active: Mask) -> Colour:
-        """See `NestingBSDF.reflected_share`."""
+        """See `SurfaceBSDF.reflected_share`."""
         return self._albedo(site.si.wi, site)
 
     def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `NestingBSDF.normal_reflectance`."""
+        """See `SurfaceBSDF.normal_reflectance`."""
         return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), site))
 
     def _albedo(self, direction: Vector3f, site: Site) -> Colour:
@@ -167,9 +167,9 @@ class DiffractionOrders(NestingBSDF):
 
     # ------------------------------------------------------------------ the surface
 
-    def derive(self) -> None:
-        """Collect what `dr.freeze` must know."""
-        self.freeze((self._lobes, self.orientation), self.table.digest(), self.coherence_width)
+    def kernel_constants(self) -> tuple[object, ...]:
+        """See `PluginBSDF.kernel_constants`."""
+        return self.table.digest(), self.coherence_width
 
     def describe(self) -> Surface:
         """Return the description of the surface (`description.describe`)."""
@@ -179,7 +179,7 @@ class DiffractionOrders(NestingBSDF):
             coherence_width=float(self.coherence_width),
             orientation=self.orientation.quantity,
             frame=lambda si: (*self.orientation.rotation(si, mi.Mask(True)), 1.0),
-            nested=None if self.nested is None else Nested(self.nested),
+            nested=self.nested,
             transmits=self.table.sides == 2,
         )
 

@@ -11,8 +11,8 @@ from ...settings import USUAL_WIDTH, checked
 from ...tables.orders import CrossedTable, OrderTable, load_any_orders
 from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
+from ..parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..properties import class_of
-from ..surface_parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..textures import Orientation
 from ..types import BSDF, Properties
 

@@ -12,7 +12,6 @@ import drjit as dr
 import mitsuba as mi
 
 from ..directions import Pair, Site
-from ..lifecycle import both_sides
 from ..types import Context, Float, Mask, Properties, Spectrum, Vector2f, Vector3f
 from .diffraction_orders import DiffractionOrders
 from .grating_parameters import read_parameters
@@ -45,14 +44,12 @@ class Passage(Pair):
 class OrdersBlock(OrdersSheet):
     """Reflection and transmission of a block's face with solved orders, from outside and within."""
 
-    def components(self) -> list[int]:
-        """See `PluginBSDF.components`."""
-        return both_sides(mi.BSDFFlags.NonSymmetric)
+    media_differ = True
 
-    def evaluated(
+    def diffracted(
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `OrdersSheet.evaluated`."""
+        """See `OrdersSheet.diffracted`."""
         cos_i, cos_o = mi.Frame3f.cos_theta(site.si.wi), mi.Frame3f.cos_theta(wo)
         lit = active & (cos_i * cos_o != 0.0) & requested(ctx, cos_i * cos_o < 0.0)
         came, left = self._index(cos_i > 0.0), self._index(cos_o > 0.0)
@@ -75,7 +72,7 @@ class OrdersBlock(OrdersSheet):
         return self._direction(tangential / self._index(above), drawn.valid), below
 
     def relative_index(self, cos_i: Float, cos_o: Float) -> Float:
-        """See `OrdersSheet.relative_index`."""
+        """See `SurfaceBSDF.relative_index`."""
         return self._index(cos_o > 0.0) / self._index(cos_i > 0.0)
 
     def _index(self, above: Mask) -> Float:

@@ -23,7 +23,6 @@ from .packing import (
     pack_conductor,
     pack_energy,
     pack_powers,
-    pack_second_order,
 )
 from .texels import Packed, Uniform
 
@@ -56,9 +55,6 @@ class Modelled:
         definitions, uniforms = {"DIFFRACTING": ""}, dict[str, Uniform]()
         if described.shadowing:
             definitions["VCAVITY"] = ""
-        if described.nested is not None and described.nested.weight is not None:
-            definitions["THESIS"] = ""
-            uniforms["diffuse_weight"] = described.nested.weight
         if described.coat is not None:
             definitions["COATED"] = ""
             uniforms["coat"] = self._coat
@@ -66,8 +62,6 @@ class Modelled:
         packed = Packed((), uniforms, definitions)
         if described.model != "kirchhoff" or described.coat is not None:
             packed |= pack_boundary(MODELS[described.model], described.patch.roughness)
-        if (second := described.second_order) is not None:
-            packed |= pack_second_order(second.index, second.ratios)
         return packed | _reflectance(described.material)
 
     def conservation(self, scales: Sequence[float]) -> Packed:

@@ -28,7 +28,7 @@ def patch():
 
 
 def test_every_parameter_is_described_once(some_variant):
-    from mitsuba_diffraction.plugin.surface_parameters import NAMES
+    from mitsuba_diffraction.plugin.parameters import NAMES
 
     shared = set(NAMES["diffraction"]) & set(NAMES["diffraction_dielectric"])
     assert set(BY_NAME) == {*NAMES["diffraction"], "(nested)"}

@@ -3,7 +3,7 @@
 Interface of two dielectrics, or thin sheet with one structured side, in light from either
 side. It has the parameters of `diffraction` for the heights, the table (without
 `coherence=surface`), `orientation`, `lateral_scale`, `height_scale` and `wavelength`, and those
-below. It has no coat, film, nested BSDF, shadowing or second order.
+below. It has no coat, film, nested BSDF or shadowing.
 
 The dielectric
 --------------
@@ -56,40 +56,36 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ...optics import through
-from ...optics.boundary import Geometry, Jones, geometry, power
-from ...optics.coat import transmittances
-from ...optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
-from ..boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
-from ..description import Surface
-from ..directions import Pair, Site, TablePoint
-from ..fresnel import Inside
-from ..layers import CoatedPair
-from ..lifecycle import asked_sides, both_sides, sample_of
-from ..sampling import EVEN, direction_of, with_even_share
-from ..sources import TableProvider, from_cache
-from ..surface import DiffractingSurface
-from ..types import (
+from ..optics import through
+from ..optics.boundary import Geometry, Jones, geometry, power
+from ..optics.coat import transmittances
+from ..optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
+from . import parameters as read
+from .arithmetic import plain
+from .base import asked_sides
+from .boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
+from .directions import CoatedPair, Crossing, Pair, Sides, Site, TablePoint, Turned
+from .energy import DielectricEnergy
+from .materials import Dielectric, Inside
+from .properties import flag
+from .sampling import EVEN, direction_of, with_even_share
+from .surface import DiffractingSurface
+from .types import (
     Colour,
     Context,
     Float,
     Interaction,
     Mask,
     Properties,
-    Sample,
     Spectrum,
     Vector2f,
     Vector3f,
 )
-from .crossing import Crossing, Sides, Turned
-from .dielectric_parameters import read_parameters
-from .energy import DielectricEnergy
 
 _LEAST_SHARE = 0.1
 
@@ -105,40 +101,47 @@ class DiffractionDielectric(DiffractingSurface):
     """
 
     title = "DiffractionDielectric"
+    transmits = True
+    energy: DielectricEnergy | None
 
-    def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
-        read = read_parameters(props, provider)
-        super().__init__(props, read.surface, read.material)
-        self.material, self.thin, self.boundary = read.material, read.thin, read.boundary
-        inside = Inside(self.material, self.thin)
-        self.inner_boundary = self.boundary.of(inside)
-        self.mirror = Boundary(KIRCHHOFF, self.material)
-        self._energy = None
-        if read.surface.energy_conserving:
-            self._energy = DielectricEnergy(
-                self.table, self.material, str(self.boundary), self.thin, self.wavelength
-            )
+    def __init__(self, props: Properties) -> None:
+        nested, material = read.nested_of(props, read.TRANSMITTING), read.transmissive_of(props)
+        # Light below the surface has the wavelength λ/n
+        super().__init__(props, nested, material, plain(material.eta))
+        self.material: Dielectric = material
+        self.thin = flag(props, "thin", False)
+        self.inner_boundary = self.boundary.of(Inside(material, self.thin))
+        self.mirror = Boundary(KIRCHHOFF, material)
+        if self.energy_conserving:
+            model = self.boundary.model.name
+            self.energy = DielectricEnergy(self.table, self.wavelength, material, model, self.thin)
         self.ready()
 
-    def components(self) -> list[int]:
-        """See `PluginBSDF.components`."""
-        return both_sides(0 if self.thin else mi.BSDFFlags.NonSymmetric)
+    @property
+    def media_differ(self) -> bool:
+        """See `SurfaceBSDF.media_differ`."""
+        return not self.thin
 
-    # ------------------------------------------------------------------ Mitsuba's interface
+    def relative_index(self, cos_i: Float, cos_o: Float) -> Float:
+        """See `SurfaceBSDF.relative_index`."""
+        sides = Sides.of(self.material.eta, self.thin, cos_i > 0.0)
+        return sides.out / sides.into
 
-    def evaluated(
+    # ------------------------------------------------------------------ light and draws
+
+    def diffracted(
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """See `NestingBSDF.evaluated`."""
+        """See `SurfaceBSDF.diffracted`."""
         si, frame = site.si, site.frame
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         reflects, transmits = asked_sides(ctx)
         share = self._staying_share(cos_i, ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        change, where = None, (frame, site.wavenumbers, site.scale)
-        if self._energy is not None and self._energy.scales_order_0:
-            change = self._energy.order_0_scale((si.wi, wo), *where)
+        change = None
+        if self.energy is not None and self.energy.scales_order_0:
+            change = self.energy.order_0_scale(site, wo)
         if reflects:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
@@ -153,25 +156,16 @@ class DiffractionDielectric(DiffractingSurface):
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, site.scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self._energy is not None:
+        if self.energy is not None:
             # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), *where))
+            value *= mi.Spectrum(self.energy.attenuation(site, wo))
         return value, density
 
-    def sample(
-        self,
-        ctx: Context,
-        si: Interaction,
-        sample1: Float,
-        sample2: Vector2f,
-        active: Mask = True,
-    ) -> tuple[Sample, Spectrum]:
+    def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
         """Draw a side by the flat reflectance, then a direction by the orders."""
-        cos_i = mi.Frame3f.cos_theta(si.wi)
-        active = mi.Mask(active) & (cos_i != 0.0)
-        site = self.site_at(si, active)
+        si, cos_i = site.si, mi.Frame3f.cos_theta(site.si.wi)
         share = self._staying_share(cos_i, ctx)
-        reflected, passed = sample1 < share, sample1 >= share
+        reflected = sample1 < share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
@@ -187,18 +181,14 @@ class DiffractionDielectric(DiffractingSurface):
             sample2,
             si,
         )
-        drawn = sign * site.frame.from_table(drawn)
-        total = drawn - sides.into * mi.Vector2f(si.wi.x, si.wi.y)
+        total = sign * site.frame.from_table(drawn) - sides.into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
             sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
-        active &= wo.z > 0.0
+        # 0, where no light goes, of a direction beyond the horizon
+        wo.z = dr.maximum(wo.z, 0.0)
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
-        value, density = self.evaluated(ctx, site, wo, active, "vd")
-        active &= density > 0.0
-        eta = dr.select(reflected, 1.0, out / sides.into)
-        result = sample_of(wo, dr.select(active, density, 0.0), passed, eta)
-        return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
+        return wo
 
     # ------------------------------------------------------------------ reflection
 
@@ -342,26 +332,15 @@ class DiffractionDielectric(DiffractingSurface):
     # ------------------------------------------------------------------ changes of parameters
 
     def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
+        """See `PluginBSDF.refusals`."""
         yield from super().refusals()
         yield self.optical_refusal(self.material.eta, "eta", "int_ior")
 
-    def derive(self) -> None:
-        """Compute what depends on the parameters: the index, and scales of both sides."""
-        self.material.derive()
-        if self._energy is not None:
-            self._energy.update(self.scale_range())
-        self.freeze(
-            (self._energy, self.boundary, self.inner_boundary, self.mirror),
-            self.thin,
-            str(self.boundary),
-            self._energy is not None and self._energy.scales_order_0,
-            self._energy is not None and self._energy.attenuates,
-        )
-
-    def describe(self) -> Surface:
-        """See `DiffractingSurface.describe`."""
-        return replace(super().describe(), transmits=True)
+    def kernel_constants(self) -> tuple[object, ...]:
+        """See `PluginBSDF.kernel_constants`."""
+        energy = self.energy
+        scales = energy is not None and (energy.scales_order_0, energy.attenuates)
+        return *super().kernel_constants(), self.thin, scales
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""

@@ -1,4 +1,7 @@
-"""Materials: a dielectric, a conductor or a perfect mirror; indices and reflectance (Dr.Jit)."""
+"""Materials: a dielectric, a conductor or a perfect mirror; indices and reflectance (Dr.Jit).
+
+Materials under a film, a coat or a stack (`layers`, `stack`) are materials, too.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.colour import LONGEST, SHORTEST, metal_tint
-from ..optics.fresnel import normal_reflectance
+from ..optics.colour import RGB_WAVELENGTHS, metal_tint
+from ..optics.fresnel import normal_reflectance, reflectance
 from ..optics.materials import SODIUM, TISSUES
-from .conductors import (
-    extended_texture,
-    parameters_of,
-    tabulated,
-    tabulated_range,
-    texture_at,
-    unknown_conductor,
-)
-from .parameter_changes import Bounded, Changeable, ObjectValues, children
-from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
+from .arithmetic import plain
+from .conductors import spectrum_texture, tabulated_index
+from .description import Feature
+from .memory import upload
+from .parameter_changes import Bounded, Changeable, ObjectValues
+from .types import Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
 #: Bounds of ratios of refractive indices: beyond, squares leave single precision's range.
 INDICES = (1e-3, 1e3)
@@ -38,27 +37,85 @@ _VISIBLE = np.arange(380.0, 780.0)
 _REQUIRED = (400.0, 700.0)
 
 
-class Perfect:
-    """R = 1 at every angle, `material="none"`."""
+class Material:
+    """What a surface reflects with: an index in each channel, and what follows from it.
+
+    Attributes
+    ----------
+    changeable : parameters that `traverse` exposes.
+    kind : MIRROR, DIELECTRIC, RARER or CONDUCTOR.
+    name : of a tabulated material, else empty.
+    absorbs : whether light that is not reflected is absorbed, and none goes beneath.
+    tint : columns of `optics.colour.metal_tint` in RGB variants, of a tabulated metal.
+    """
 
     changeable: tuple[Changeable, ...] = ()
+    kind = Feature.DIELECTRIC
+    name = ""
+    absorbs = False
+    tint: list[Colour] | None = None
+
+    def indices(self, si: Interaction, active: Mask) -> list[Any]:
+        """Return the index of each channel, relative to the medium above, or one for all."""
+        raise NotImplementedError
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """R for the cosine (mi.Float) of the angle to the half vector, mi.UnpolarizedSpectrum."""
-        return mi.UnpolarizedSpectrum(1.0)
+        """Reflectance of the flat surface for unpolarised light.
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose nothing."""
+        cos_theta : of the angle of incidence, or of that to the half vector.
+        """
+        return self.channels([reflectance(cos_theta, n) for n in self.indices(si, active)])
+
+    def channels(self, values: list[Float]) -> Colour:
+        """Return the channels' values from the values of `indices`."""
+        return mi.UnpolarizedSpectrum(values if len(values) > 1 else values[0])
+
+    def wavenumbers(self, wavenumbers: list[Float]) -> list[Float]:
+        """Return wavenumbers of `indices`, rad/µm, from the channels' wavenumbers."""
+        return wavenumbers
+
+    def at(self, wavelengths: Array) -> Any:
+        """Return n + ik at wavelengths (n,), nm, in the variant's colours; None for R = 1."""
+        indices = []
+        # one look-up of all wavelengths in a kernel, or one for each
+        at_once = not mi.is_spectral or dr.is_jit_v(mi.Float)
+        for light in [wavelengths] if at_once else wavelengths[:, None]:
+            si = dr.zeros(mi.SurfaceInteraction3f, len(light) if mi.is_spectral else 1)
+            if mi.is_spectral:
+                values = upload(mi.Float, light.astype(np.float32)) if at_once else float(light[0])
+                si.wavelengths = mi.UnpolarizedSpectrum(values)
+            indices.append([_lanes(n) for n in self.indices(si, True)])
+        if not mi.is_rgb:
+            values = np.concatenate([channels[0] for channels in indices])
+            return np.broadcast_to(values, wavelengths.shape)
+        colours = np.broadcast_to(np.ravel(indices[0]), len(RGB_WAVELENGTHS))
+        return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
+
+    def refusal(self) -> str | None:
+        """Reason why parameters that are allowed each by itself are refused together, or None."""
 
     def derive(self) -> None:
-        """Derive nothing."""
+        """Derive what depends on the parameters."""
+
+
+class Perfect(Material):
+    """R = 1 at every angle, `material="none"`."""
+
+    kind = Feature.MIRROR
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """See `Material.reflectance`."""
+        return mi.UnpolarizedSpectrum(1.0)
+
+    def at(self, wavelengths: Array) -> None:
+        """See `Material.at`."""
 
     def __str__(self) -> str:
         return "none"
 
 
-class Dielectric:
-    """Fresnel reflectance of an interface between two dielectrics, unpolarised.
+class Dielectric(Material):
+    """Interface between two dielectrics.
 
     Parameters
     ----------
@@ -68,7 +125,6 @@ class Dielectric:
     Attributes
     ----------
     eta : the ratio.
-    changeable : parameters that `traverse` exposes.
     reflects_all : whether there is total reflection: the medium above is the denser one.
     """
 
@@ -79,28 +135,26 @@ class Dielectric:
         name: str = "eta",
         least: float = INDICES[0],
     ) -> None:
-        probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
-        eta = float(dr.slice(mi.traverse(probe)["eta"]))
+        eta = _ratio(int_ior, ext_ior)
         self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
-        self.eta = self._index.value
-        self.changeable = (self._index,)
-        self.traverse, self.refusal = self._index.traverse, self._index.refusal
+        self.eta, self.changeable = self._index.value, (self._index,)
         self.derive()
 
-    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """R for the cosine of the angle to the half vector, the same at every wavelength."""
-        return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
-
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
-        """The relative index, one for all channels; complex where there is total reflection."""
+        """Return one index for all channels; complex where there is total reflection."""
         return [mi.Complex2f(self.eta, 0.0) if self.reflects_all else self.eta]
 
     def derive(self) -> None:
         """Determine whether there is total reflection, for which kernels differ."""
-        self.reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
+        self.reflects_all = plain(self.eta) < 1.0
+        self.kind = Feature.RARER if self.reflects_all else Feature.DIELECTRIC
+
+    def refusal(self) -> str | None:
+        """See `Material.refusal`."""
+        return self._index.refusal()
 
     def __str__(self) -> str:
-        return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
+        return f"dielectric[eta = {plain(self.eta):.5g}]"
 
 
 def _ratio_refusal(name: str, least: float, ratio: float) -> str:
@@ -111,32 +165,27 @@ def _ratio_refusal(name: str, least: float, ratio: float) -> str:
     )
 
 
-class Inside:
+class Inside(Material):
     """Dielectric seen from within: the medium above it, over the dielectric."""
-
-    reflects_all = True
 
     def __init__(self, outside: Dielectric, thin: bool) -> None:
         self._outside, self._thin = outside, thin
 
-    def reflectance(self, cosine: Float, si: Interaction, active: Mask) -> Colour:
-        """R for the cosine inside."""
-        return mi.UnpolarizedSpectrum(mi.fresnel(cosine, dr.rcp(self._outside.eta))[0])
-
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
-        """The index, one for all channels; light from outside is never reflected totally."""
+        """Return one index for all channels; light from outside is never reflected totally."""
         index = dr.rcp(self._outside.eta)
         return [index if self._thin else mi.Complex2f(index, 0.0)]
 
 
-class Conductor:
-    """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
+class Conductor(Material):
+    """Conductor, or a material with an index over wavelength: textures eta and k."""
+
+    kind = Feature.CONDUCTOR
 
     def __init__(self, eta: ObjectValues, k: ObjectValues, name: str) -> None:
         self.eta: Texture = eta.thing
         self.k: Texture = k.thing
         self.name, self.changeable = name, (eta, k)
-        #: Whether light that is not reflected is absorbed, and none goes beneath.
         self.absorbs = True
         self.medium: Dielectric | None = None  #: medium above, if not air
         #: Index of the medium above over that of `medium`, which is one number; None if it is 1.
@@ -144,8 +193,6 @@ class Conductor:
         self.above = ""  #: name of the medium whose dispersion it is
         # of RGB's channels: the index over wavelengths, and as the channels have it
         self._spectrum: tuple[Array, Array] | None = None
-        #: Columns of `optics.colour.metal_tint`, in RGB variants and of a tabulated material.
-        self.tint: list[Colour] | None = None
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
@@ -155,8 +202,8 @@ class Conductor:
 
         Raises a DiffractionError if the material is unknown, or its table is too short.
         """
-        objects = children(_load("conductor", **parameters_of(material)))
-        first, last = tabulated_range(material) or (SHORTEST, LONGEST)
+        nodes, index = tabulated_index(material)
+        first, last = nodes[0], nodes[-1]
         needed = (wavelength, wavelength) if mi.is_monochromatic else _REQUIRED
         if not first <= needed[0] <= needed[1] <= last:
             raise DiffractionError(
@@ -164,16 +211,15 @@ class Conductor:
                 f"from {needed[0]:g} to {needed[1]:g} nm is needed; choose another material, or "
                 "give spectra of eta and k"
             )
-        if mi.is_monochromatic:
-            objects = {name: texture_at(material, name, wavelength) for name in INDEX_PARTS}
-        elif mi.is_spectral and not first <= SHORTEST < LONGEST <= last:
-            objects = {name: extended_texture(material, name) for name in INDEX_PARTS}
-        eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
+        parts = zip(INDEX_PARTS.items(), (index.real, index.imag), strict=True)
+        eta, k = (
+            ObjectValues(name, spectrum_texture(nodes, part, wavelength), bounds)
+            for (name, bounds), part in parts
+        )
         conductor = cls(eta, k, material)
         conductor.absorbs = material not in TISSUES or TISSUES[material].absorbs
         if mi.is_rgb:
-            index = tabulated(material, "eta", _VISIBLE) + 1j * tabulated(material, "k", _VISIBLE)
-            conductor._spectrum = index, conductor._channels()
+            conductor._spectrum = np.interp(_VISIBLE, nodes, index), conductor._channels()
         return conductor
 
     def disperse(self, above: str, wavelength: float) -> None:
@@ -182,22 +228,8 @@ class Conductor:
         wavelength : nm, where mono variants take it.
         """
         nodes = TISSUES[above].nodes
-        ratio = dispersion_of(above, nodes)
-        spectrum: dict[str, Any] = {
-            "type": "spectrum",
-            "value": list(zip(nodes.tolist(), ratio.tolist(), strict=True)),
-        }
-        if mi.is_monochromatic:
-            one = float(dispersion_of(above, np.array(wavelength)))
-            spectrum = {"type": "uniform", "value": one}
-        # a conductor's spectra are without bounds in every variant
-        loaded = _load("conductor", eta=spectrum, k={"type": "uniform", "value": 0.0})
-        self.above, self.dispersion = above, children(loaded)["eta"]
-
-    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """R for the cosine of the angle to the half vector, at si.wavelengths."""
-        indices = self.indices(si, active)
-        return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
+        self.above = above
+        self.dispersion = spectrum_texture(nodes, dispersion_of(above, nodes), wavelength)
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
         """The complex index n + ik of each channel, relative to the medium above."""
@@ -224,17 +256,12 @@ class Conductor:
         )
         return np.asarray(eta + 1j * k)
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose both spectra."""
-        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
-        callback.put("k", self.k, mi.ParamFlags.Differentiable)
-
     def derive(self) -> None:
         """Tint the colours of a tabulated metal; a changed index has no known spectrum."""
         self.tint = None
         if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
             return
-        above = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
+        above = 1.0 if self.medium is None else plain(self.medium.eta)
         spectrum, channels = (
             normal_reflectance(index / (above * ratio))
             for index, ratio in zip(self._spectrum, self._dispersion_spectrum(), strict=True)
@@ -252,13 +279,9 @@ def dispersion_of(tissue: str, wavelengths: Array) -> Array:
     return np.asarray(index(wavelengths).real / index(SODIUM).real)
 
 
-Reflectance = Perfect | Dielectric | Conductor
-
-
-def tinted(value: Spectrum, material: object) -> Spectrum:
+def tinted(value: Spectrum, material: Material) -> Spectrum:
     """Correct a metal's colour in RGB variants to the colour of its spectrum."""
-    tint: list[Colour] | None = getattr(material, "tint", None)
-    if tint is None:
+    if (tint := material.tint) is None:
         return value
 
     def of_channels(channels: Colour) -> Colour:
@@ -270,16 +293,22 @@ def tinted(value: Spectrum, material: object) -> Spectrum:
     return mi.Spectrum([[of_channels(value[i, j]) for j in range(4)] for i in range(4)])
 
 
-def _load(plugin: str, **parameters: Any) -> BSDF:
-    """Load one of Mitsuba's own BSDFs, which know the names of materials."""
+def _lanes(number: Number) -> Array:
+    """Return a number of each lane as an array (lanes,)."""
+    parts = (number.real, number.imag) if dr.is_complex_v(number) else (number, mi.Float(0.0))
+    real, imaginary = (np.array(dr.detach(part), np.float64).ravel() for part in parts)
+    return np.asarray(real + 1j * imaginary)
+
+
+def _ratio(int_ior: float | str, ext_ior: float | str) -> float:
+    """Return a ratio of indices, or of media that Mitsuba knows by name."""
     try:
-        return mi.load_dict({"type": plugin, **parameters})
+        probe = mi.load_dict({"type": "dielectric", "int_ior": int_ior, "ext_ior": ext_ior})
     except Exception as error:  # Mitsuba throws RuntimeError, over several lines
-        arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
-        if plugin == "conductor":
-            raise DiffractionError(unknown_conductor(str(parameters.get("material")))) from error
         raise DiffractionError(
-            f"{arguments} is not a material that Mitsuba knows ({reason[:200]}); give a number, a "
-            "name from Mitsuba's table of materials, or eta and k"
+            f"int_ior={int_ior!r}, ext_ior={ext_ior!r} is not a material that Mitsuba knows "
+            f"({reason[:200]}); give a number, a name from Mitsuba's table of materials, or eta "
+            "and k"
         ) from error
+    return float(dr.slice(mi.traverse(probe)["eta"]))

@@ -1,0 +1,202 @@
+"""Numbers over a surface: one number between bounds, or a texture or mesh attribute (Dr.Jit).
+
+Heights, lengths, weights and depths are of this kind; `textures.Orientation` is an angle.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+from .arithmetic import plain
+from .description import Quantity
+from .memory import index_between
+from .parameter_changes import Bounded, Changeable, ObjectValues
+from .properties import number
+from .textures import is_bitmap, range_of, require_raw
+from .types import Float, Interaction, Mask, Properties, Texture
+
+#: Least number that stands for one above 0: less would be lost in single precision.
+LEAST_SCALE = 1e-30
+
+
+class Varying:
+    """One number, or a texture's or mesh attribute's number at each point.
+
+    Parameters
+    ----------
+    name : of the parameter.
+    value : number or raw texture of one channel.
+    low, high : bounds; a texture's numbers are clamped to them.
+    positive : whether the number must be above 0, where `low` is; a texture's 0 is a tiny number.
+    advice : end of the message on a number out of bounds.
+
+    Attributes
+    ----------
+    texture : the texture, or None.
+    changeable : parameters that `traverse` exposes.
+
+    Raises a DiffractionError if a number, or a texture's known range, is out of bounds.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        value: float | Texture,
+        low: float,
+        high: float,
+        *,
+        positive: bool = False,
+        advice: str = "",
+    ) -> None:
+        self.name, self.low, self.high, self._advice = name, low, high, advice
+        self._least = LEAST_SCALE if positive and low == 0.0 else low
+        self.texture = value if isinstance(value, mi.Texture) else None
+        self.changeable: tuple[Changeable, ...]
+        if self.texture is None:
+            # to single precision, as bounds are
+            bounded = Bounded(name, float(np.float32(value)), self._least, high, self._message)
+            self._number, self.changeable = bounded.value, (bounded,)
+            refused = bounded.refusal()
+        else:
+            require_raw(self.texture, name, "numbers")
+            self.changeable = (ObjectValues(name, self.texture),)
+            refused = self.refusal()
+        if refused:
+            raise DiffractionError(refused)
+
+    def at(self, si: Interaction, active: Mask) -> Float:
+        """Return the number at points of the surface."""
+        if self.texture is None:
+            return self._number
+        return index_between(self.texture.eval_1(si, active), self._least, self.high)
+
+    @property
+    def number(self) -> float:
+        """The number, or the upper bound of a texture's numbers."""
+        return self.high if self.texture is not None else plain(dr.max(self._number))
+
+    def range(self) -> tuple[float, float]:
+        """Return the smallest and the largest number, as far as known."""
+        if self.texture is None:
+            return self.number, self.number
+        known = range_of(self.texture) if is_bitmap(self.texture) else None
+        return known or (self.low, self.high)
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether derivatives with respect to the number are wanted."""
+        return self.texture is None and dr.grad_enabled(self._number)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The number, for descriptions."""
+        return Quantity(self.number, self.texture)
+
+    def refusal(self) -> str | None:
+        """Reason why a texture's numbers are not allowed, or None."""
+        if self.texture is None or (known := range_of(self.texture)) is None:
+            return None
+        # to single precision; procedural textures are clipped, as the documentation says
+        high = known[1] if is_bitmap(self.texture) else min(known[1], self.high)
+        wrong = [x for x in (known[0], high) if not self.low <= x <= self.high * (1.0 + 1e-6)]
+        return self._message(wrong[0]) if wrong else None
+
+    def _message(self, value: float) -> str:
+        low = "above 0" if self._least > self.low else f"{self.low:g}"
+        return f"{self.name}={value:g} must be {low} to {self.high:g}{self._advice}"
+
+    def __str__(self) -> str:
+        return f"{self.number:g}" if self.texture is None else " ".join(str(self.texture).split())
+
+
+#: Largest factor on heights.
+MOST_SCALE = 1e3
+#: Bounds of factors on lengths: beyond, the coherence window covers no period, or all of a scan.
+LEAST_STRETCH, MOST_STRETCH = 0.01, 100.0
+
+
+def largest_of(props: Properties, name: str, least: float, most: float) -> tuple[Any, float]:
+    """Return a scene's factor, a number or a texture, 1 by default, and its largest value.
+
+    The largest value of a texture is the parameter `…_max` or that of a bitmap; that of a number is
+    the number itself.
+
+    Raises a DiffractionError with the parameter, its value and the allowed values.
+    """
+    value: Any = dict(props.objects()).get(name)
+    largest = number(props, f"{name}_max", 1.0) if f"{name}_max" in props else None
+    if not isinstance(value, mi.Texture):
+        value = number(props, name, 1.0)
+        described, found = name, value
+    elif is_bitmap(value) and largest is None:
+        known = range_of(value)
+        assert known is not None
+        described, found = f"{name}: its largest factor,", known[1]
+    elif largest is None:
+        raise DiffractionError(
+            f"{name} of a texture other than a bitmap, or of a mesh attribute, needs {name}_max, "
+            "the largest factor that it has"
+        )
+    else:
+        described, found = f"{name}_max", largest
+    if not least <= found <= most:  # also refuses NaN
+        low = "above 0" if least == LEAST_SCALE else f"at least {least:g}"
+        raise DiffractionError(f"{described}={found:g} must be {low} and at most {most:g}")
+    return value, found
+
+
+class LateralScale:
+    """Factor by which the patch is stretched in its plane.
+
+    Attributes
+    ----------
+    factor : the factor; None without lateral_scale, where kernels have no operation for it.
+    of_table : factor by which the table's heights are stretched: the largest, or 1 where none is
+        above 1, so that no look-up goes beyond the table's frequencies.
+    """
+
+    def __init__(self, props: Properties) -> None:
+        name, largest_name = "lateral_scale", "lateral_scale_max"
+        value, largest = largest_of(props, name, LEAST_STRETCH, MOST_STRETCH)
+        if largest_name in props and not isinstance(value, mi.Texture):
+            if name not in props:
+                raise DiffractionError(f"{largest_name} is for a {name}; give both, or none")
+            largest = number(props, largest_name, 1.0)
+            if not value <= largest <= MOST_STRETCH:
+                raise DiffractionError(
+                    f"{largest_name}={largest:g} must be at least {name}, {value:g}, and at most "
+                    f"{MOST_STRETCH:g}"
+                )
+        self.of_table = max(1.0, largest)
+        self.factor: Varying | None = None
+        if name in props:
+            high = largest if isinstance(value, mi.Texture) else self.of_table
+            advice = "; load the plugin anew with that lateral_scale_max"
+            self.factor = Varying(name, value, LEAST_STRETCH, high, advice=advice)
+
+    def over_table(self, si: Interaction, active: Mask) -> Float:
+        """Return the factor relative to the table's; the plain number 1 without lateral_scale."""
+        return 1.0 if self.factor is None else self.factor.at(si, active) * (1.0 / self.of_table)
+
+    def range_over_table(self) -> tuple[float, float]:
+        """Return the least and the largest factor relative to the table's, as far as known."""
+        low, high = (1.0, 1.0) if self.factor is None else self.factor.range()
+        return low / self.of_table, high / self.of_table
+
+    @property
+    def texture(self) -> Texture | None:
+        """The texture of factors, or None."""
+        return self.factor and self.factor.texture
+
+    @property
+    def quantity(self) -> Quantity:
+        """The factor relative to the table's, for descriptions."""
+        return Quantity(self.range_over_table()[1], self.texture)
+
+    def __str__(self) -> str:
+        return "1" if self.factor is None else str(self.factor)
