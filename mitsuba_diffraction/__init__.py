@@ -6,7 +6,6 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 OrderTable         solved efficiencies of a grating's orders
-CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
@@ -51,29 +50,28 @@ select_llvm()  # before Dr.Jit picks a library by itself: some would end the pro
 from . import reference  # noqa: E402
 from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heights import HeightField, gratings  # noqa: E402
+from .orders import OrderTable  # noqa: E402
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .plugin.registration import register_in_all  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
-from .tables.orders import CrossedTable, OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster, osl
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
+    from .orders.listed import read_orders
+    from .orders.solve import profiles
+    from .orders.solve.crossed import solve_crossed
+    from .orders.solve.orders import solve_orders
     from .plugin.presets import preset
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
-    from .solve import profiles
-    from .solve.crossed import solve_crossed
-    from .solve.measured import read_orders
-    from .solve.orders import solve_orders
     from .thesis import period_fit
 
 register_in_all()
 
 __version__ = version(__name__)
 __all__ = [
-    "CrossedTable",
     "DiffractionError",
     "DiffractionTable",
     "DiffractionWarning",
@@ -108,7 +106,7 @@ _ON_DEMAND = {
     "maps": "analysis.maps",
     "osl": "osl",
     "period_fit": "thesis.period_fit",
-    "profiles": "solve.profiles",
+    "profiles": "orders.solve.profiles",
     "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
@@ -116,9 +114,9 @@ _ON_DEMAND = {
 _FUNCTIONS = {
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
-    "read_orders": "solve.measured",
-    "solve_crossed": "solve.crossed",
-    "solve_orders": "solve.orders",
+    "read_orders": "orders.listed",
+    "solve_crossed": "orders.solve.crossed",
+    "solve_orders": "orders.solve.orders",
     "spectrum": "analysis.spectra",
 }
 

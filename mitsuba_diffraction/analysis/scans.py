@@ -17,10 +17,10 @@ from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions
 from ..heights.recipes import Recipe
+from ..orders import OrderTable
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.build.build import build_with
-from ..tables.orders import CrossedTable, OrderTable
 from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
@@ -63,7 +63,7 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
         return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
 
 
-def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: Any) -> Any:
+def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
     """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
@@ -72,14 +72,14 @@ def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: A
     """
     import mitsuba as mi
 
+    from ..orders.bsdf.diffraction_orders import DiffractionOrders
     from ..plugin.diffraction import Diffraction
-    from ..plugin.orders.orders_block import diffraction_orders
 
     with tempfile.TemporaryDirectory() as folder:
-        solved = isinstance(table, OrderTable | CrossedTable)
+        solved = isinstance(table, OrderTable)
         file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
         props = mi.Properties("diffraction_orders" if solved else "diffraction")
         for name, value in {"table": str(file), **parameters}.items():
             props[name] = value
-        return diffraction_orders(props) if solved else Diffraction(props)
+        return DiffractionOrders(props) if solved else Diffraction(props)

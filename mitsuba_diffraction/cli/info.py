@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> Figures:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..tables.orders import load_any_orders
+    from ..orders.file import load_orders
 
     readable_file(file)
     kind = kind_of(file)
@@ -91,7 +91,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         return {"kind": "table", **DiffractionTable.load(file).summary()}
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
-        return {"kind": "table of orders", **load_any_orders(file).summary()}
+        return {"kind": "table of orders", **load_orders(file).summary()}
     return _heights(file, args)
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..analysis.spectrometer import Geometry
     from ..analysis.treatments import Treatment
     from ..heights.field import HeightField
-    from ..tables.orders import OrderTable
+    from ..orders import OrderTable
 
 # Treatments of edges between which a band is drawn.
 _TREATMENTS = ("smooth", "taper", "none")
@@ -46,12 +46,12 @@ class Measurement:
 
     def of_file(self, file: Path) -> list[Spectra]:
         """Measure the spectra of one file, or of its crops."""
-        from ..tables.orders import load_any_orders
+        from ..orders.file import load_orders
         from ..tables.store import loaded_table
 
         kind = kind_of(file)
         if kind is FileKind.ORDERS:
-            return [self._of_table(load_any_orders(file), file)]
+            return [self._of_table(load_orders(file), file)]
         if kind is FileKind.TABLE:
             return [self._of_table(loaded_table(file), file)]
         how = self._treatment(file).options

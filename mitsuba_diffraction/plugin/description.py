@@ -18,7 +18,6 @@ from ..errors import DiffractionError, warn
 from ..heights.field import HeightField
 from ..optics.geometry import sigma_of
 from ..tables.directional import DirectionalTable
-from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 from .types import BSDF, Interaction, Texture
 
@@ -79,6 +78,17 @@ class Quantity:
 
 #: Index n + ik of a material, relative to the medium above, at wavelengths (n,) in nm.
 Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+
+
+class SolvedOrders(Protocol):
+    """Table of solved orders, as far as this room knows it; see `orders.table.OrderTable`."""
+
+    periods: tuple[float, float]
+    header: Mapping[str, Any]
+
+    @property
+    def crossed(self) -> bool:
+        """Whether the grating repeats along y as well."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +153,7 @@ class Surface:
     stacked : whether a stack of layers lies on the structure.
     """
 
-    table: DiffractionTable | OrderTable | CrossedTable
+    table: DiffractionTable | SolvedOrders
     text: str
     coherence_width: float
     orientation: Quantity
@@ -171,9 +181,9 @@ class Surface:
         return self.table
 
     @property
-    def orders(self) -> OrderTable | None:
-        """Table of solved orders of grooves, or None."""
-        return self.table if isinstance(self.table, OrderTable) else None
+    def orders(self) -> Any:
+        """Table of solved orders, or None."""
+        return self.table if self.solved else None
 
     @property
     def solved(self) -> bool:
@@ -195,8 +205,8 @@ class Surface:
         known = {"": None, "small_slope": Feature.SMALL_SLOPE, "kirchhoff": Feature.KIRCHHOFF}
         turned, tall, wide = self.orientation, self.height_scale, self.lateral_scale
         present = {
-            Feature.ORDERS: self.orders is not None,
-            Feature.CROSSED: isinstance(self.table, CrossedTable),
+            Feature.ORDERS: self.solved and not self.orders.crossed,
+            Feature.CROSSED: self.solved and self.orders.crossed,
             Feature.HEIGHTS: not self.solved,
             Feature.LIMITED: not self.solved and self.patch.limited,
             Feature.TRANSMISSION: self.transmits,

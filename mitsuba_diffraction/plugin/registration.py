@@ -13,19 +13,25 @@ import mitsuba as mi
 
 from . import arithmetic
 
-# Base classes first
-_MODULES = (
-    "base", "surface", "diffraction", "diffraction_dielectric",
-    "orders.diffraction_orders", "orders.orders_sheet", "orders.orders_block", "diffraction_mix",
-    "presets",
-)  # fmt: skip
+# Base classes first; rooms above add theirs
+_MODULES = [
+    f"{__package__}.{name}"
+    for name in (
+        "base", "surface", "diffraction", "diffraction_dielectric", "diffraction_mix", "presets",
+    )
+]  # fmt: skip
+
+
+def add_plugins(module: str) -> None:
+    """Register the plugins that a module defines with those of this room, in each variant."""
+    _MODULES.append(module)
 
 
 def register(old: str | None, new: str | None) -> None:
     """Define the plugins for the variant just set: their base class is another in each."""
     if new is None:
         return
-    for module in (f"{__package__}.{name}" for name in _MODULES):
+    for module in _MODULES:
         if module in sys.modules:
             importlib.reload(sys.modules[module])
         else:

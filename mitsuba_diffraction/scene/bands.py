@@ -14,9 +14,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, warn
+from ..orders import OrderTable
 from ..plugin.description import describe
 from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest
-from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 
 # Parameters of a film that its size and format follow from.
@@ -129,7 +129,7 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> N
             least, most = min(first, float(low)), max(last, float(high))
             if least < float(low) - _MARGIN or most > float(high) + _MARGIN:
                 wider = f"DiffractionTable.build(wavelength_range=({least:.4g}, {most:.4g}))"
-                if kind in (OrderTable.__name__, CrossedTable.__name__):
+                if kind == OrderTable.__name__:
                     wider = "a wider range of wavelengths"
                 warn(
                     f"{name} is black outside {low} to {high} nm, the range of its table, and the "

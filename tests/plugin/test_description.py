@@ -22,7 +22,6 @@ from mitsuba_diffraction.plugin.description import (
     Material,
     Nested,
     Quantity,
-
     Surface,
     describe,
 )
