@@ -81,9 +81,7 @@ def test_the_second_order_is_reciprocal():
     there = reference.brdf(SMALL, wi, wo, 550.0, second_order=True, **DIELECTRIC)
     back = reference.brdf(SMALL, wo, wi, 550.0, second_order=True, **DIELECTRIC)
     assert there == pytest.approx(back, rel=1e-9)
-    assert there != pytest.approx(
-        reference.brdf(SMALL, wi, wo, 550.0, **DIELECTRIC), rel=1e-3
-    )
+    assert there != pytest.approx(reference.brdf(SMALL, wi, wo, 550.0, **DIELECTRIC), rel=1e-3)
 
 
 def test_the_second_order_knows_hills_from_pits_and_leaves_the_mirror_direction():

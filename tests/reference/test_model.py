@@ -64,7 +64,7 @@ def test_the_reference_s_default_is_the_model(second):
 
 
 def test_small_slope_is_the_default_where_there_is_an_index():
-    light = {"coherence_width": 2.0, "second_order": False}
+    light = {"coherence_width": 2.0}
     pair = WI[:4], WO[:4], 550.0
     for material, name in (({"eta": 0.7, "k": 5.0}, "small_slope"), ({}, "kirchhoff")):
         default, told = (

@@ -81,7 +81,7 @@ def test_equal_content_is_found_whatever_it_is_called():
         Builder(coherence_width=1.7),
         Builder(coherence_width=1.6, tolerance=1e-4),
         Builder(coherence_width=1.6, coherence="patch"),
-        Builder(coherence_width=1.6, second_order=False),
+        Builder(coherence_width=1.6),
     ],
     ids=["heights", "pixel size", "coherence width", "tolerance", "coherence", "second order"],
 )
