@@ -194,7 +194,7 @@ def imported_table(
         table = _sheet(_response(lights, periods, superstrate), periods, ends, header)
     else:
         table = listed_table(lights, periods, header, superstrate=superstrate)
-    _warn_of_gaps(table, lights, shown)
+    warn_of_gaps(table, lights, shown)
     header |= _errors(table, grid, orders, values)
     if header["reciprocity_error"] > _ONE_WAY:
         warn(
@@ -313,7 +313,7 @@ def _shown(order: NDArray[np.int64], crossed: bool) -> str:
     return f"({order[0]}, {order[1]})" if crossed else str(order[0])
 
 
-def _warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
+def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
     assert isinstance(response, Listed)

@@ -453,7 +453,7 @@ def check_outline(
     if not listed and largest_band((low, high), optical_period) >= MOST_BANDS:
         raise DiffractionError(
             f"a period of {periods[0]:g} µm has over {MOST_BANDS} orders at {low:g} nm; solve "
-            "some directions of light alone, or use the BSDF 'diffraction'"
+            "some directions of light alone (theta), or use the BSDF 'diffraction'"
         )
 
 

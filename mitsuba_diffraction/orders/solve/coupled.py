@@ -66,7 +66,7 @@ class CoupledWaves:
             )
         self.period, self.harmonics = profile.period, harmonics
         levels = np.unique(profile.z)
-        if not _has_walls(profile):
+        if not profile.is_lamellar:
             levels = np.linspace(levels[0], levels[-1], harmonics + 1)
         around = structure or Structure()
         # surfaces of the material and of each film
@@ -334,12 +334,6 @@ def _slices(
         layers.append((thickness, filled))
         first += len(parts)
     return layers[::-1]
-
-
-def _has_walls(profile: Profile) -> bool:
-    """Whether all sides are level or vertical."""
-    x, z = profile.closed
-    return bool(((np.diff(x) == 0) | (np.diff(z) == 0)).all())
 
 
 def _intervals(profile: Profile, height: float) -> Real:

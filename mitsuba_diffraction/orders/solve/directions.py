@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import DiffractionError
-from ..listed import Lights, listed_table
+from ..listed import Lights, listed_table, warn_of_gaps
 from ..lists import check_light
 from ..polarised import mueller_of
 from ..table import LINEAR, MUELLER, OrderTable, check_outline, orders_between
 from .accuracy import powers
-from .jobs import Jobs, Problem
+from .jobs import LEAST_COSINES, Jobs, Problem
 from .nodes import places_at
 from .resolution import resolved
 from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of
@@ -66,6 +66,17 @@ def solve_directions(
         )
     waves, theta, phi = (part.ravel() for part in np.meshgrid(lam, polar, azimuth, indexing="ij"))
     sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    least = LEAST_COSINES.get(problem.method, 0.0)
+    steps = np.arange(-400, 401)[:, None] * waves / (1e3 * grating.optical_period)
+    c = np.sqrt(1.0 - np.minimum((sine * np.sin(turn)) ** 2, 1.0))
+    square = 1.0 - ((steps - sine * np.cos(turn)) / c) ** 2
+    if (near := (square > 0.0) & (square < least**2)).any():
+        n = int(np.argwhere(near)[0][1])
+        raise DiffractionError(
+            f"at {waves[n]:g} nm, theta {theta[n]:g}°, phi {phi[n]:g}° an order leaves within 1.7° "
+            f"of grazing, where method {problem.method} loses its digits; use method=coupled or "
+            "chandezon, or leave this light out"
+        )
     # solvers take y ≥ 0, the mirror image; side 0 of a block lies within
     factors = [1.0, 1.0 / block] if block else [1.0] * sides
     cell_of, places = [], []
@@ -102,9 +113,11 @@ def solve_directions(
         }
     )
     table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]))
-    return listed_table(
+    made = listed_table(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip
+    warn_of_gaps(made, table, f"the table of {grating.profile.name}")
+    return made
 
 
 def _elements(amplitudes: Complex, port: int, count: int, thin: bool) -> Real:

@@ -28,7 +28,7 @@ from .coupled import CoupledWaves
 from .integral import IntegralSolver
 from .nodes import Place
 from .sheet import sheet_efficiencies
-from .stations import Complex, Grating, Real, Solver, on_both_sides
+from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
 
 Item = TypeVar("Item", bound=Hashable)
 
@@ -38,6 +38,9 @@ METHODS: dict[str, Callable[..., Solver]] = {
     "integral": IntegralSolver, "coupled": CoupledWaves, "chandezon": Chandezon,
 }  # fmt: skip
 LAYERED = ("coupled", "chandezon")
+#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) of the solvers that lose
+#: digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its power.
+LEAST_COSINES = {"integral": 0.03}
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
@@ -71,14 +74,15 @@ class Problem:
 def method_for(grating: Grating) -> str:
     """Return the solver for a grating.
 
-    Chandezon's method for slopes, also under films; coupled waves for other films and for slices,
-    else the integral method.
+    Chandezon's method for slopes, also under films; coupled waves for other films, for slices and
+    for lamellar profiles of metal, else the integral method.
     """
     flat = grating.profile.depth == 0.0
     sloped = not (grating.is_perfect or grating.thin or flat or refused(grating.profile))
     if sloped and not grating.structure.is_beneath:
         return "chandezon"
-    return "coupled" if grating.structure else "integral"
+    lamellar = grating.profile.is_lamellar and not (grating.is_perfect or grating.thin)
+    return "coupled" if grating.structure or lamellar else "integral"
 
 
 def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
@@ -145,7 +149,8 @@ def solve_place(problem: Problem, place: Place) -> Solved:
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
     w = place.w[:1] if grating.is_perfect else place.w
-    station = grating.station(place.band, place.kind, place.tau, place.rho, w)
+    least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
+    station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
     try:
         values = solver.amplitudes(station)
     except DiffractionError:

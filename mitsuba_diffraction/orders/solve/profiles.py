@@ -99,6 +99,12 @@ class Profile:
         return float(np.ptp(self.z))
 
     @property
+    def is_lamellar(self) -> bool:
+        """Whether all sides are level or vertical, from left to right."""
+        x, z = (np.diff(values) for values in self.closed)
+        return bool(((x == 0) | (z == 0)).all() and (x >= 0).all())
+
+    @property
     def corners(self) -> int:
         """Number of vertices that turn by more than `CORNER` degrees."""
         return int((np.abs(self._turns()) > CORNER).sum())

@@ -10,12 +10,12 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .films import material_text
-from .jobs import Jobs, Problem
+from .jobs import MOST_RESOLUTION, Jobs, Problem
 from .nodes import Place, kinds_of
 from .stations import Real, reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
-_STEP, _MOST = 1.35, 6
+_STEP, _MOST = 1.35, 12
 #: Light from nothing that a solution may have where resolutions are compared, or a tenth of the
 #: tolerance if that is more: the table scales it away, which changes colours by as much.
 _EXCESS = 5e-4
@@ -47,7 +47,9 @@ def chosen_resolution(
     """
     coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")
-    for _ in range(_MOST):
+    for number in range(_MOST):
+        if number and np.ceil(coarse.resolution * _STEP) > MOST_RESOLUTION[problem.method]:
+            break
         fine, finer, error = _refined(coarse, values, jobs, places)
         excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
         if problem.grating.thin:  # which loses no light either

@@ -22,8 +22,7 @@ Complex = NDArray[np.complex128]
 Number = TypeVar("Number", np.float64, np.complex128)
 
 #: Least c = √(1 − y²), and least |cosine| of any order across the grooves: 0.006° from grazing.
-#: There solvers lose digits as 1/cosine, and diffuse light has 1e-3 of its power. Stations beyond
-#: have the efficiencies of this cosine.
+#: Stations beyond have the efficiencies of this cosine.
 LEAST_COSINE = 1e-4
 #: Least normal part of the wave vector of a wave that counts as propagating, over its length; below
 #: that of all channels outside.
@@ -69,13 +68,26 @@ class Grating:
         """Whether the material is a perfect conductor, whose efficiencies do not depend on w."""
         return self.material.values is None
 
-    def station(self, band: int, kind: int, tau: float, rho: float, w: ArrayLike) -> Station:
-        """Return the station of a band and kind at τ, ρ and several w, (n,)."""
+    def station(
+        self,
+        band: int,
+        kind: int,
+        tau: float,
+        rho: float,
+        w: ArrayLike,
+        least_cosine: float = LEAST_COSINE,
+    ) -> Station:
+        """Return the station of a band and kind at τ, ρ and several w, (n,).
+
+        least_cosine : across the grooves, of any order.
+        """
         r, t = float(cells.sine_squared(rho)), float(cells.sine_squared(tau))
-        smallest = LEAST_COSINE * 2e3 * self.optical_period / self.wavelengths[0] - band
+        smallest = least_cosine * 2e3 * self.optical_period / self.wavelengths[0] - band
         # an order at a distance δ from the end of p has the squared cosine 4δ/K
-        margin = 0.25 * LEAST_COSINE**2 * max(band + r, 1e-3)
-        r = float(np.clip(max(r, smallest), 2.0 * margin, 1.0 - 2.0 * margin))
+        margin = 0.25 * least_cosine**2 * max(band + r, 1e-3)
+        # only the kind's own width has to hold two margins: K may be a whole number, as at λ = 2d/N
+        ends = (2.0 * margin, 1.0) if kind == cells.A else (0.0, 1.0 - 2.0 * margin)
+        r = float(np.clip(max(r, smallest), *ends))
         begin, end = (0.0, r) if kind == cells.A else (r, 1.0)
         fraction = float(np.clip(begin + t * (end - begin), begin + margin, end - margin))
         big_k = band + r

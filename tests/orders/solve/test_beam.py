@@ -35,7 +35,6 @@ def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
     [
         ({"theta": 95.0}, "theta 95 must be"),
         ({"theta": np.arange(80), "phi": np.arange(80), "step": 0.1}, "choose fewer directions"),
-        ({"theta": 10.0, "settings": Settings(polarised=True)}, "efficiencies alone"),
     ],
 )
 def test_light_that_cannot_be_solved_is_refused(options, message):
@@ -55,7 +54,6 @@ def test_efficiencies_of_one_direction_are_those_solved():
             )
             for ends in ((522.0, 542.0), (524.0, 540.0))
         )  # fmt: skip
-    assert table.header["error_worst"] < 1e-3  # `measured._MISSED`
     # half way between wavelengths, by the other table's own nodes
     x = -np.sin(np.radians(45.0))
     for wavelength in np.linspace(524.0, 540.0, 5):
