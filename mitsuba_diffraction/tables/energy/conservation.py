@@ -18,7 +18,6 @@ from functools import partial
 
 import numpy as np
 
-from ...optics import mean_second_order
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
 from ..order_mixture import MOST_STRONG, STRONG
@@ -96,7 +95,7 @@ class Surface:
         if largest <= settings.threshold:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
-        fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+        fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
         nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
         s = np.stack(parallel(lambda light: self._solved(light()), lights))
@@ -238,7 +237,7 @@ class Energy:
             conservation = surface.conservation(light)
             return {name: table for name, table in vars(conservation).items() if table is not None}
 
-        versions = VERSION, mean_second_order.VERSION, STRONG, MOST_STRONG
+        versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
         return Conservation(**cached_directions("energy", self.table, made_of, make))
