@@ -363,7 +363,6 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
     if is_auto(asked.get("coherence_width", 0.0)):
         del asked["coherence_width"]
     settings = {name: checked(name, value) for name, value in asked.items()}
-    settings["second_order"] = False
     value = props.get(source)
     if source == "data":
         heights = heights_of_tensor(value, options).stretched(stretch)

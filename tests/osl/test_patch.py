@@ -70,7 +70,7 @@ def test_draws_have_the_probabilities_that_weigh_them():
         {"shadowing": "vcavity"},
         {"beneath": {"type": "plastic"}},
         {"pigment": {"type": "diffuse", "reflectance": {"type": "checkerboard"}}},
-        {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
+        {"plugin": "diffraction_dielectric", "energy_conserving": None},
     ],
     ids=lambda value: next(iter(value)),
 )  # fmt: skip
@@ -91,12 +91,6 @@ def test_a_picture_of_one_colour_almost_everywhere_is_refused(tmp_path, some_var
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, **parameters))
     with pytest.raises(DiffractionError, match="no single diffuse colour"):
         md.osl.export(bsdf, tmp_path / "out")
-
-
-def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):
-    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=True))
-    with pytest.warns(md.DiffractionWarning, match="second_order"):
-        md.osl.export(bsdf, tmp_path)
 
 
 @settings(deadline=None, max_examples=50)
