@@ -6,7 +6,7 @@ All of them follow these rules:
   or %, and the rest of a row behind " #", are comments.
 - The first line of numbers decides the separator: semicolon, tab, comma, or white space. Beside a
   semicolon or a tab a comma is a decimal comma; between white space it is one if every number has
-  digits on both sides of it; between commas it is one in quotation marks.
+  digits on both sides; between commas it is one in quotation marks.
 - Lines of words above the numbers are a header. The last one with as many cells names the columns;
   a unit is in brackets behind a name, behind an underscore or slash, or in a line of units alone.
 - An empty cell, "nan", "-" and the like are missing numbers, NaN. Separators at the end of every
@@ -117,8 +117,8 @@ class Columns(NamedTuple):
     def column(self, name: str) -> int:
         """Return the number of the column of values with a name, or of the only one without.
 
-        The first column, of wavelengths, is none of them. Raw counts are, if nothing else is there
-        or they are asked for. Raises a DiffractionError that lists the names.
+        The first column has the wavelengths. Columns of raw counts are passed over, unless the file
+        has no others. Raises a DiffractionError that lists the names.
         """
         values = range(1, self.numbers.shape[1])
         if name:
@@ -210,7 +210,7 @@ def parse_columns(lines: Iterable[str], shown: str) -> Columns:
 
 
 def _encoding(file: Path) -> str:
-    """Return the encoding of a text; raise UnicodeError for what is none."""
+    """Return the encoding of a text; raise UnicodeError for binary content."""
     with file.open("rb") as stream:
         beginning = stream.read(1 << 16)
     encoding = "utf-8-sig"

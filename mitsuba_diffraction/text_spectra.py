@@ -102,8 +102,8 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     """Read a spectrum of shares, such as a reflectance.
 
     Per cent or fraction is what the text says, else the header, else a guess by the values, which a
-    warning names. Noise a little below 0 is 0. Noise beyond the needed wavelengths that is no share
-    ends the spectrum.
+    warning names. Noise a little below 0 is 0. Noise out of range beyond the needed wavelengths ends
+    the spectrum.
 
     text : FILE, FILE:COLUMN, FILE:UNIT or FILE:COLUMN:UNIT.
     needed : wavelengths, nm, between which every value has to be a share.
@@ -125,7 +125,7 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     if not good[inside].all():
         raise DiffractionError(
             f"{table.shown}: {what} are {raw[inside].min():g} to {raw[inside].max():g}; expected "
-            "0 to 1, or 0 to 100 per cent. Divide what is above by the reflectance of the white "
+            "0 to 1, or 0 to 100 per cent. Divide larger values by the reflectance of the white "
             f"standard; say what the file has by {choice.path}:fraction or :percent"
         )
     bad = np.flatnonzero(~good)

@@ -30,9 +30,9 @@ def pigment_bsdf(text: str | float) -> BSDF:
     """Return a diffuse BSDF of a pigment.
 
     text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
-        "sienna", a text of wavelengths and reflectances (see `text_spectra`), a picture, or a glTF file,
-        whose material's base colour is taken. The name of a column and a unit may follow a text:
-        "feathers.csv:male:percent".
+        "sienna", a text of wavelengths and reflectances (`text_spectra`), a picture, or a glTF
+        file, whose material's base colour is taken. The name of a column and a unit may follow a
+        text: "feathers.csv:male:percent".
 
     Raises a DiffractionError if the text is not one of these, or the spectrum is not one or ends
     within 400 to 700 nm.

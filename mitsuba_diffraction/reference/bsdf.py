@@ -7,7 +7,7 @@ its equation (4).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +33,8 @@ Complex = NDArray[np.complex128]
 Measure = Callable[[Complex], Real]
 
 
-class Material(NamedTuple):
+@dataclass(frozen=True)
+class Material:
     """Material of a surface, and the model of its boundary.
 
     Attributes
@@ -167,17 +168,16 @@ def _lit(
 ) -> Real:
     """Measured light of directions above the surface."""
     if material.coat is not None:
+        assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
         jones = _matrices(field, inside, relative, material.model)
         power = window_power(field, *inside, *window)
         return coats.reflected(light, window.sigmas, material.coat, relative, power, jones, measure)
-    if material.model == "small_slope" and window.coherence == COHERENCES[0]:
-        if not isinstance(index, Filmed):
-            return models.default_brdf(field, light, index, window.sigmas, measure)
-    jones, power = (
-        _matrices(field, light, index, material.model),
-        window_power(field, *light, *window),
-    )
+    averaged = window.coherence == COHERENCES[0]
+    if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
+        return models.default_brdf(field, light, index, window.sigmas, measure)
+    jones = _matrices(field, light, index, material.model)
+    power = window_power(field, *light, *window)
     return models.reflected(light, window.sigmas.orders, power, jones, measure)
 
 

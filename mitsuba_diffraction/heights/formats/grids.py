@@ -111,7 +111,7 @@ def read_text(path: Path) -> RawHeights:
 
 
 def _refuse_names(header: dict[int, str], shown: str) -> None:
-    """Raise a DiffractionError for lines above a grid that say nothing that is known here."""
+    """Raise a DiffractionError for lines above a grid that are neither comment nor size."""
     for place, line in header.items():
         if line.lstrip()[0] not in "#%" and not (_SIZE.match(line) or _VALUES.match(line)):
             raise DiffractionError(
