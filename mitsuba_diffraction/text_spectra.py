@@ -102,8 +102,8 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     """Read a spectrum of shares, such as a reflectance.
 
     Per cent or fraction is what the text says, else the header, else a guess by the values, which a
-    warning names. Noise a little below 0 is 0. Noise out of range beyond the needed wavelengths ends
-    the spectrum.
+    warning names. Noise a little below 0 is 0. Noise out of range beyond the needed wavelengths
+    ends the spectrum.
 
     text : FILE, FILE:COLUMN, FILE:UNIT or FILE:COLUMN:UNIT.
     needed : wavelengths, nm, between which every value has to be a share.
