@@ -159,7 +159,8 @@ The light beneath
     components follow.
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
-    or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
+    or a spectrum, constant beyond its ends: a text of wavelengths and reflectances, `brown.csv`,
+    `feathers.csv:male` (one column of several), `brown.csv:percent` (or `fraction`). Or a
     picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
 Variants
 --------
@@ -216,7 +217,7 @@ from ..optics.geometry import vcavity
 from . import parameters as read
 from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
-from .description import Feature, Surface
+from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
 from .energy import EnergyModel, reflector_of
 from .layers import UnderCoat
@@ -358,8 +359,8 @@ class Diffraction(DiffractingSurface):
             nested=self.nested,
             shadowing=self.vcavity,
             # shaders have no scale under a coat, where it is near 1
-            **({"energy_scale": energy.scale} if energy.conserving and self.coat is None else {}),
-            **({"reflected": energy.ratio} if energy.beneath else {}),
+            energy_scale=unscaled if self.coat is not None else energy.scale,
+            reflected=energy.ratio,
         )
 
     def shown(self) -> dict[str, Any]:

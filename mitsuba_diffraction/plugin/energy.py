@@ -98,11 +98,11 @@ class EnergyModel:
         def fine(energy: Conservation) -> list[DirectionalTable] | None:
             return energy.scales and [side.on(FINE) for side in energy.scales]
 
-        return self._tabulated(fine, height_scale)
+        return self._tabulated(fine, height_scale) if self.conserving else None
 
     def ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Return the table of `reflected`, for shaders."""
-        return self._tabulated(self._ratio_of, height_scale)
+        """Return the table of `reflected`, for shaders; None where it is 1."""
+        return self._tabulated(self._ratio_of, height_scale) if self.beneath else None
 
     @property
     def scales(self) -> bool:
