@@ -189,7 +189,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
                 continue  # names of the columns
             raise DiffractionError(
                 f"'{path}', line {number}: expected two numbers x, z in µm, got {text[:60]!r} "
-                "(read_orders reads efficiencies)"
+                "(the command 'solve --import', or read_orders, reads efficiencies)"
             ) from error
         rows.append([x, z])
     if not rows:
