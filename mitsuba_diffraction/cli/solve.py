@@ -19,9 +19,9 @@ from .workers import add_workers, executor_for
 
 if TYPE_CHECKING:
     from ..orders import OrderTable
-    from ..solve.films import Layers
-    from ..solve.orders import Estimate
-    from ..solve.recipes import SolvedRecipe
+    from ..orders.solve.films import Layers
+    from ..orders.solve.recipes import SolvedRecipe
+    from ..orders.solve.settings import Estimate
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
@@ -82,7 +82,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--wavelength-range A,B", "nm; default: 380,780", _pair),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
-        ("--accept", argparse.SUPPRESS, bool),
         ("--solver", "Chandezon's method, for slopes; boundary integral (extra solve); coupled "
          "waves, for dielectrics; default: auto, the first that suits",
          ("auto", "chandezon", "integral", "coupled")),
@@ -101,6 +100,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
          {"dest": "imports"}),
     )  # fmt: skip
+    options.add_retired(parser, "accept", 0)
     options.add_option(parser, "--jobs N", "processes here; default: 1", whole_number(1))
     add_workers(parser)
     options.add_json(parser, "the table's summary")

@@ -32,6 +32,7 @@ from scipy.io import netcdf_file
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ..tables.fields import mapping
 from .table import MOST_NUMBERS, Band, Cells, Listed, OrderTable
 
 #: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
@@ -85,19 +86,19 @@ def _add_response(file: Any, table: OrderTable) -> None:
             _add(file, name, (name,), values.astype(">f8"), unit)
         for name, column in zip(("order_x", "order_y"), response.orders.T, strict=True):
             _add(file, name, ("order",), column.astype(">i4"))
-        names = ("wavelength", "theta", "phi", "side", "port", "element")
-        _add(file, _LISTED, names, response.values.astype(">f4"))
+        every = ("wavelength", "theta", "phi", "side", "port", "element")
+        _add(file, _LISTED, every, response.values.astype(">f4"))
         return
     if response.even:
         file.even = np.int32(1)
     for band in response.bands:
-        for kind, values in zip("ab", band.kinds, strict=False):
+        for kind, numbers in zip("ab", band.kinds, strict=False):
             names = (
                 *(f"{axis}_{band.k}" for axis in ("tau", "rho", "w")),
                 *(f"{axis}_{kind}_{band.k}" for axis in ("j", "q")),
                 "element",
             )
-            _add(file, f"kind_{kind}_{band.k}", names, values.astype(">f4"))
+            _add(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
 
 
 def _add(
@@ -148,7 +149,10 @@ def _advice(path: Path) -> str:
         )
     if kind_of(path) is FileKind.TABLE:
         return "tables of heights (EXR) belong to the BSDF 'diffraction'"
-    return "make one with solve_orders, or with read_orders from efficiencies of other programs"
+    return (
+        "make one with the command 'solve' (solve_orders), or of efficiencies of other programs "
+        "with 'solve --import' (read_orders)"
+    )
 
 
 def _table(file: Any) -> OrderTable:
@@ -192,9 +196,7 @@ def _bands(file: Any) -> tuple[Band, ...]:
 
 def _with_outline(file: Any, response: Cells | Listed) -> OrderTable:
     """Return the table with the attributes of an open file."""
-    header = json.loads(_text(file.header))
-    if not isinstance(header, dict):
-        raise ValueError("its header is no JSON object")
+    header = mapping(json.loads(_text(file.header)), "header")
     low, high = map(float, file.wavelengths)
     return OrderTable(
         (float(file.period), float(getattr(file, "period_y", math.inf))),

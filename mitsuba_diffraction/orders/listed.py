@@ -116,11 +116,12 @@ def _response(
 
 def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:
     """Return θ from 0 and φ (b, c), degrees: φ to 180 on grooves, below 360 on crossed gratings."""
-    theta, phi = np.meshgrid(lights.theta, lights.phi, indexing="ij")
-    phi = np.round((phi + np.where(theta < 0.0, 180.0, 0.0)) % 360.0, _DIGITS) % 360.0
+    theta, azimuth = np.meshgrid(lights.theta, lights.phi, indexing="ij")
+    turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
+    phi = np.asarray(np.round(turned, _DIGITS) % 360.0, np.float64)
     if not crossed:  # mirror images are alike
         phi = np.round(np.minimum(phi, 360.0 - phi), _DIGITS)
-    return np.round(np.abs(theta), _DIGITS), phi
+    return np.asarray(np.round(np.abs(theta), _DIGITS), np.float64), phi
 
 
 def _of_nearest_directions(

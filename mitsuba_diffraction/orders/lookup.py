@@ -296,7 +296,7 @@ class BlockLookup(Lookup):
         assert table.block is not None
         self.index, self._more = table.block, table.block**2 - 1.0
 
-    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> BlockRow:
+    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> Any:
         """See `Lookup.row`."""
         row = super().row(x, y, cos_i, wavelength)
         xp = of(wavelength)

@@ -352,8 +352,8 @@ class OrderTable:
         content = hashlib.sha256()
         if isinstance(self.response, Listed):
             outline.append(self.response.in_plane)
-            for part in (*self.response.axes, self.response.orders):
-                content.update(np.ascontiguousarray(part, np.float64).data)
+            for axis in (*self.response.axes, self.response.orders):
+                content.update(np.ascontiguousarray(axis, np.float64).data)
         else:
             outline.append(self.response.even)
         shapes = [part.shape for part in self.response.arrays]

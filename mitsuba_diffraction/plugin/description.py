@@ -52,8 +52,8 @@ class Feature(Enum):
     VARYING_LENGTH = "", "a lateral_scale that varies"
     ORIENTATION = "", "an orientation other than 0"
     VARYING_ORIENTATION = "", "an orientation that varies"
-    NESTED = "", "a BSDF beneath"
-    OPAQUE = "", "a material or layer that absorbs the light that is not reflected"
+    NESTED = "", "a nested BSDF or pigment"
+    OPAQUE = "", "a conductor or layer that absorbs the light that is not reflected"
     COLOURS = "", "an RGB variant, whose light has no wavelengths to tell speckle by"
 
     def phrase(self, model: str = "") -> str:
@@ -83,8 +83,17 @@ Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 class SolvedOrders(Protocol):
     """Table of solved orders, as far as this room knows it; see `orders.table.OrderTable`."""
 
-    periods: tuple[float, float]
-    header: Mapping[str, Any]
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Periods along x and y, µm; infinite along y for grooves."""
+
+    @property
+    def header(self) -> Mapping[str, Any]:
+        """Facts about the table."""
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Wavelengths between which light has efficiencies, nm."""
 
     @property
     def crossed(self) -> bool:
@@ -117,7 +126,8 @@ class Film:
     thickness: float
 
 
-def _none(height_scale: float) -> DirectionalTable | None:
+def unscaled(height_scale: float) -> DirectionalTable | None:
+    """Return None: all values are 1 at every height scale."""
     return None
 
 
@@ -167,8 +177,8 @@ class Surface:
     coat: float | None = None
     film: Film | None = None
     model: str = ""
-    energy_scale: Callable[[float], DirectionalTable | None] = _none
-    reflected: Callable[[float], DirectionalTable | None] = _none
+    energy_scale: Callable[[float], DirectionalTable | None] = unscaled
+    reflected: Callable[[float], DirectionalTable | None] = unscaled
     nested: BSDF | None = None
     shadowing: bool = False
     transmits: bool = False
@@ -199,6 +209,12 @@ class Surface:
     def shortest_wavelength(self) -> float:
         """Shortest wavelength that the table serves, nm; 0 for solved orders."""
         return 0.0 if self.solved else self.patch.wavelength_range[0]
+
+    @property
+    def wavelengths(self) -> tuple[float, float]:
+        """Shortest and longest wavelength of the light that the table reflects, nm."""
+        table = self.table
+        return table.wavelength_range if isinstance(table, DiffractionTable) else table.reach
 
     def features(self) -> set[Feature]:
         """Return all features that the surface has."""

@@ -159,7 +159,8 @@ The light beneath
     components follow.
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
-    or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
+    or a spectrum, constant beyond its ends: a text of wavelengths and reflectances, `brown.csv`,
+    `feathers.csv:male` (one column of several), `brown.csv:percent` (or `fraction`). Or a
     picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
 Variants
 --------
@@ -206,6 +207,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -215,9 +217,9 @@ from ..optics.geometry import vcavity
 from . import parameters as read
 from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
-from .description import Feature, Surface
+from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
-from .energy import ReflectedEnergy
+from .energy import EnergyModel, reflector_of
 from .layers import UnderCoat
 from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
@@ -248,10 +250,13 @@ class Diffraction(DiffractingSurface):
         if self.coat is not None:
             self.fresnel = UnderCoat(self.boundary.material, self.coat)
             self.mirror = Boundary(KIRCHHOFF, self.coat)
-        self.energy: ReflectedEnergy = ReflectedEnergy(
-            self.mean_table, self.wavelength, self.boundary, self.coat, self.energy_conserving,
+        self.energy = EnergyModel(
+            self.mean_table,
+            self.wavelength,
+            partial(reflector_of, self.boundary, self.coat),
+            conserving=self.energy_conserving,
             beneath=nested is not None and self.coat is None,
-        )  # fmt: skip
+        )
         self.ready()
 
     # ------------------------------------------------------------------ the diffraction
@@ -340,7 +345,7 @@ class Diffraction(DiffractingSurface):
             getattr(material, "sums", None),
             material.tint is None,
         )
-        own = self.vcavity, self.coat is None, self.energy.scales
+        own = self.vcavity, self.coat is None, self.energy.kernel_constants()
         return *super().kernel_constants(), *own, *other_kernels
 
     # ------------------------------------------------------------------ for shaders and people
@@ -354,8 +359,8 @@ class Diffraction(DiffractingSurface):
             nested=self.nested,
             shadowing=self.vcavity,
             # shaders have no scale under a coat, where it is near 1
-            **({"energy_scale": energy.scale} if energy.conserving and self.coat is None else {}),
-            **({"reflected": energy.ratio} if energy.beneath else {}),
+            energy_scale=unscaled if self.coat is not None else energy.scale,
+            reflected=energy.ratio,
         )
 
     def shown(self) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ..errors import DiffractionError, warn
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
+from ..llvm import require_loaded_llvm
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
 from ..retired import retired
@@ -24,7 +25,6 @@ from .arithmetic import plain
 from .description import Feature
 from .dictionary import ORDERS, PLUGINS
 from .layers import UnderFilm
-from .llvm import require_loaded_llvm
 from .materials import INDEX_PARTS, Conductor, Dielectric, Material, Perfect
 from .parameter_changes import ObjectValues
 from .pigment import pigment_bsdf
@@ -158,9 +158,9 @@ def check_combination(props: Properties, material: Material, nested: BSDF | None
         Feature.COLOURS: mi.is_rgb,
     }
     for group in _EXCLUDED:
-        first, *others = [feature for feature in group if chosen[feature]] or [None]
-        if first and others:
-            raise DiffractionError(refusal(first.phrase(), others[0].phrase()))
+        both = [feature.phrase() for feature in group if chosen[feature]][:2]
+        if len(both) == 2:
+            raise DiffractionError(refusal(*both))
 
 
 def refusal(first: str, second: str) -> str:

@@ -22,7 +22,8 @@ from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.build.checks import warnings_of
-from ..tables.store import cached_table, key_of, loaded_table
+from ..tables.source import cached_table, loaded_table
+from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
 
@@ -75,7 +76,10 @@ _providers: list[TableProvider] = [lambda request: request.cached(request.settin
 
 @contextmanager
 def tables_by(provider: TableProvider) -> Iterator[None]:
-    """Let a provider choose the tables of all scenes that are loaded inside."""
+    """Let a provider choose the tables of all scenes that are loaded inside.
+
+    In all threads: Mitsuba's own, which make the BSDFs of a scene, inherit no context variables.
+    """
     _providers.append(provider)
     try:
         yield
@@ -119,8 +123,8 @@ def table_of_file(
             raise DiffractionError(
                 f"height_scale={height_scale:g} is beyond the table's "
                 f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
-                "the height field instead of the table, or build it with "
-                f"DiffractionTable.build(height_scale_max={height_scale:.4g}) or more"
+                "the height field instead of the table, or build the table with "
+                f"height_scale_max={height_scale:.4g} or more (the command 'precompute')"
             )
     elif kind is FileKind.RECIPE:
         recipe = Recipe.load(path)
@@ -272,7 +276,7 @@ def _check_agreement(
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has "
                 f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
-                f"DiffractionTable.build({name}={value})"
+                f"{name}={value} (the command 'precompute')"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
@@ -283,5 +287,5 @@ def _check_agreement(
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
-            "DiffractionTable.build(wavelength_range=(360, 830))"
+            "wavelength_range=(360, 830) (the command 'precompute')"
         )

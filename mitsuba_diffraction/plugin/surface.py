@@ -45,10 +45,11 @@ class DiffractingSurface(SurfaceBSDF):
     orientation, lateral_scale, height_scale : the patch as it lies on the surface.
     boundary : model of the structure's material; fresnel : flat surface with all layers.
     power : `power.PowerModel` of the variant.
+    energy : scale by which energy is conserved, made after all layers are known.
     wavelength : nm, of mono variants.
     """
 
-    energy: EnergyModel | None = None
+    energy: EnergyModel
     fresnel: Material
 
     def __init__(
@@ -70,7 +71,7 @@ class DiffractingSurface(SurfaceBSDF):
         stretch = self.lateral_scale.of_table
         self.table, self.heights = read.read_patch(props, largest * optical, stretch)
         most = largest if varies else self.table.height_scale_max / optical
-        advice = "; load the plugin anew with that height_scale"
+        advice = ", the table's range; load the plugin anew with that height_scale"
         self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)
         self.orientation = read.orientation_of(props)
         self.wavelength = read.mono_wavelength(props, self.table.wavelength_range)
@@ -157,7 +158,8 @@ class DiffractingSurface(SurfaceBSDF):
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
         yield self.height_scale.refusal()
-        yield self.lateral_scale.factor and self.lateral_scale.factor.refusal()
+        if self.lateral_scale.factor is not None:
+            yield self.lateral_scale.factor.refusal()
         yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
@@ -176,8 +178,7 @@ class DiffractingSurface(SurfaceBSDF):
     def derive(self) -> None:
         """Compute what depends on the parameters: indices and scales of energy."""
         self.fresnel.derive()
-        if self.energy is not None:
-            self.energy.update(self.scale_range())
+        self.energy.update(self.scale_range())
 
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""

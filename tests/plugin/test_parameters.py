@@ -236,8 +236,8 @@ REFUSED = [
     ({"pigment": "custard"}, "pigment='custard' is not a colour"),
     ({"pigment": "0.2,1.5,0"}, "pigment='0.2,1.5,0' is not a colour"),
     ({"pigment": "nothing.csv"}, "nothing.csv"),
-    ({"pigment": "red", "material": "gold"}, "the pigment cannot be combined with a conductor"),
-    ({"pigment": "red", "material": "1.5+0.1i"}, "the pigment cannot be combined with a cond"),
+    ({"pigment": "red", "material": "gold"}, "pigment cannot be combined with a conductor"),
+    ({"pigment": "red", "material": "1.5+0.1i"}, "pigment cannot be combined with a conductor"),
     ({"material": "Alu"}, "did you mean Al or Au?"),
     ({"material": "au"}, "did you mean Au"),
     ({"material": "Al", "int_ior": 1.5}, "material makes a conductor and int_ior a dielectric"),
@@ -317,9 +317,7 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
     (name,) = parameters
     if name in SCENE_SETTINGS:
         assert "; leave it out, or " in text
-        assert text.endswith(
-            f"build another table with DiffractionTable.build({name}={parameters[name]})"
-        )
+        assert f"build another table with {name}={parameters[name]} (" in text
         assert ("say coherence_width=auto" in text) == (name == "coherence_width")
 
 

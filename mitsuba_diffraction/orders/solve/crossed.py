@@ -133,8 +133,8 @@ def solve_crossed(
         "profile": f"crossed, {np.ptp(field.heights):.3g} µm deep",
         "depth": float(np.ptp(field.heights)),
     }
-    lights = Lights(lam, theta, phi, orders, values[:, :, :, None, None, :, None])
-    table = listed_table(lights, (periods[0], periods[1]), header)
+    every = Lights(lam, theta, phi, orders, values[:, :, :, None, None, :, None])
+    table = listed_table(every, (periods[0], periods[1]), header)
     return replace(table, header=header | _checked(table, cell, last, executor))
 
 

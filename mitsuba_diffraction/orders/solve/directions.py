@@ -106,7 +106,7 @@ def solve_directions(
                 values[n, came, left, j - np.arange(size) - first] = part
     header = (
         header_of(chosen, how)
-        | facts
+        | dict(facts)
         | {
             "directions": [[float(t), float(p)] for t in polar for p in azimuth],
             "processor_seconds": round(work.processor_seconds, 1),

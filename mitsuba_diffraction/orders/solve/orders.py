@@ -178,7 +178,7 @@ def _solve_cells(
         counts = dict.fromkeys(bands, BLOCK_COUNTS)
     else:
         counts = _counts(coarse, work, bands, how, tell)
-    header = header_of(chosen, how) | facts
+    header = header_of(chosen, how) | dict(facts)
     superstrate, thin, block = _media(grating)
     for refinement in range(REFINEMENTS + 1):
         problem, solved = _solved_at_nodes(problem, counts, work, tell)

@@ -1,6 +1,6 @@
 """Stations: sets of directions between which a grating scatters light, solved together.
 
-All channels of one (band, kind, τ, ρ) of `tables.orders.cells` have the same Bloch wave, so they
+All channels of one (band, kind, τ, ρ) of `cells` have the same Bloch wave, so they
 share the expensive part of a solver. A station has several wavelengths w at the same s and K.
 """
 

@@ -136,7 +136,7 @@ def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_coupled_waves():
         ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
         ("x,z\n0,1\n0.3\n", "line 3"),
         ("0,1,2\n", "line 1"),
-        ("0,nan\n1,0\n", "finite"),
+        ("0,nan\n1,0\n", "line 1"),
         ("# nothing\n", "no points"),
         ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "read_orders"),
     ],
