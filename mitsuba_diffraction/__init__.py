@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+TableSource        table of a file, recipe or height field, built once for all that ask
 OrderTable         solved efficiencies of a grating's orders
 CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
@@ -53,7 +54,7 @@ from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heights import HeightField, gratings  # noqa: E402
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .plugin.registration import register_in_all  # noqa: E402
-from .tables import DiffractionTable  # noqa: E402
+from .tables import DiffractionTable, TableSource  # noqa: E402
 from .tables.orders import CrossedTable, OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "OrderTable",
+    "TableSource",
     "bsdf_dict",
     "cluster",
     "design",

@@ -119,24 +119,19 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
 def _draw(args: argparse.Namespace) -> None:
     from ..analysis.pictures import patches_figure
-    from ..heights.load import load_heights
-    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
-    how = options.load_options(args)
-    if kind_of(args.file) is FileKind.RECIPE:
-        fields = Recipe.load(args.file).fields(how)
-    else:
-        fields = [load_heights(args.file, how)]
+    fields = Source.of(args.file, options.load_options(args)).fields()
     save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.load import load_heights
+    from ..heights.source import Source
     from ..heights.treatment import jumping_lines, treatment_warning
 
     how = options.load_options(args)
-    field = load_heights(file, how)
+    field = Source.of(file, how).field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
     suggested = (treatment_warning(file, how, field), jumping_lines(field))
@@ -163,19 +158,20 @@ def _periods(field: HeightField) -> dict[str, Any]:
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
-    recipe = Recipe.load(file)
-    table = recipe.table
+    source = Source.of(file, options.load_options(args))
+    recipe = source.recipe
+    assert recipe is not None
     with Bar(args) as bar:
         bar(0, 0, "making heights")
-        fields = recipe.fields(options.load_options(args))
-    settings = TableSettings(**{**table, **options.table_options(args)})
+        fields = source.fields()
+    settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
         "options": recipe.options.specified(),
-        "table": table,
+        "table": source.settings,
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],

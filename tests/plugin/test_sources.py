@@ -8,7 +8,7 @@ import mitsuba as mi
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.sources import tables_by
+from mitsuba_diffraction.tables.source import providing
 from tests.support.patches import DEFAULTS, PATCH
 
 
@@ -25,7 +25,7 @@ def test_a_provider_serves_all_bsdfs_of_a_scene(some_variant, parallel):
         f"sphere_{n}": {"type": "sphere", "bsdf": md.bsdf_dict(PATCH, **DEFAULTS, orientation=n)}
         for n in range(4)
     }
-    with tables_by(wider):
+    with providing(wider):
         scene = mi.load_dict({"type": "scene", **surfaces}, parallel=parallel)
     outside = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
     assert len(requests) == len(surfaces)
@@ -37,6 +37,6 @@ def test_a_provider_serves_no_longer_after_an_error(some_variant):
     def broken(request):
         raise md.DiffractionError("no table")
 
-    with pytest.raises(Exception, match="no table"), tables_by(broken):
+    with pytest.raises(Exception, match="no table"), providing(broken):
         mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
     mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
