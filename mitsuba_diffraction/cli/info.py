@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files import MESHES, FileKind, kind_of, readable_file
+from ..files import MESHES, FileKind
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
@@ -17,6 +17,8 @@ from .report import STDOUT, Figures, lines_of, plain, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
+    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
@@ -69,12 +71,13 @@ def run(args: argparse.Namespace) -> Figures:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..heights.source import Source
     from ..tables.orders import load_any_orders
 
-    readable_file(file)
-    kind = kind_of(file)
-    if kind is FileKind.RECIPE:
-        return _recipe(file, args)
+    source = Source.of(file, options.load_options(args))
+    kind = source.kind
+    if source.recipe is not None:
+        return _recipe(source, source.recipe, args)
     if kind is FileKind.MESH:
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
@@ -92,7 +95,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
         return {"kind": "table of orders", **load_any_orders(file).summary()}
-    return _heights(file, args)
+    return _heights(source, args)
 
 
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
@@ -125,16 +128,14 @@ def _draw(args: argparse.Namespace) -> None:
     save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
-def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.source import Source
     from ..heights.treatment import jumping_lines, treatment_warning
 
-    how = options.load_options(args)
-    field = Source.of(file, how).field()
+    field = source.field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
-    suggested = (treatment_warning(file, how, field), jumping_lines(field))
+    suggested = (treatment_warning(args.file, source.options, field), jumping_lines(field))
     return {
         "kind": "height field",
         **field.summary(),
@@ -156,13 +157,9 @@ def _periods(field: HeightField) -> dict[str, Any]:
     return described
 
 
-def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.source import Source
 
-    source = Source.of(file, options.load_options(args))
-    recipe = source.recipe
-    assert recipe is not None
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = source.fields()

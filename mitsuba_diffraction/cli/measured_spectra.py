@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files import FileKind, kind_of
+from ..files import FileKind
 from ..settings import TableSettings
 from . import options
 from .brdf_map import surface_parameters
@@ -95,6 +95,8 @@ class Measurement:
 
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
+        from ..tables import DiffractionTable
+
         args, lam = self.args, self.lam
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
         if refused := options.given(args, own):
@@ -107,7 +109,7 @@ class Measurement:
                 f"'{file}' is a table, without heights to find gratings in; give --azimuth in "
                 "degrees"
             )
-        if kind_of(file) is FileKind.ORDERS:
+        if not isinstance(table, DiffractionTable):
             lam = _within(table, lam, file)
         elif args.wavelength_range is None:
             lam = lam[lam >= table.wavelength_range[0]]

@@ -110,7 +110,7 @@ class Source:
             return list(self.patches)
         self._refuse_tables()
         if self.recipe is None:
-            return [read_heights(file, self.options) for file in self.files]
+            return [read_heights(file, self.options, self.kind) for file in self.files]
         recipe, merged = self.recipe, self.recipe.options.updated(self.options)
         if recipe.generator is None:
             return [read_heights(file, merged) for file in recipe.sources]
