@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ..optics.arithmetic import is_complex
 from ..optics.coat import coated_reflectance, cosine_within
@@ -77,7 +77,9 @@ class Channels:
         count = _LEAST_NODES + math.ceil(_PER_FRINGE * path * (first - last))
         nodes = np.linspace(last, first, count)
         dense = np.arange(*_ENDS, 1.0)
-        rows = linear_srgb(response(dense)).T @ CubicSpline(nodes, np.eye(count))(1.0 / dense)
+        rows = linear_srgb(response(dense)).T @ scipy.interpolate.CubicSpline(nodes, np.eye(count))(
+            1.0 / dense
+        )
         return cls((1.0 / nodes).tolist(), (rows / rows.sum(axis=1, keepdims=True)).tolist())
 
     def colours(self, values: list[Float]) -> list[Float]:
