@@ -28,8 +28,8 @@ from .parameter_changes import ObjectValues
 from .pigment import pigment_bsdf
 from .properties import choice, class_of, number
 from .stack import UnderStack, read_layers
-from .textures import Orientation
 from .types import BSDF, Properties
+from .varying import Orientation
 from .window_positions import TILINGS, WindowPositions
 
 SOURCES = ("heightfield", "table", "data")
