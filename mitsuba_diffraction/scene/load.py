@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..plugin import installed
 from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
@@ -161,6 +162,8 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
     try:
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **values.parameters)
+            installed.check_plugins(state)
+            installed.search_first()  # the scene's folder was put in front of it
             _check_films(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)
