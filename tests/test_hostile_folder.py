@@ -1,4 +1,4 @@
-"""A folder from somebody else: nothing in it runs, and nothing outside of it is read."""
+"""A folder from somebody else: nothing there runs, and no other file is read."""
 
 from __future__ import annotations
 

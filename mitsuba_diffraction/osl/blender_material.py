@@ -117,7 +117,7 @@ def check_blender() -> None:
 def read_folder(folder: Path) -> dict[str, Any]:
     """Return the document of an exported folder, with absolute paths of its files.
 
-    Raises a MaterialError if the folder is not one, or names a file outside of it.
+    Raises a MaterialError if the folder is not one, or names files elsewhere.
     """
     documents = sorted(
         file

@@ -163,7 +163,7 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **values.parameters)
             installed.check_plugins(state)
-            installed.search_first()  # the scene's folder was put in front of it
+            installed.search_first()  # before the scene's folder
             _check_films(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)

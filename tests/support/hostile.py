@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 _SOURCE = """
 #include <stdio.h>
@@ -46,3 +47,9 @@ def _library(mark: Path) -> Path:
         [compiler, "-shared", "-fPIC", f'-DMARK="{mark}"', "-o", built, source], check=True
     )
     return built
+
+
+def postscript(file: Path) -> Path:
+    """Write an image in PostScript (EPS), a program that Ghostscript runs; return the file."""
+    Image.new("L", (8, 8)).save(file, format="EPS")
+    return file
