@@ -6,7 +6,6 @@ Pillow opens more formats than these; for PostScript (EPS) it runs Ghostscript o
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import IO
 
 from PIL import Image, UnidentifiedImageError
@@ -16,7 +15,7 @@ FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
 
 
 def open_image(
-    file: str | os.PathLike[str] | IO[bytes], formats: Sequence[str] = FORMATS
+    file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
 ) -> Image.Image:
     """Return an image that is not decoded yet.
 
