@@ -70,7 +70,7 @@ def check_plugins(state: Any) -> None:
             )
         if not _NAME.fullmatch(name):
             raise DiffractionError(
-                f"plugin {quoted(name)}: the type is no name of a plugin; use letters, digits and _"
+                f"plugin {quoted(name)}: a plugin's name has letters, digits, - and _ only"
             )
         for suffix in _LIBRARIES:
             file = _path(mi.file_resolver().resolve(f"plugins/{name}{suffix}"))
