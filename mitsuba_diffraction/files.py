@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from .errors import DiffractionError
+from .inputs import note_input
 
 #: Largest text that is read at once, bytes: recipes, plans and reports are far smaller.
 LARGEST_TEXT = 1_000_000
@@ -103,6 +104,7 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
     empty, or if its name is not UTF-8.
     """
     _beginning(path, 1)
+    note_input(path)
     return Path(path)
 
 

@@ -37,6 +37,6 @@ report                 output files, checked before the work; figures as text, J
 
 from .console import Bar, say_error
 from .main import main
-from .report import check_writable
+from .report import check_outputs
 
-__all__ = ["Bar", "check_writable", "main", "say_error"]
+__all__ = ["Bar", "check_outputs", "main", "say_error"]

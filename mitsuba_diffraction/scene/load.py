@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..inputs import note_input
 from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
@@ -108,7 +109,8 @@ def load_scene(
 
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
-    files_of(file, values.parameters, with_sources=False)  # refuses pipes
+    for each in files_of(file, values.parameters, with_sources=False):  # refuses pipes
+        note_input(each)
     check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
@@ -162,6 +164,7 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **values.parameters)
             _check_films(state)
+            _note_files(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)
             put_surface_parameters(state, values.surface)
@@ -224,6 +227,21 @@ def sensor_of(scene: Any, index: int) -> Any:
             f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
     return sensors[index]
+
+
+def _note_files(state: Any) -> None:
+    """Note the files that a parsed scene names as inputs, where Mitsuba finds them.
+
+    state : `mi.parser.ParserState`.
+    """
+    import mitsuba as mi
+
+    for node in state.nodes:
+        props = node.props
+        for name in list(props.keys()):
+            if props.type(name) == mi.Properties.Type.String and len(text := props[name]) < 1024:
+                note_input(str(mi.file_resolver().resolve(text)))
+                props.mark_queried(name, False)  # Mitsuba refuses what no plugin reads
 
 
 def _check_films(state: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import json
 import math
 import os
 import re
@@ -11,15 +12,19 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote
 
 from ..errors import DiffractionError, quoted
-from ..files import FileKind, kind_of, refuse_pipe
+from ..files import FileKind, kind_of, read_text, refuse_pipe
+from ..inputs import note_input
 
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
 _DEEPEST = 15
 # Longest path in characters: longer texts name no file, and asking would be an error.
 _LONGEST = 1024
+# Bytes of JSON that is searched for names; buffers within it make it large.
+_LARGEST_GLTF = 1 << 26
 
 Numbers = tuple[float, ...]
 
@@ -97,6 +102,28 @@ def files_of(
                     if named and len(named) < _LONGEST and "\0" not in named:
                         waiting.append(scene.parent / named)
     return list(files)
+
+
+def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
+    """Note as inputs a file and all that it names, if it is a scene or a recipe.
+
+    A file that is wrong is left to its reader, who refuses it.
+    """
+    note_input(file)
+    with contextlib.suppress(DiffractionError):
+        for named in files_of(file, values):
+            note_input(named)
+            if named.suffix.lower() == ".gltf":
+                note_gltf(named)
+
+
+def note_gltf(file: Path) -> None:
+    """Note as inputs the buffers and pictures that lie beside a glTF file."""
+    with contextlib.suppress(DiffractionError, ValueError, RecursionError, AttributeError):
+        document = json.loads(read_text(file, _LARGEST_GLTF))
+        for item in (*document.get("buffers", ()), *document.get("images", ())):
+            if not (uri := str(item.get("uri", "data:"))).startswith("data:"):
+                note_input(file.parent / unquote(uri))
 
 
 def _collect(

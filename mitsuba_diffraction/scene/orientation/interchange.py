@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import DiffractionError, one_line
 from ...extras import optional
 from ...files import GLTF, USD
+from ...inputs import note_input
 from ...plugin.meshes import Floats, Ints, MeshArrays
 
 
@@ -102,7 +103,10 @@ def _stage(file: Path) -> Any:
     """Open a USD file."""
     usd = optional("pxr.Usd", f"mesh '{file}'")
     try:
-        return usd.Stage.Open(str(file))
+        stage = usd.Stage.Open(str(file))
+        for layer in stage.GetUsedLayers():
+            note_input(layer.realPath)
+        return stage
     except Exception as error:  # Tf.ErrorException, over several lines
         raise DiffractionError(f"mesh '{file}': cannot be read as USD") from error
 
