@@ -1,6 +1,6 @@
 """Outputs never replace a file that the command reads: a given name is refused, a default changed.
 
-`world` is a folder of small inputs; `COMMANDS` reads every one of them with every command.
+`world` is a folder of small inputs.
 """
 
 from __future__ import annotations
@@ -12,91 +12,17 @@ import shlex
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.cli.arguments import OUTPUTS
 from mitsuba_diffraction.cli.main import build_parser
-from tests.support.directions import rough_patch
-from tests.support.orders import thin_grating
+from tests.support.inputs import HEIGHTS, PLY, RENDER
 from tests.support.systems import posix
-
-SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
-<include filename="light.xml"/><integrator type="path"/>
-<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="$width"/>
-<integer name="height" value="4"/></film><sampler type="independent">
-<integer name="sample_count" value="1"/></sampler></sensor>
-<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
-<string name="filename" value="scale.png"/></texture></bsdf></shape>
-<shape type="ply"><string name="filename" value="mesh.ply"/></shape>
-<shape type="sphere" id="ball"><bsdf type="diffraction" id="skin">
-<string name="heightfield" value="recipe.toml"/><string name="material" value="Al"/></bsdf></shape>
-</scene>"""
-LIGHT = """<scene version="3.0.0"><emitter type="envmap">
-<string name="filename" value="sky.exr"/></emitter></scene>"""
-PLY = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-element face 4
-property list uchar int vertex_indices
-end_header
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-3 0 2 1
-3 0 1 3
-3 0 3 2
-3 1 2 3
-"""
-SMALL = "--coherence-width 2 --tolerance 0.05"
-
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    """Small inputs of every kind."""
-    folder = tmp_path_factory.mktemp("original")
-    field = rough_patch((20, 24), (0.1, 0.1), 0.05)
-    np.save(folder / "h.npy", field.heights)
-    grey = np.uint8(255 * (field.heights - field.heights.min()) / np.ptp(field.heights))
-    Image.fromarray(grey).save(folder / "scale.png")
-    Image.fromarray(np.stack([grey > 127] * 3, -1).astype(np.uint8) * 255).save(folder / "logo.png")
-    DiffractionTable.build(field, coherence_width=2.0, tolerance=0.05).save(folder / "t.exr")
-    thin_grating().save(folder / "orders.nc")
-    texts = {
-        "scale.xml": SCENE, "light.xml": LIGHT, "mesh.ply": PLY,
-        "recipe.toml": 'source = "h.npy"\npixel_size = 0.1\ncoherence_width = 2\n'
-        "tolerance = 0.05\n",
-        "pigment.csv": "400,0.2\n700,0.4\n", "profile.txt": "0 0\n0.3 0.05\n0.6 0\n",
-        "layers.toml": '[[layer]]\nmaterial = "SiO2"\nthickness = 0.1\n',
-        "treatments.toml": '["*.npy"]\npixel_size = 0.1\n',
-    }  # fmt: skip
-    for name, text in texts.items():
-        (folder / name).write_text(text)
-    import OpenEXR
-
-    OpenEXR.File({}, {"RGB": np.ones((2, 4, 3), np.float32)}).write(str(folder / "sky.exr"))
-    return folder
-
-
-@pytest.fixture
-def world(original, here):
-    """A copy of the small inputs, which is the current folder."""
-    shutil.copytree(original, here, dirs_exist_ok=True)
-    return here
 
 
 def _contents(folder: Path) -> dict[str, tuple[int, bytes]]:
     return {f.name: (f.stat().st_ino, f.read_bytes()) for f in folder.iterdir() if f.is_file()}
-
-
-RENDER = "render scale.xml -m scalar_rgb -s 1"
-HEIGHTS = f"--pixel-size 0.1 {SMALL}"
 
 
 @pytest.mark.parametrize(
@@ -197,70 +123,3 @@ def test_every_option_that_names_an_output_is_known():
         if str(action.help).startswith("write") and action.metavar
     }  # fmt: skip
     assert named <= {*OUTPUTS}
-
-
-#: A command with each kind of input, and the suffixes of its outputs.
-COMMANDS = [
-    (RENDER, ".exr .png"), (f"{RENDER} --material ball=t.exr", ".exr .png"),
-    (f"{RENDER} --material ball=orders.nc", ".exr"),
-    ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
-    (f"{RENDER} --plan recipe.toml", ".exr"), (f"{RENDER} --frames 1 --turn width", ""),
-    ("plan scale.xml --paths 64", ".toml"), ("brdf-map recipe.toml --resolution 8", ".exr .png"),
-    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
-     "--material keratin", ".exr .png"),
-    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),
-    ("evaluate recipe.toml --windows 0 --step 50 --angle-step 5", ".png .csv .npz"),
-    ("spectrum t.exr --material keratin --pigment pigment.csv --step 50", ".csv .png"),
-    ("spectrum recipe.toml --step 100", ".csv .png"), ("spectrum orders.nc --step 100", ".csv"),
-    ("spectrum h.npy --treatments treatments.toml --step 100 " + SMALL, ".csv"),
-    ("tangents mesh.ply", ".ply"), ("precompute recipe.toml", ".exr"),
-    (f"precompute h.npy {HEIGHTS}", ".exr"),
-    (f"precompute scale.png {HEIGHTS} --max-height 0.1", ".exr"),
-    ("orders orders.nc --theta 0 --wavelength 500", ".csv"), ("tonemap sky.exr", ".png"),
-    (f"sweep light-angle h.npy {HEIGHTS} --resolution 8 --step 100", ".png .csv"),
-    ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
-    ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
-    ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
-    ("solve profile.txt --period 0.6 --resolution 80 --tolerance 0.2 --wavelength-range 590,610",
-     ".nc"),
-]  # fmt: skip
-
-
-#: What files name.
-NAMED = {
-    "scale.xml": ("light.xml", "sky.exr", "scale.png", "mesh.ply", "recipe.toml", "h.npy"),
-    "recipe.toml": ("h.npy",),
-}  # fmt: skip
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])
-def test_no_output_of_any_name_replaces_an_input(run, original, world, command, suffixes):
-    """Outputs called after each input, with every suffix, in several spellings; then defaults."""
-    words = [word for part in shlex.split(command) for word in part.replace("=", ",").split(",")]
-    first, *others = (word for word in words if (world / word).exists())
-    inputs = {name for word in (first, *others) for name in (word, *NAMED.get(word, ()))}
-    before = {name: (original / name).read_bytes() for name in inputs}
-
-    def check(*options: str) -> list[str]:
-        """Run the command, check its inputs, and tidy up; the names of what it has made."""
-        run(*shlex.split(command), *options)
-        assert {name: (world / name).read_bytes() for name in inputs} == before, options
-        made = [str(f.relative_to(world)) for f in world.rglob("*") if f.is_file()]
-        shutil.rmtree(world)
-        shutil.copytree(original, world)
-        os.chdir(world)
-        return [name for name in made if not (world / name).exists()]
-
-    spellings = itertools.cycle(["{}", "../here/./{}"])
-    for name, suffix in itertools.product(sorted(inputs), suffixes.split()):
-        check("-o", next(spellings).format(f"{Path(name).stem}{suffix}"))
-    # what the command makes by default are links to an input in the next run
-    made = check()
-    for name, link in zip(made, itertools.cycle([os.link, os.symlink]), strict=False):
-        (world / name).parent.mkdir(parents=True, exist_ok=True)
-        link(world / first, world / name)
-    run(*shlex.split(command))
-    for name in made:
-        assert (world / name).samefile(world / first), name
-    check()
