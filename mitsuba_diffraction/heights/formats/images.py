@@ -13,6 +13,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...images import open_image
 from ...streams import without_chatter
 from ..field import check_pixel_count
 from . import RawHeights, first_line
@@ -49,7 +50,7 @@ def read_image(path: Path) -> RawHeights:
             # The size is checked below, against a limit of our own and before anything is decoded.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
-            with Image.open(path, formats=("PNG", "BMP", "DIB", "TIFF")) as image:
+            with open_image(path, ("PNG", "BMP", "DIB", "TIFF")) as image:
                 return _heights_of(image, shown)
     except DiffractionError:
         raise

@@ -1,0 +1,27 @@
+"""Images that users name, opened in formats that Pillow decodes by itself.
+
+Pillow opens more formats than these; for PostScript (EPS) it runs Ghostscript on the content.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import IO
+
+from PIL import Image, UnidentifiedImageError
+
+#: Formats of images, in Pillow's names; the content decides, not the suffix.
+FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
+
+
+def open_image(
+    file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
+) -> Image.Image:
+    """Return an image that is not decoded yet.
+
+    Raises an UnidentifiedImageError, an OSError, if the content is of another format.
+    """
+    try:
+        return Image.open(file, formats=formats)
+    except UnidentifiedImageError as error:
+        raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
