@@ -57,9 +57,8 @@ def run(args: argparse.Namespace) -> Figures:
     try:
         rows = _measured(args)
     except KeyboardInterrupt:
-        say(
-            f"interrupted; finished scans are in '{args.output or 'survey'}': run the command again to go on"
-        )
+        folder = args.output or "survey"
+        say(f"interrupted; finished scans are in '{folder}': run the command again to go on")
         args.code = INTERRUPTED
         return {}
     for row in rows:

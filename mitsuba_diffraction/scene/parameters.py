@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import json
 import math
 import os
 import re
@@ -12,18 +11,16 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from urllib.parse import unquote
 
 from ..errors import DiffractionError, quoted
-from ..files import FileKind, kind_of, read_text, refuse_pipe
+from ..files import FileKind, kind_of, refuse_pipe
+from ..gltf import note_named
 from ..inputs import note_input
 from .stage import STUDIO
 
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
 _DEEPEST = 15
-# Bytes of JSON that is searched for names; buffers within it make it large.
-_LARGEST_GLTF = 1 << 26
 # Parameters of Mitsuba's plugins and of this package's whose text is the name of a file.
 _FILES = ("filename", "heightfield", "table", "layers", "pigment")
 
@@ -128,16 +125,7 @@ def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
         for named in files_of(file, values):
             note_input(named)
             if named.suffix.lower() == ".gltf":
-                note_gltf(named)
-
-
-def note_gltf(file: Path) -> None:
-    """Note as inputs the buffers and pictures that lie beside a glTF file."""
-    with contextlib.suppress(DiffractionError, ValueError, RecursionError, AttributeError):
-        document = json.loads(read_text(file, _LARGEST_GLTF))
-        for item in (*document.get("buffers", ()), *document.get("images", ())):
-            if not (uri := str(item.get("uri", "data:"))).startswith("data:"):
-                note_input(file.parent / unquote(uri))
+                note_named(named)
 
 
 def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:
