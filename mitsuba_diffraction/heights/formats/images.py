@@ -13,6 +13,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...limits import check_content
 from ...streams import without_chatter
 from ..field import check_pixel_count
 from . import RawHeights, first_line
@@ -50,6 +51,8 @@ def read_image(path: Path) -> RawHeights:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
             with Image.open(path, formats=("PNG", "BMP", "DIB", "TIFF")) as image:
+                check_pixel_count(image.height, image.width, shown)
+                check_content(8 * image.height * image.width, path.stat().st_size, shown)
                 return _heights_of(image, shown)
     except DiffractionError:
         raise
@@ -65,7 +68,6 @@ def read_image(path: Path) -> RawHeights:
 
 def _heights_of(image: Image.Image, shown: str) -> RawHeights:
     """Decode an opened image."""
-    check_pixel_count(image.height, image.width, shown)
     mode = image.mode
     if mode == "I" and image.format == "PNG":  # Pillow's name of 16-bit grey before 10.3
         mode = "I;16"
@@ -130,6 +132,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
         check_pixel_count(height, width, shown)
         check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
+        check_content(8 * height * width * len(names), path.stat().st_size, shown)
         chosen = _choose_channel(names, channel, shown)
         with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = file.channels()[chosen].pixels
