@@ -1,12 +1,10 @@
-"""Small files take neither the memory nor the day, and end no process."""
+"""Limits on files, and the refusal of small files that ask for more."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import resource
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -20,17 +18,13 @@ from mitsuba_diffraction.scene.load import set_variant
 from tests.support import ROOT
 from tests.support.small_files import FILES
 
-# Importing Mitsuba takes 0.2 GB, and what a file may hold 0.5 GB, twice while it is copied
-MOST_BYTES = 1_500_000_000
-MOST_SECONDS = 20.0
-
 
 def test_security_lists_the_limits():
     """The table names every limit and its value, and nothing else."""
     rows = re.findall(r"^\| `([A-Z_]+)` \| ([\d,]+) \|", (ROOT / "SECURITY.md").read_text(), re.M)
     listed = {name: int(value.replace(",", "")) for name, value in rows}
-    named = {name: value for name, value in vars(limits).items() if name.isupper()}
-    assert listed == {name: value for name, value in named.items() if name[0] != "_"}
+    named = {name: value for name, value in vars(limits).items() if isinstance(value, int)}
+    assert listed == named
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -40,21 +34,6 @@ def test_a_small_file_is_refused_in_a_line(name, tmp_path):
     with pytest.raises(DiffractionError) as caught:
         FILES[name].read(path)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.thorough
-def test_small_files_take_neither_memory_nor_time(tmp_path):
-    ran = subprocess.run(
-        [sys.executable, "-m", "tests.support.small_files", tmp_path, *FILES],
-        cwd=ROOT, capture_output=True, text=True, timeout=600, check=False,
-    )  # fmt: skip
-    last = ran.stdout.splitlines()[-1] if ran.stdout else ""
-    assert ran.returncode == 0, f"{last}\n{ran.stderr[-500:]}"
-    for line in map(json.loads, ran.stdout.splitlines()):
-        assert line["seconds"] < MOST_SECONDS, line
-        assert line["peak"] < MOST_BYTES, line
-        assert line["size"] < MOST_BYTES / 100, line
-        assert line["refusal"], line
 
 
 def test_files_of_the_kernel_are_refused():

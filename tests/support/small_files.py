@@ -7,7 +7,6 @@ prints a line of JSON for each: the refusal, seconds, and the peak memory of the
 from __future__ import annotations
 
 import json
-import os
 import struct
 import sys
 import time
@@ -207,7 +206,7 @@ def run(names: list[str], folder: Path) -> None:
     set_variant("scalar_rgb")
     for name in names:
         path = FILES[name].write(folder)
-        print(json.dumps({"name": name, "begins": True}), flush=True)
+        print(name, file=sys.stderr, flush=True)
         start, refusal = time.monotonic(), None
         try:
             FILES[name].read(path)
@@ -217,7 +216,7 @@ def run(names: list[str], folder: Path) -> None:
         print(
             json.dumps({
                 "name": name, "seconds": time.monotonic() - start, "peak": peak * 1024,
-                "refusal": refusal, "size": os.path.getsize(path),
+                "refusal": refusal, "size": path.stat().st_size,
             }),
             flush=True,
         )  # fmt: skip
