@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..errors import DiffractionError
 from ..scene.load import set_variant
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
@@ -15,7 +17,7 @@ from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
 from .report import Figures, check_writable, elapsed
-from .workers import THREADS, add_workers, client_of, on_workers, worker_threads
+from .workers import THREADS, add_workers, client_of, on_workers, say_files, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
 _SIZES = 1.5
@@ -84,6 +86,15 @@ def run(args: argparse.Namespace) -> Figures:
     return {"rows": rows, "seconds": seconds}
 
 
+def _read_by(scans: Sequence[Path]) -> Iterator[Path]:
+    """Yield the scans with the files that their recipes name; survey.csv tells of wrong recipes."""
+    from ..scene.parameters import files_of
+
+    for scan in scans:
+        with contextlib.suppress(DiffractionError):
+            yield from files_of(scan)
+
+
 def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Measure new scans, here or on workers, and return the rows of all scans."""
     own_options, settings = options.load_options(args), options.table_options(args)
@@ -105,6 +116,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
             from ..cluster.workers import check_workers
 
             check_workers(client, variant)
+            say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(
             args.files, args.output, treatments=treatments,

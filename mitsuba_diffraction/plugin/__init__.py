@@ -14,6 +14,7 @@ nesting         `NestingBSDF`, a BSDF over a nested one
 arithmetic      Dr.Jit's arithmetic, for the formulas of `optics`
 presets         named looks: a patch with its material and layers, by name
 registration    registration of the plugins in every variant
+installed       Mitsuba's own plugins and tables, before files of the same names beside a scene
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 diffraction_parameters  parameters of `diffraction`, read from Mitsuba's Properties and checked

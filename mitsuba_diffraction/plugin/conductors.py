@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.materials import METALS, TISSUES
+from . import installed
 from .types import Texture
 
 Array = NDArray[Any]
@@ -33,17 +34,20 @@ def unknown_conductor(material: str) -> str:
 
 def _names() -> list[str]:
     """Return names of tabulated conductors, without second entries from Palik's table."""
-    folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    names = _tabulated()
     return sorted(
         (name for name in names if name.removesuffix("_palik") not in names - {name}),
         key=str.lower,
     )
 
 
+def _tabulated() -> set[str]:
+    return {file.name.removesuffix(".eta.spd") for file in _folder().glob("*.eta.spd")}
+
+
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of a material's table, if there is one."""
-    if material not in TISSUES and not _file(material, "eta").is_file():
+    if material not in TISSUES and material not in _tabulated():
         return None
     nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
@@ -106,9 +110,9 @@ def _table(material: str, name: str) -> Array:
     if tissue := TISSUES.get(material):
         index = tissue.index(tissue.nodes)
         return np.stack([tissue.nodes, index.real if name == "eta" else index.imag])
-    return np.asarray(np.loadtxt(_file(material, name)).T)
+    return np.asarray(np.loadtxt(_folder() / f"{material}.{name}.spd").T)
 
 
-def _file(material: str, name: str) -> Path:
-    """Return the path of Mitsuba's table of a part of a material's index."""
-    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))
+def _folder() -> Path:
+    """Return the folder of Mitsuba's own tables of optical constants."""
+    return installed.folder() / "data" / "ior"

@@ -155,8 +155,11 @@ class Conductor:
 
         Raises a DiffractionError if the material is unknown, or its table is too short.
         """
+        limits = tabulated_range(material)
+        if limits is None:
+            raise DiffractionError(unknown_conductor(material))
+        first, last = limits
         objects = children(_load("conductor", **parameters_of(material)))
-        first, last = tabulated_range(material) or (SHORTEST, LONGEST)
         needed = (wavelength, wavelength) if mi.is_monochromatic else _REQUIRED
         if not first <= needed[0] <= needed[1] <= last:
             raise DiffractionError(

@@ -20,6 +20,7 @@ from PIL import Image
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
+from ..images import open_image
 from ..tables.exr import write_channels
 
 Floats = NDArray[np.float32]
@@ -183,7 +184,7 @@ def _picture(image: ArrayLike | str | os.PathLike[str]) -> tuple[NDArray[Any], f
 def _read(path: Path) -> NDArray[Any]:
     readable_file(path)
     try:
-        with Image.open(path) as picture:
+        with open_image(path) as picture:
             mode, values = picture.mode, np.array(picture)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         reason = one_line(str(error))

@@ -13,17 +13,18 @@ from __future__ import annotations
 import contextlib
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..plugin import installed
 from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from ..system import memory
-from .parameters import check_parameters, files_of, parameters_of
+from .parameters import check_includes, check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
@@ -108,14 +109,14 @@ def load_scene(
 
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
-    files_of(file, values.parameters, with_sources=False)  # refuses pipes
+    known = files_of(file, values.parameters, with_sources=False)
     check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         with contextlib.nullcontext() if bands is None else wider_tables(bands.first):
-            scene = _instantiated(file, values, box_filter, bands)
+            scene = _instantiated(file, known, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -136,8 +137,13 @@ def load_scene(
     return scene
 
 
-def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Bands | None) -> Any:
-    """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects."""
+def _instantiated(
+    file: Path, known: Sequence[Path], values: SceneValues, box_filter: bool, bands: Bands | None
+) -> Any:
+    """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects.
+
+    known : files that the scene may include.
+    """
     import mitsuba as mi
 
     from .additions import (
@@ -161,6 +167,9 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
     try:
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **values.parameters)
+            check_includes([Path(str(path)) for path in state.files], known)
+            installed.check_plugins(state)
+            installed.search_first()  # before the scene's folder
             _check_films(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)

@@ -13,6 +13,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...images import open_image
 from ...limits import check_content
 from ...streams import without_chatter
 from ..field import check_pixel_count
@@ -50,9 +51,7 @@ def read_image(path: Path) -> RawHeights:
             # The size is checked below, against a limit of our own and before anything is decoded.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
-            with Image.open(path, formats=("PNG", "BMP", "DIB", "TIFF")) as image:
-                check_pixel_count(image.height, image.width, shown)
-                check_content(8 * image.height * image.width, path.stat().st_size, shown)
+            with open_image(path, ("PNG", "BMP", "DIB", "TIFF")) as image:
                 return _heights_of(image, shown)
     except DiffractionError:
         raise
@@ -68,6 +67,7 @@ def read_image(path: Path) -> RawHeights:
 
 def _heights_of(image: Image.Image, shown: str) -> RawHeights:
     """Decode an opened image."""
+    check_pixel_count(image.height, image.width, shown)
     mode = image.mode
     if mode == "I" and image.format == "PNG":  # Pillow's name of 16-bit grey before 10.3
         mode = "I;16"

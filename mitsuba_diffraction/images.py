@@ -1,0 +1,39 @@
+"""Images that users name, opened in formats that Pillow decodes by itself.
+
+Pillow opens more formats than these; for PostScript (EPS) it runs Ghostscript on the content.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import IO
+
+from PIL import Image, UnidentifiedImageError
+
+from .errors import DiffractionError
+from .limits import check_content
+
+#: Formats of images, in Pillow's names; the content decides, not the suffix.
+FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
+
+
+def open_image(
+    file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
+) -> Image.Image:
+    """Return an image that is not decoded yet.
+
+    Raises an UnidentifiedImageError, an OSError, if the content is of another format; a
+    DiffractionError if a file is small, and its pixels as numbers of 8 bytes are many.
+    """
+    try:
+        image = Image.open(file, formats=formats)
+    except UnidentifiedImageError as error:
+        raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
+    if isinstance(file, str | os.PathLike):
+        name = os.fspath(file)
+        try:
+            check_content(8.0 * image.width * image.height, os.path.getsize(name), repr(name))
+        except DiffractionError:
+            image.close()
+            raise
+    return image
