@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from .errors import DiffractionError
+from .errors import DiffractionError, quoted
 from .limits import LARGEST_FILE, LARGEST_TEXT
 
 #: Attribute of an EXR file that makes it a table; the JSON in it holds everything but coefficients.
@@ -142,6 +142,19 @@ def path_within(file: Path, name: str) -> Path:
     if not path.resolve().is_relative_to(file.parent.resolve()):
         raise DiffractionError(
             f"{str(file)!r}: output: {name!r} is outside the file's folder; name a path in it"
+        )
+    return path
+
+
+def path_beside(file: Path, name: str) -> Path:
+    """Return the path of an input that a file names, relative to the file's folder.
+
+    Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
+    """
+    path = file.parent / name
+    if not path.resolve().is_relative_to(file.parent.resolve()):
+        raise DiffractionError(
+            f"{str(file)!r} names {quoted(name)}, which is outside of its folder; copy that there"
         )
     return path
 

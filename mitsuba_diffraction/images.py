@@ -5,16 +5,29 @@ Pillow opens more formats than these; for PostScript (EPS) it runs Ghostscript o
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from typing import IO
 
-from PIL import Image, UnidentifiedImageError
+from PIL import EpsImagePlugin, Image, UnidentifiedImageError
 
 from .errors import DiffractionError
 from .limits import check_content
 
 #: Formats of images, in Pillow's names; the content decides, not the suffix.
 FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
+
+
+@contextlib.contextmanager
+def without_programs() -> Iterator[None]:
+    """Keep Pillow from running Ghostscript for packages that open images of every format."""
+    before = EpsImagePlugin.gs_binary
+    EpsImagePlugin.gs_binary = False
+    try:
+        yield
+    finally:
+        EpsImagePlugin.gs_binary = before
 
 
 def open_image(

@@ -61,7 +61,7 @@ def check_content(claimed: float, size: int, shown: str) -> None:
     if claimed > max(SMALL_CONTENT, MOST_COMPRESSED * size):
         raise DiffractionError(
             f"{shown}: {size} bytes claim to hold {claimed:.3g}; a file may hold {SMALL_CONTENT} "
-            f"bytes, or {MOST_COMPRESSED} times its size: is it damaged?"
+            f"bytes, or {MOST_COMPRESSED} times its size; damaged?"
         )
 
 
@@ -79,7 +79,7 @@ def check_archive(path: Path, shown: str) -> None:
 
     Readers of ZIP archives stop at the sizes that the archive's directory states.
 
-    Raises a DiffractionError if all members, or texts of it, are too large, or its directory is
+    Raises a DiffractionError if all members, or texts among them, are too large, or its directory is
     damaged.
     """
     if not zipfile.is_zipfile(path):
@@ -124,7 +124,7 @@ def bounded_memory(size: int, shown: str) -> Iterator[None]:
             yield
     except MemoryError as error:
         raise DiffractionError(
-            f"{shown}: {size} bytes claim to hold more than memory; is it damaged?"
+            f"{shown}: {size} bytes claim to hold more than memory; damaged?"
         ) from error
 
 

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, quoted
 from ..extras import optional
 from ..files import GLTF, read_text, readable_file
+from ..gltf import load_gltf
+from ..images import FORMATS
 from ..optics.colour import decode_srgb
 from .types import BSDF
 
@@ -128,7 +130,9 @@ def _base_colour(file: Path) -> dict[str, Any]:
     """
     trimesh = optional("trimesh", f"pigment='{file}'")
     try:
-        meshes = trimesh.load_scene(file, process=False).geometry.values()
+        meshes = load_gltf(file, f"pigment='{file}'").geometry.values()
+    except DiffractionError:
+        raise
     except Exception as error:  # whatever the package makes of damaged files
         raise DiffractionError(f"pigment='{file}': cannot be read as glTF") from error
     materials = {id(m): m for mesh in meshes if (m := getattr(mesh.visual, "material", None))}
@@ -143,6 +147,10 @@ def _base_colour(file: Path) -> dict[str, Any]:
     picture = own[0].baseColorTexture
     if picture is None:
         return {"type": "rgb", "value": factor.tolist()}
+    if picture.format not in FORMATS:
+        raise DiffractionError(
+            f"pigment='{file}': its picture is none of {', '.join(FORMATS)}; save it as PNG"
+        )
     linear = decode_srgb(np.asarray(picture.convert("RGB")) / 255.0) * factor
     return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32))}
 

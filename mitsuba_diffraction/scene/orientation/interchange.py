@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError, one_line
+from ...errors import DiffractionError, one_line, quoted
 from ...extras import optional
-from ...files import GLTF, USD
+from ...files import GLTF, USD, path_beside, refuse_pipe
+from ...gltf import load_gltf
 from ...plugin.meshes import Floats, Ints, MeshArrays
 
 
@@ -80,7 +81,7 @@ def _placed(
 
 def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
     """Yield the meshes of a glTF file; `trimesh` turns v upwards."""
-    scene = trimesh.load_scene(file, process=False)
+    scene = load_gltf(file, f"mesh '{file}'")
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
         mesh = scene.geometry[name]
@@ -100,11 +101,38 @@ def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
 
 def _stage(file: Path) -> Any:
     """Open a USD file."""
-    usd = optional("pxr.Usd", f"mesh '{file}'")
+    usd, sdf = optional("pxr.Usd", f"mesh '{file}'"), optional("pxr.Sdf", f"mesh '{file}'")
     try:
+        _check_layers(sdf, file)
         return usd.Stage.Open(str(file))
+    except DiffractionError:
+        raise
     except Exception as error:  # Tf.ErrorException, over several lines
         raise DiffractionError(f"mesh '{file}': cannot be read as USD") from error
+
+
+def _check_layers(sdf: Any, file: Path) -> None:
+    """Refuse a USD file that is composed of files outside of its folder, before they are opened."""
+    waiting, seen = [file], set()
+    while waiting:
+        layer_file = waiting.pop()
+        if layer_file in seen:
+            continue
+        seen.add(layer_file)
+        refuse_pipe(layer_file)
+        layer = sdf.Layer.FindOrOpen(str(layer_file)) if layer_file.is_file() else None
+        if layer is None:
+            continue  # USD warns of it
+        for name in layer.GetCompositionAssetDependencies():
+            if name.startswith("`"):
+                raise DiffractionError(
+                    f"mesh '{file}': its name of a file {quoted(name)} is an expression; write the "
+                    "name itself"
+                )
+            # a file in an archive: archive.usdz[file.usda]
+            path = layer_file.parent / name.partition("[")[0]
+            path_beside(file, str(path.absolute()))
+            waiting.append(path)
 
 
 def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
