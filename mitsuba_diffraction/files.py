@@ -2,7 +2,7 @@
 
 `kind_of` alone decides the kind of a file.
 
-Opening a pipe waits for somebody to write into it, and a device has no end. A name that is not
+Opening a pipe waits for somebody to write into it, and a device has no end. A name in another encoding than
 UTF-8 cannot be handed to Mitsuba or OpenEXR.
 """
 

@@ -33,7 +33,7 @@ def without_programs() -> Iterator[None]:
 def open_image(
     file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
 ) -> Image.Image:
-    """Return an image that is not decoded yet.
+    """Return an image before its pixels are decoded.
 
     Raises an UnidentifiedImageError, an OSError, if the content is of another format; a
     DiffractionError if a file is small, and its pixels as numbers of 8 bytes are many.

@@ -79,8 +79,8 @@ def check_archive(path: Path, shown: str) -> None:
 
     Readers of ZIP archives stop at the sizes that the archive's directory states.
 
-    Raises a DiffractionError if all members, or texts among them, are too large, or its directory is
-    damaged.
+    Raises a DiffractionError if all members, or a text among them, are too large, or the directory
+    is damaged.
     """
     if not zipfile.is_zipfile(path):
         return
