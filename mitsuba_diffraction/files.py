@@ -2,8 +2,8 @@
 
 `kind_of` alone decides the kind of a file.
 
-Opening a pipe waits for somebody to write into it, and a device has no end. A name in another encoding than
-UTF-8 cannot be handed to Mitsuba or OpenEXR.
+Opening a pipe waits for somebody to write, and a device has no end. Mitsuba and OpenEXR accept
+names in UTF-8 only.
 """
 
 from __future__ import annotations
