@@ -14,6 +14,7 @@ from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
 from ...images import open_image
+from ...limits import check_content
 from ...streams import without_chatter
 from ..field import check_pixel_count
 from . import RawHeights, first_line
@@ -131,6 +132,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
         check_pixel_count(height, width, shown)
         check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
+        check_content(8 * height * width * len(names), path.stat().st_size, shown)
         chosen = _choose_channel(names, channel, shown)
         with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = file.channels()[chosen].pixels
