@@ -11,7 +11,7 @@ import OpenEXR
 
 from ..files import FileKind, kind_of, readable_file, refuse_pipe
 from ..images import open_image
-from ..limits import MOST_NESTED, check_content, check_count
+from ..limits import MOST_NESTED, check_content, check_count, tree_sizes
 from ..streams import without_chatter
 from .orientation.mesh_files import KINDS
 from .orientation.mesh_indices import check_mesh
@@ -78,33 +78,8 @@ def _check_nesting(state: Any) -> None:
     for node in state.nodes:
         names = [n for n in node.props.keys() if node.props.type(n) == kinds.ResolvedReference]  # noqa: SIM118
         inner.append([int(node.props[name].index()) for name in names])
-    sizes = _tree_sizes(inner)
+    sizes = tree_sizes(inner)
     for number, node in enumerate(state.nodes):
         if node.type == mi.ObjectType.BSDF:
             shown = f"BSDF {node.props.id() or node.props.plugin_name()!r}"
             check_count(sizes[number], MOST_NESTED, shown, "BSDFs and textures within it")
-
-
-def _tree_sizes(inner: list[list[int]]) -> list[float]:
-    """Return how many nodes the tree below each node of a graph has; infinite in a circle.
-
-    inner : numbers of the nodes that each node refers to.
-    """
-    sizes = [0.0] * len(inner)
-    states = [0] * len(inner)  # 0 not seen, 1 on the way down, 2 known
-    for first in range(len(inner)):
-        waiting = [first]
-        while waiting:
-            number = waiting[-1]
-            if states[number] == 0:
-                states[number] = 1
-                waiting += [other for other in inner[number] if states[other] == 0]
-                continue
-            waiting.pop()
-            if states[number] == 1:
-                circle = any(states[other] == 1 for other in inner[number])
-                sizes[number] = (
-                    float("inf") if circle else 1.0 + sum(sizes[other] for other in inner[number])
-                )
-                states[number] = 2
-    return sizes

@@ -1,13 +1,16 @@
-"""Meshes and scenes, see `small_files`."""
+"""Small meshes and scenes that ask for more than there is; see `small_files`."""
 
 from __future__ import annotations
 
 import json
 import struct
+import sys
 import zlib
 from pathlib import Path
 
-from tests.support.small_files import hostile, mesh, pigment, png, scene
+from tests.support.small_files import FILES, hostile, mesh, pigment, png, run, scene
+
+__all__ = ["FILES"]
 
 
 # --- meshes --------------------------------------------------------------------------------------
@@ -151,7 +154,7 @@ def gltf(**changes: object) -> dict[str, object]:
     }  # fmt: skip
 
 
-@hostile("accessor.gltf", mesh)
+@hostile("accessor.gltf", mesh, "trimesh")
 def _(path: Path) -> None:
     document = gltf(accessors=[
         {"componentType": 5126, "count": 400_000_000, "type": "VEC3"},
@@ -160,7 +163,7 @@ def _(path: Path) -> None:
     path.write_text(json.dumps(document))
 
 
-@hostile("accessor_sparse.gltf", mesh)
+@hostile("accessor_sparse.gltf", mesh, "trimesh")
 def _(path: Path) -> None:
     document = gltf(accessors=[
         {"componentType": 5126, "count": 400_000_000, "type": "VEC3", "sparse": {
@@ -171,7 +174,7 @@ def _(path: Path) -> None:
     path.write_text(json.dumps(document))
 
 
-@hostile("instances.gltf", mesh)
+@hostile("instances.gltf", mesh, "trimesh")
 def _(path: Path) -> None:
     document = gltf(nodes=[{"mesh": 0}] * 300_000, scenes=[{"nodes": list(range(300_000))}])
     path.write_text(json.dumps(document))
@@ -188,12 +191,27 @@ def _with_picture(data: bytes) -> dict[str, object]:
     )  # fmt: skip
 
 
-@hostile("texture.gltf", mesh)
+@hostile("circle.gltf", mesh, "trimesh")
 def _(path: Path) -> None:
-    path.write_text(json.dumps(_with_picture(png(13_000, 13_000, 8, 4))))
+    path.write_text(json.dumps(gltf(nodes=[{"mesh": 0, "children": [0]}])))
 
 
-@hostile("pigment.gltf", pigment)
+@hostile("tree.gltf", mesh, "trimesh")
+def _(path: Path) -> None:
+    nodes = [{"children": [n + 1, n + 1]} for n in range(40)]
+    path.write_text(json.dumps(gltf(nodes=[*nodes, {"mesh": 0}])))
+
+
+@hostile("views.gltf", mesh, "trimesh")
+def _(path: Path) -> None:
+    document = gltf()
+    document["buffers"] = [{"uri": "views.bin", "byteLength": 1 << 24}]
+    document["bufferViews"] = [{"buffer": 0, "byteLength": 1 << 24}] * 10_000
+    path.with_suffix(".bin").write_bytes(_XYZ.ljust(1 << 24, b"\0"))
+    path.write_text(json.dumps(document))
+
+
+@hostile("pigment.gltf", pigment, "trimesh")
 def _(path: Path) -> None:
     path.write_text(json.dumps(_with_picture(png(13_000, 13_000, 8, 4))))
 
@@ -208,7 +226,7 @@ def Mesh "m"
 """
 
 
-@hostile("count.usda", mesh)
+@hostile("count.usda", mesh, "pxr")
 def _(path: Path) -> None:
     path.write_text(_USD % "2000000000")
 
@@ -268,8 +286,4 @@ def _(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    import sys
-
-    from tests.support.small_files import run
-
     run(sys.argv[2:], Path(sys.argv[1]))

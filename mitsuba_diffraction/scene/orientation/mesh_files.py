@@ -54,13 +54,7 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         return interchange_mesh(file)
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")
-    mesh = _load(file)
-    if not mesh.face_count():
-        # whoever keeps the error keeps its traceback, and Dr.Jit compiles kernels for all meshes
-        # alive: one without faces would break every later rendering of the process
-        del mesh
-        raise DiffractionError(f"mesh '{file}': it has no triangles")
-    return mesh_arrays(mesh)
+    return mesh_arrays(_load(file))
 
 
 def _is_interchange(file: Path) -> bool:
@@ -76,15 +70,12 @@ def has_own_normals(path: str | os.PathLike[str]) -> bool:
         header = ply_header(readable_file(file))
         vertex = [e for e in header.elements if e.name == "vertex"] if header else []
         return any(words[-1] == "nx" for element in vertex for words in element.properties)
-    if file.suffix.lower() != ".obj":
-        return True
-    with readable_file(file).open("rb") as lines:
-        return any(line.startswith((b"vn ", b"vn\t")) for line in lines)
+    return file.suffix.lower() != ".obj" or _any_line_begins(readable_file(file), b"vn")
 
 
 def _load(file: Path) -> mi.Mesh:
     kind = KINDS[file.suffix.lower()]
-    check_mesh(file, kind)
+    _check(file, kind, file)
     try:
         return _read(file, kind)
     except _UNREAD as error:
@@ -96,12 +87,33 @@ def _load(file: Path) -> mi.Mesh:
             with tempfile.TemporaryDirectory() as folder:
                 cut = Path(folder, file.name)
                 cut.write_bytes(triangles)
-                check_mesh(cut, kind, shown=f"mesh '{file}'")
+                _check(cut, kind, file)
                 with contextlib.suppress(*_UNREAD):
                     return _read(cut, kind)
         lines = str(error).split(": ", 1)[-1].split()
         reason = " ".join(lines)[-200:] or type(error).__name__
         raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
+
+
+def _check(file: Path, kind: str, named: Path) -> None:
+    """Refuse a mesh without triangles, or one that Mitsuba cannot read safely.
+
+    Dr.Jit compiles kernels for all meshes alive, those that the traceback of an error keeps as
+    well: one without triangles would break every later rendering of the process.
+
+    named : the file in messages.
+    """
+    triangles = check_mesh(file, kind, shown=f"mesh '{named}'")
+    if kind == "obj" and not _any_line_begins(file, b"f"):
+        triangles = 0
+    if triangles == 0:
+        raise DiffractionError(f"mesh '{named}': it has no triangles")
+
+
+def _any_line_begins(file: Path, word: bytes) -> bool:
+    """Whether a line of an OBJ file begins with a word."""
+    with file.open("rb") as lines:
+        return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
 
 
 def _read(file: Path, kind: str) -> mi.Mesh:

@@ -35,12 +35,12 @@ class Element(NamedTuple):
 
     Attributes
     ----------
-    name, count : `vertex`, `face` or others, and how many.
+    name, number : `vertex`, `face` or others, and how many.
     properties : words of each line after `property`: type and name, or `list`, two types and name.
     """
 
     name: str
-    count: int
+    number: int
     properties: list[list[str]]
 
     def dtype(self, order: str) -> np.dtype[Any]:
@@ -67,21 +67,22 @@ class Header(NamedTuple):
         return ">" if self.format == "binary_big_endian" else "<"
 
 
-def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
+def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> int | None:
     """Refuse a mesh file that Mitsuba cannot read safely.
 
     kind : Mitsuba's plugin: `ply`, `serialized`, or others, which nothing is checked of.
     number : of the mesh in a serialized file.
     shown : the file in messages.
 
+    Returns the number of triangles, or None where only Mitsuba knows it.
+
     Raises a DiffractionError if a triangle names a vertex that does not exist, or the file is
     shorter than its header states.
     """
     shown = shown or f"mesh '{file}'"
     if kind == "ply":
-        _check_ply(file, shown)
-    elif kind == "serialized":
-        _check_serialized(file, number, shown)
+        return _check_ply(file, shown)
+    return _check_serialized(file, number, shown) if kind == "serialized" else None
 
 
 def ply_header(file: Path, shown: str = "") -> Header | None:
@@ -102,31 +103,37 @@ def ply_header(file: Path, shown: str = "") -> Header | None:
             form = words[1]
         elif words[:1] == ["element"]:
             if len(words) < 3 or not words[2].isdecimal() or len(words[2]) > 18:
-                raise DiffractionError(f"{shown}: {quoted(line.strip())} is no element of a PLY")
+                raise DiffractionError(
+                    f"{shown}: {quoted(line.strip())} cannot be an element of a PLY"
+                )
             elements.append(Element(words[1], int(words[2]), []))
         elif words[:1] == ["property"]:
             types = words[2:4] if words[1:2] == ["list"] else words[1:2]
             expected = 5 if words[1:2] == ["list"] else 3
             if not elements or len(words) < expected or any(word not in CODES for word in types):
-                raise DiffractionError(f"{shown}: {quoted(line.strip())} is no property of a PLY")
+                raise DiffractionError(
+                    f"{shown}: {quoted(line.strip())} cannot be a property of a PLY"
+                )
             elements[-1].properties.append(words[1:expected])
     names = [element.name for element in elements]
     if twice := [name for name in names if names.count(name) > 1]:
         raise DiffractionError(f"{shown}: element {quoted(twice[0])} is there twice")
     for element in elements:
-        if element.count and not element.properties:
+        if element.number and not element.properties:
             raise DiffractionError(
-                f"{shown}: element {quoted(element.name)} has no properties, {element.count} times"
+                f"{shown}: element {quoted(element.name)} has no properties, {element.number} times"
             )
     return Header(form, elements, line_end + 1)
 
 
-def _check_ply(file: Path, shown: str) -> None:
+def _check_ply(file: Path, shown: str) -> int | None:
     header = ply_header(file, shown)
-    counts = {element.name: element.count for element in header.elements} if header else {}
-    if header is None or not {"vertex", "face"} <= counts.keys():
-        return
-    least = sum(e.count * _least_bytes(e, header) for e in header.elements)
+    counts = {element.name: element.number for element in header.elements} if header else {}
+    if header is None:
+        return None
+    if not counts.get("vertex") or not counts.get("face"):
+        return 0
+    least = sum(e.number * _least_bytes(e, header) for e in header.elements)
     if header.size + least > file.stat().st_size + 1:  # a text needs no blank at its end
         raise DiffractionError(
             f"{shown}: its {file.stat().st_size} bytes are fewer than its header states "
@@ -134,14 +141,15 @@ def _check_ply(file: Path, shown: str) -> None:
         )
     rows = _faces(file, header, shown)
     if rows is None:
-        return
+        return None
     for n, words in enumerate(next(e for e in header.elements if e.name == "face").properties):
         if words[0] != "list":
             continue
         if (rows[f"{n}"] != 3).any():
-            return  # polygons, which Mitsuba refuses
+            return None  # polygons, which Mitsuba refuses
         if words[2] not in ("float", "float32", "double", "float64") or "vertex" in words[3]:
             check_indices(rows[f"{n} values"], counts["vertex"], shown)
+    return counts["face"]
 
 
 def _least_bytes(element: Element, header: Header) -> int:
@@ -160,11 +168,11 @@ def _faces(file: Path, header: Header, shown: str) -> Any:
     for element in header.elements:
         row = element.dtype(header.order)
         if element.name != "face":
-            start += element.count * row.itemsize
+            start += element.number * row.itemsize
             continue
-        if start + element.count * row.itemsize > file.stat().st_size:
+        if start + element.number * row.itemsize > file.stat().st_size:
             return None  # no triangles alone, or too short
-        return np.memmap(file, row, "r", start, element.count) if element.count else None
+        return np.memmap(file, row, "r", start, element.number) if element.number else None
     return None
 
 
@@ -179,11 +187,11 @@ def _faces_of_text(file: Path, header: Header, shown: str) -> Any:
     start = 0
     for element in header.elements:
         widths = [4 if words[0] == "list" else 1 for words in element.properties]
-        size = element.count * sum(widths)
+        size = element.number * sum(widths)
         if element.name == "face":
             if start + size > len(numbers):
                 return None
-            rows = numbers[start : start + size].reshape(element.count, -1)
+            rows = numbers[start : start + size].reshape(element.number, -1)
             places = np.cumsum([0, *widths])
             columns = {f"{n}": rows[:, place] for n, place in enumerate(places[:-1])}
             values = {f"{n} values": rows[:, p + 1 : p + 4] for n, p in enumerate(places[:-1])}
@@ -195,7 +203,7 @@ def _faces_of_text(file: Path, header: Header, shown: str) -> Any:
 def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:
     """Refuse triangles that name a vertex which does not exist.
 
-    Raises a DiffractionError with the first of them.
+    Raises a DiffractionError that names the first one.
     """
     with np.errstate(invalid="ignore"):
         wrong = corners[~((corners >= 0) & (corners <= vertices - 1))]
@@ -206,7 +214,7 @@ def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:
         )
 
 
-def _check_serialized(file: Path, number: int, shown: str) -> None:
+def _check_serialized(file: Path, number: int, shown: str) -> int | None:
     """Check one mesh of Mitsuba's own format, as Mitsuba 3.9 reads it."""
     size = file.stat().st_size
     with file.open("rb") as stream:
@@ -226,8 +234,9 @@ def _check_serialized(file: Path, number: int, shown: str) -> None:
         except (struct.error, ValueError, zlib.error) as error:
             if isinstance(error, DiffractionError):
                 raise
-            return  # Mitsuba refuses it
+            return None  # Mitsuba refuses it
     check_indices(corners, vertices, shown)
+    return int(faces)
 
 
 def _place(stream: Any, size: int, number: int) -> tuple[int, int]:
