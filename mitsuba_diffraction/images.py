@@ -12,6 +12,9 @@ from typing import IO
 
 from PIL import EpsImagePlugin, Image, UnidentifiedImageError
 
+from .errors import DiffractionError
+from .limits import check_content
+
 #: Formats of images, in Pillow's names; the content decides, not the suffix.
 FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
 
@@ -30,11 +33,22 @@ def without_programs() -> Iterator[None]:
 def open_image(
     file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
 ) -> Image.Image:
-    """Return an image that is not decoded yet.
+    """Return an image before its pixels are decoded.
 
-    Raises an UnidentifiedImageError, an OSError, if the content is of another format.
+    Raises an UnidentifiedImageError, an OSError, if the content is of another format; a
+    DiffractionError if a file is small, and its pixels as numbers of 8 bytes are many.
     """
+    name = "an image" if not isinstance(file, str | os.PathLike) else repr(os.fspath(file))
     try:
-        return Image.open(file, formats=formats)
+        image = Image.open(file, formats=formats)
     except UnidentifiedImageError as error:
         raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
+    except Image.DecompressionBombError as error:
+        raise DiffractionError(f"{name} is too large: {error}") from error
+    if isinstance(file, str | os.PathLike):
+        try:
+            check_content(8.0 * image.width * image.height, os.path.getsize(file), name)
+        except DiffractionError:
+            image.close()
+            raise
+    return image

@@ -21,6 +21,7 @@ from typing import NoReturn
 
 from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
+from ..inputs import noted
 from ..streams import own_program
 from . import (
     brdf_map,
@@ -43,9 +44,10 @@ from . import (
     tonemap,
     tradeoff,
 )
+from .arguments import note_arguments
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
-from .report import STDOUT, check_writable, save_report
+from .report import STDOUT, check_outputs, save_report
 from .wording import speak_for
 
 #: Functions that declare the sub-commands, in the order of --help.
@@ -86,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
     speak_for(args.parser)
-    with own_program(), warnings_in_one_line(), ended_at_once():
+    with own_program(), warnings_in_one_line(), ended_at_once(), noted():
         return _run(args)
 
 
@@ -133,8 +135,9 @@ def _add_common(group: argparse._ActionsContainer) -> None:
 def _run(args: argparse.Namespace) -> int:
     _load_matplotlib()
     try:
+        note_arguments(args)
         if args.json not in (None, STDOUT):
-            check_writable(args.json)
+            check_outputs([args.json])
         args.began, args.code = time.perf_counter(), DONE
         save_report(args, args.run(args))
         sys.stdout.flush()

@@ -15,7 +15,7 @@ from ..optics.second_order_change import applies
 from ..system import peak_memory
 from . import options
 from .console import Bar
-from .report import Figures, check_outputs
+from .report import Figures, check_outputs, output_name
 from .workers import add_workers, client_of, on_workers
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _of_recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     recipe, how = Recipe.load(file), options.load_options(args)
     return _precompute(
         args, [file], partial(recipe.fields, how), args.output or recipe.output, recipe.table,
-        recipe.sources, make_folder=args.output is None,
+        make_folder=args.output is None,
     )  # fmt: skip
 
 
@@ -75,19 +75,17 @@ def _of_files(files: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]
     """Build the table of patches."""
     from ..heights.load import load_heights
 
-    how, output = options.load_options(args), args.output or Path(f"{files[0].stem}.exr")
+    how, output = options.load_options(args), output_name(args.output, Path(f"{files[0].stem}.exr"))
     return _precompute(args, files, lambda: [load_heights(file, how) for file in files], output)
 
 
 def _precompute(
     args: argparse.Namespace, sources: Sequence[Path], read: Callable[[], list[HeightField]],
-    output: Path, of_recipe: Mapping[str, Any] = {}, more: Sequence[Path] = (), *,
-    make_folder: bool = False,
+    output: Path, of_recipe: Mapping[str, Any] = {}, *, make_folder: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Build one table and return its summary.
 
     of_recipe : settings of the table that options override.
-    more : further files that are read.
     make_folder : the folder of the table may be made.
     """
     from ..settings import TableSettings
@@ -97,7 +95,7 @@ def _precompute(
     settings = TableSettings(**{**of_recipe, **options.table_options(args)})
     if (args.workers or args.scheduler) and settings.windows is None:
         args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
-    check_outputs([output], [*sources, *more], "table", make_folder=make_folder)
+    check_outputs([output], make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = read()

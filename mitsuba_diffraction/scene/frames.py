@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -183,6 +184,12 @@ def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
                 with open_image(path, ("PNG",)) as picture:
                     writer.send(picture.convert("RGB").crop((0, 0, width, height)).tobytes())
             writer.close()
+            # it loses the error of a full disk
+            written, _ = ffmpeg.count_frames_and_secs(str(temporary))
+            if written != len(frames):
+                raise OSError(
+                    errno.ENOSPC, f"it has {written} of {len(frames)} frames; is the disk full?"
+                )
     except (OSError, RuntimeError) as error:
         raise DiffractionError(f"cannot write '{film}': {error}") from error
 

@@ -40,6 +40,12 @@ class Files(NamedTuple):
     lateral_scale: Path
     weight: Path
 
+    @classmethod
+    def called(cls, folder: Path, stem: str) -> Files:
+        """Return the paths in a folder, of names that begin with the stem."""
+        names = "orientation.exr", "lateral_scale.exr", "weight.png"
+        return cls(*(folder / f"{stem}_{name}" for name in names))
+
 
 @dataclass(frozen=True, eq=False)
 class Hologram:
@@ -83,8 +89,7 @@ class Hologram:
 
         Raises a DiffractionError if the folder does not exist or cannot be written to.
         """
-        names = "orientation.exr", "lateral_scale.exr", "weight.png"
-        files = Files(*(Path(folder) / f"{stem}_{name}" for name in names))
+        files = Files.called(Path(folder), stem)
         parts = np.moveaxis(self.orientation.astype(np.float16), -1, 0)
         write_channels(files.orientation, dict(zip("RGB", parts, strict=True)))
         write_channels(files.lateral_scale, {"Y": self.lateral_scale.astype(np.float16)})

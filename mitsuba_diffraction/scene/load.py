@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..inputs import note_input
 from ..plugin import installed
 from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
@@ -110,6 +111,8 @@ def load_scene(
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
     known = files_of(file, values.parameters, with_sources=False)
+    for each in known:
+        note_input(each)
     check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
@@ -155,6 +158,7 @@ def _instantiated(
     )
     from .bands import put_bands
     from .clamping import put_clamp
+    from .nodes import check_nodes
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -171,10 +175,12 @@ def _instantiated(
             installed.check_plugins(state)
             installed.search_first()  # before the scene's folder
             _check_films(state)
+            _note_files(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)
             put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
+            check_nodes(state)
             remove_dark_lights(state)
             if values.clamp is not None:
                 put_clamp(state, values.clamp)
@@ -233,6 +239,21 @@ def sensor_of(scene: Any, index: int) -> Any:
             f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
     return sensors[index]
+
+
+def _note_files(state: Any) -> None:
+    """Note the files that a parsed scene names as inputs, where Mitsuba finds them.
+
+    state : `mi.parser.ParserState`.
+    """
+    import mitsuba as mi
+
+    for node in state.nodes:
+        props = node.props
+        for name in list(props.keys()):
+            if props.type(name) == mi.Properties.Type.String and len(text := props[name]) < 1024:
+                note_input(str(mi.file_resolver().resolve(text)))
+                props.mark_queried(name, False)  # Mitsuba refuses what no plugin reads
 
 
 def _check_films(state: Any) -> None:

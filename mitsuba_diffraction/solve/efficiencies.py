@@ -33,8 +33,9 @@ from scipy.io import netcdf_file
 
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
-from ..files import FileKind, kind_of, read_bytes, read_text
-from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
+from ..files import FileKind, beginning, kind_of, read_bytes, read_text
+from ..limits import LARGEST_LISTING, MOST_EFFICIENCIES, bounded_memory, check_content
+from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, WAVELENGTHS
 from .stations import Real
 
 AXES = ("wavelength", "theta", "phi", "order")
@@ -44,8 +45,6 @@ CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
 PAIR = ("order_x", "order_y")
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
-#: Bytes of a CSV at most: two million lines. NetCDF files may be larger.
-_LARGEST_CSV = 100_000_000
 _LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
             "micron": 1e3, "m": 1e9, "meter": 1e9}  # fmt: skip
 _ANGLES = {"deg": 1.0, "degree": 1.0, "°": 1.0, "rad": 180.0 / np.pi, "radian": 180.0 / np.pi}
@@ -93,7 +92,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     unit, a hole in its grid, an order twice, or numbers out of range.
     """
     shown = repr(os.fspath(path))
-    head = read_bytes(path)[: len(_BEGINS_HDF5)]
+    head = beginning(path, len(_BEGINS_HDF5))
     if kind_of(path) is FileKind.ORDERS:
         raise DiffractionError(f"{shown} is a table of orders already; use it as it is")
     if head.startswith(b"CDF") or head == _BEGINS_HDF5:
@@ -114,7 +113,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
 
 def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
     """Return the grid of a CSV, whose delimiters are commas, semicolons or tabs."""
-    text = read_text(path, _LARGEST_CSV).removeprefix("\ufeff")
+    text = read_text(path, LARGEST_LISTING).removeprefix("\ufeff")
     first = text.partition("\n")[0]
     delimiter = next((mark for mark in ";\t" if mark in first), ",")
     reader = csv.reader(text.splitlines(), delimiter=delimiter)
@@ -267,14 +266,14 @@ def _classic(path: str | os.PathLike[str]) -> dict[str, Variable]:
 def _hdf5(path: str | os.PathLike[str]) -> dict[str, Variable]:
     """Read the variables of a NetCDF file of version 4."""
     h5py = optional("h5py", repr(os.fspath(path)))
-    variables = {}
-    with h5py.File(path, "r") as file:
+    variables, claimed, shown = {}, 0.0, repr(os.fspath(path))
+    with bounded_memory(size := os.path.getsize(path), shown), h5py.File(path, "r") as file:
         for name in (*AXES, *REFLECTED, *TRANSMITTED):
             if name not in file:
                 continue
             data = file[name]
-            if data.size > MOST_NUMBERS:
-                raise ValueError(f"{name} claims {data.size} numbers")
+            claimed += 8.0 * data.size
+            check_content(claimed, size, shown)
             scales = [dimension[0].name.rpartition("/")[2] for dimension in data.dims if dimension]
             dimensions = [name] if data.is_scale else scales
             variables[name] = _variable(dimensions, data[()], data.attrs)
@@ -330,10 +329,10 @@ def _check_all(name: str, numbers: Real, allowed: NDArray[np.bool_], hint: str, 
 def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:
     """Refuse grids that are too large, or empty."""
     size = np.prod(shape, dtype=float) * kinds
-    if not 0 < size <= MOST_NUMBERS:
+    if not 0 < size <= MOST_EFFICIENCIES:
         raise DiffractionError(
             f"{shown} has {' x '.join(map(str, shape))} wavelengths, theta, phi and orders; a "
-            f"table may be made of 1 to {MOST_NUMBERS} efficiencies: list fewer"
+            f"table may be made of 1 to {MOST_EFFICIENCIES} efficiencies: list fewer"
         )
 
 

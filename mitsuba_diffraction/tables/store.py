@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
 from ..errors import DiffractionError, one_line, warn
+from ..inputs import note_input
 from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
@@ -292,6 +293,7 @@ def loaded_once(
         status = os.stat(path)
     except OSError:
         return load(path)  # whose error names the damage
+    note_input(path)
     key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
     value = in_use.get(key)
     return in_use.setdefault(key, load(path)) if value is None else value

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import DiffractionError
-from ..field import MAX_PIXELS, check_pixel_count
+from ...limits import MOST_PIXELS, bounded_lines
+from ..field import check_pixel_count
 from ..lengths import micrometres_of
 from . import RawHeights, first_line
 
@@ -20,8 +21,11 @@ _BLOCK = 1 << 22  # values that are copied at a time
 
 _MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
-_SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
-_VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
+# Repetitions are possessive: a line of n characters takes n steps, and not n².
+_SIZE = re.compile(
+    r"[#;%\s]*+(Width|Height)\s*+[:=]\s*+([-+.\deE]++)\s*+(\S++)\s*+$", re.IGNORECASE
+)
+_VALUES = re.compile(r"[#;%\s]*+Value units\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE)
 
 
 def read_npy(path: Path) -> RawHeights:
@@ -86,7 +90,7 @@ def read_text(path: Path) -> RawHeights:
     shown = repr(str(path))
     try:
         with path.open(encoding="utf-8-sig") as stream:
-            rows, header = _parse(stream, shown)
+            rows, header = _parse(bounded_lines(stream, shown), shown)
     except UnicodeDecodeError as error:
         raise DiffractionError(f"{shown} is not text (UTF-8)") from error
     except OSError as error:
@@ -133,7 +137,7 @@ def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[st
             )
         rows.append(row)
         count += len(row)
-        if count > 3 * MAX_PIXELS:
+        if count > 3 * MOST_PIXELS:
             check_pixel_count(count, count, shown)
     return rows, header
 
