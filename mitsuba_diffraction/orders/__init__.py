@@ -13,7 +13,6 @@ solve         solvers: from a profile to a table
 
 from __future__ import annotations
 
-from ..plugin.registration import add_plugins
 from .efficiency import efficiency, groove_efficiency, mueller, polarised_efficiency
 from .file import load_orders, save_orders
 from .table import Band, Cells, Listed, OrderTable
@@ -27,5 +26,3 @@ OrderTable.groove_efficiency = groove_efficiency
 OrderTable.mueller = mueller
 OrderTable.load = staticmethod(load_orders)
 OrderTable.save = save_orders
-
-add_plugins(f"{__name__}.bsdf.diffraction_orders")

@@ -32,8 +32,9 @@ from scipy.io import netcdf_file
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ..limits import MOST_EFFICIENCIES
 from ..tables.fields import mapping
-from .table import MOST_NUMBERS, Band, Cells, Listed, OrderTable
+from .table import Band, Cells, Listed, OrderTable
 
 #: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
 #: and crossed gratings, which have other lights now.
@@ -174,7 +175,7 @@ def _table(file: Any) -> OrderTable:
 
 def _check_sizes(file: Any) -> None:
     for name, variable in file.variables.items():
-        if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+        if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
             raise ValueError(f"{name} claims {variable.shape} numbers")
 
 

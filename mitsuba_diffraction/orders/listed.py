@@ -120,7 +120,7 @@ def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:
     turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
     phi = np.asarray(np.round(turned, _DIGITS) % 360.0, np.float64)
     if not crossed:  # mirror images are alike
-        phi = np.round(np.minimum(phi, 360.0 - phi), _DIGITS)
+        phi = np.asarray(np.round(np.minimum(phi, 360.0 - phi), _DIGITS), np.float64)
     return np.asarray(np.round(np.abs(theta), _DIGITS), np.float64), phi
 
 

@@ -28,8 +28,8 @@ WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
 LEAST_BLOCK = 1.01
 #: Octaves beyond its wavelengths within which a table has its nearest efficiencies, and then none.
 MARGIN = 0.1
-#: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
-MOST_BANDS, MOST_NODES, MOST_NUMBERS = 256, 64, 1 << 27
+#: Bands, and nodes along an axis, of a table at most: beyond, no renderer would want it.
+MOST_BANDS, MOST_NODES = 256, 64
 #: Numbers of elements of Mueller matrices that a response may have (`Cells`, `Listed`).
 UNPOLARISED, ALONG, LINEAR, MUELLER = 1, 2, 3, 16
 

@@ -10,8 +10,8 @@ from ...heights.lengths import is_auto
 from ...plugin.dictionary import ORDERS, TableData
 from ...plugin.parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ...plugin.properties import class_of
-from ...plugin.textures import Orientation
 from ...plugin.types import BSDF, Properties
+from ...plugin.varying import Orientation
 from ...settings import USUAL_WIDTH, checked
 from ...tables.store import loaded_once
 from ..file import load_orders
