@@ -27,7 +27,7 @@ from ..optics.boundary import (
     model_of,
     power,
 )
-from ..optics.coat import Crossing, coated_power, crossing, transmitted
+from ..optics.coat import FaceCoefficients, coated_power, crossing, transmitted
 from .arithmetic import clip, index_of, maximum
 from .directions import CoatedPair, Pair, TablePoint
 from .materials import Material, Perfect
@@ -154,7 +154,7 @@ class LightPath:
     pair: Geometry
     ends: tuple[Vector3f, Vector3f]
     above: bool
-    passed: tuple[Crossing, ...]
+    passed: tuple[FaceCoefficients, ...]
 
     @classmethod
     def of(cls, pair: Pair, mode: mi.TransportMode) -> LightPath:
@@ -164,7 +164,7 @@ class LightPath:
         ends, cosines = [outer.wi, outer.wo], [outer.cos_i, outer.cos_o]
         if mode != mi.TransportMode.Importance:
             inner, ends, cosines = inner[::-1], ends[::-1], cosines[::-1]
-        passed: tuple[Crossing, ...] = ()
+        passed: tuple[FaceCoefficients, ...] = ()
         if isinstance(pair, CoatedPair):
             passed = tuple(crossing(cosine, pair.n) for cosine in cosines)
         side = mi.Vector3f(1.0, 1.0, 1.0 if outer.above else -1.0)

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.layout import Record
+from ..tables.layout import BinRecord
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
@@ -25,7 +25,7 @@ from .loops import sum_of
 from .memory import index_between, once_a_table, packet_size, read_packets, upload, zero_packets
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
-from .window_positions import Window
+from .window_positions import PlacedWindow
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
@@ -49,7 +49,7 @@ class DeviceTable:
         self.expansion, self.grid = table.expansion, table.grid
         self.spacing, self.limited = table.spacing, table.limited
         self.radii, self.q_limit = table.frequency_limit, table.q_limit
-        self.record = Record.aligned(*table.coefficients.shape[3:])
+        self.record = BinRecord.aligned(*table.coefficients.shape[3:])
         self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
         # order 0's lobe is that of a window `order_0_ratio` times as large in area
@@ -67,7 +67,7 @@ class DeviceTable:
         self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
     def window_sum(
-        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[Window] = ()
+        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[PlacedWindow] = ()
     ) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
 
@@ -170,7 +170,7 @@ class DeviceTable:
         across: Gaussians,
         along: Gaussians,
         weights: list[Float],
-        windows: Sequence[Window],
+        windows: Sequence[PlacedWindow],
     ) -> list[Float]:
         """Σ over windows and taps of amplitudes turned by exp(−i q·x): real, imaginary part.
 
@@ -282,7 +282,7 @@ class Phases:
     weight: list[Float]
 
     @classmethod
-    def of(cls, windows: Sequence[Window], across: Gaussians, along: Gaussians) -> Phases:
+    def of(cls, windows: Sequence[PlacedWindow], across: Gaussians, along: Gaussians) -> Phases:
         """Make the phases of windows, for taps along both axes."""
         return cls(
             along,

@@ -19,7 +19,7 @@ from .directions import Crossing, Pair, TablePoint
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Vector2f
-from .window_positions import Window, WindowPositions
+from .window_positions import PlacedWindow, WindowPositions
 
 
 class PowerModel(Protocol):
@@ -101,7 +101,7 @@ class SpectralPower:
     ) -> Callable[[Float], Float]:
         scaled_w = pair.w * height_scale
         if self._places is None or not isinstance(pair, Pair):
-            windows: Sequence[Window] = ()
+            windows: Sequence[PlacedWindow] = ()
         else:
             windows = self._places.at(si, pair.frame)
 

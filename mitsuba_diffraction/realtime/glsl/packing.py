@@ -18,7 +18,7 @@ from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
-from ...tables.layout import Record, cells_of, functions_at
+from ...tables.layout import BinRecord, cells_of, functions_at
 from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
@@ -96,7 +96,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "interfere; use method fast"
         )
     series, _, scale, expansion = power_series(table)
-    record = Record.of(1, expansion.terms, unit=4)
+    record = BinRecord.of(1, expansion.terms, unit=4)
     packed = as_half(record.pack(series[..., None, :]).reshape(-1, 4))
     cells = cells_of(expansion, _CELL)
     share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
