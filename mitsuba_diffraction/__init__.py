@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+TableSource        table of a file, recipe or height field, built once for all that ask
 OrderTable         solved efficiencies of a grating's orders
 CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
     from .solve.crossed import solve_crossed
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
-    from .tables import DiffractionTable
+    from .tables import DiffractionTable, TableSource
     from .tables.orders import CrossedTable, OrderTable
     from .thesis import period_fit
 
@@ -73,6 +74,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "OrderTable",
+    "TableSource",
     "bsdf_dict",
     "cluster",
     "design",
@@ -115,6 +117,7 @@ _NAMES = {
     "DiffractionTable": "tables",
     "HeightField": "heights",
     "OrderTable": "tables.orders",
+    "TableSource": "tables",
     "bsdf_dict": "plugin.dictionary",
     "hologram": "scene.hologram",
     "preset": "plugin.presets",

@@ -118,7 +118,8 @@ def spectrum(
     bsdf : a Mitsuba BSDF of the current variant, spectral and vectorised. In a polarised variant
         the result has s and p as well.
     light : angle of the lamp from the normal, degrees; its light is parallel.
-    detectors : angles of the detectors in the plane of incidence, degrees; see `MeasurementGeometry`.
+    detectors : angles of the detectors in the plane of incidence, degrees; see
+        `MeasurementGeometry`.
     light_azimuth : azimuth of the lamp from the patch's x axis, degrees.
     acceptance : full angle of a detector's cone, degrees.
     relative : "white", relative to a Lambertian standard of reflectance 1; "mirror", relative to a
@@ -147,8 +148,8 @@ def spectrum(
         SPECTRA.check(described)
     if isinstance(described, Surface):
         sigma = described.sigma
-        if described.material is not None and described.material.known:
-            check_material(described.material.name, lam)
+        if described.material:
+            check_material(described.material, lam)
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
                 f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
