@@ -69,12 +69,11 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
     make_folder = recipe is not None and output is None
     if output is None:
         output = Path(f"{source.files[0].stem}.exr") if recipe is None else recipe.output
-    inputs = [*source.files, *(recipe.sources if recipe else ())]
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
     if (args.workers or args.scheduler) and settings.windows is None:
         args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
-    check_outputs([output], inputs, "table", make_folder=make_folder)
+    check_outputs([output], make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = source.fields()
