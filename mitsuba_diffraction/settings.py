@@ -115,15 +115,6 @@ def _windows(value: Any) -> str | float | None:
     return "auto" if value == "auto" else _between(0.0, math.inf)(value)
 
 
-def _auto_or_flag(value: Any) -> str | bool:
-    words: dict[Any, str | bool] = {"auto": "auto", "true": True, "false": False}
-    if isinstance(value, bool):
-        return value
-    if value not in words:
-        raise ValueError
-    return words[value]
-
-
 def _choices(*names: str) -> dict[str, Any]:
     return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
 
@@ -151,9 +142,6 @@ class TableSettings:
         k·(u, v) that are tabulated: the table is dark beyond. None for all that light can probe.
     windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
         averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
-    second_order : whether light is multiplied by the second order of small slope: True, False, or
-        "auto" for where it changes colours enough (`optics.second_order_change`). Unless False, the
-        table holds the slope ratios. "auto" is False for coherence "patch" and basis "taylor".
     window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
         (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
     """
@@ -197,11 +185,6 @@ class TableSettings:
         "coherence_width; auto is twice that", "auto, none, or a positive number of µm",
         metavar="auto|W", text="the scan as a whole", type=str,
     )  # fmt: skip
-
-    second_order: str | bool = _setting(
-        "auto", _auto_or_flag, "the second order of small slope; auto applies it where it changes "
-        "colours by 5 %% or more", "auto, true or false", metavar="auto|true|false", type=str,
-    )  # fmt: skip
     window_width: float | None = _setting(
         None, _window_width, "µm, 4σ of the window of all orders but 0",
         "a positive number of µm, at most coherence_width", metavar="W", type=float,
@@ -212,8 +195,6 @@ class TableSettings:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
         if self.window_width is not None and not self.window_width < self.light_width:
             object.__setattr__(self, "window_width", None)
-        if self.second_order == "auto" and (self.coherent or self.basis == "taylor"):
-            object.__setattr__(self, "second_order", False)
 
     @property
     def light_width(self) -> float:
@@ -231,17 +212,15 @@ class TableSettings:
         return self.coherence == "patch"
 
     def as_json(self) -> dict[str, Any]:
-        """Return the settings by name, except None and False."""
+        """Return the settings by name, except None."""
         values = ((name, getattr(self, name)) for name in _BY_NAME)
-        return {name: value for name, value in values if value not in (None, False)}
+        return {name: value for name, value in values if value is not None}
 
 
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
 
 #: Settings that scenes and recipes may give.
-SCENE_SETTINGS = (
-    *("coherence_width", "coherence", "basis", "tolerance", "terms", "windows", "second_order"),
-)
+SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
 RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range", "height_scale_max", "frequency_limit")
 
 

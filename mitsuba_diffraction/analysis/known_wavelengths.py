@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics.materials import PERFECT, lets_light_through, material_named
 from ..plugin.conductors import tabulated_range, unknown_conductor
-from ..plugin.pigment import pigment_range
 from ..plugin.parameters import refusal
+from ..plugin.pigment import pigment_range
 
 Reals = NDArray[np.float64]
 

@@ -42,7 +42,7 @@ from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 7
+VERSION = 8
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.

@@ -25,6 +25,7 @@ from ..errors import DiffractionError, check_keys, one_line
 from ..files import read_text
 from ..heights.read import LoadOptions
 from ..heights.recipes import LOAD_KEYS, options_and_settings
+from ..retired import retired
 from ..settings import RECIPE_SETTINGS
 
 
@@ -70,5 +71,7 @@ def _treatment(where: str, values: Any) -> Treatment:
     """Check the options of one pattern."""
     if not isinstance(values, dict):
         raise DiffractionError(f"{where}: expected a section such as ['*.spm'] with options")
+    for key in retired(values, where):
+        del values[key]
     check_keys(where, values, (*LOAD_KEYS, *RECIPE_SETTINGS))
     return Treatment(*options_and_settings(values, where))

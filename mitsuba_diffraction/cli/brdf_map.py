@@ -24,7 +24,6 @@ _KEPT = "that of the table or recipe, else "
 _TABLE = {
     "coherence_width": f"{_KEPT}auto", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
-    "second_order": f"{_KEPT}auto",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = (
@@ -33,8 +32,7 @@ _SURFACE = (
 )  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
-    "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "second_order", "preset",
-    "spectral",
+    "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "preset", "spectral",
 )  # fmt: skip
 
 
@@ -136,6 +134,7 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
         ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
     )
     options.add_table(group, tuple(_TABLE), **_TABLE)
+    options.add_retired(group, "second_order", 1)
 
 
 def gain_of(args: argparse.Namespace) -> Any:

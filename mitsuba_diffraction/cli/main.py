@@ -19,6 +19,7 @@ from typing import NoReturn
 
 from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
+from ..retired import retired
 from ..streams import own_program
 from . import (
     brdf_map,
@@ -94,7 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
     _add_common(parser)
-    parser.set_defaults(debug=False, progress=None, json=None)
+    parser.set_defaults(debug=False, progress=None, json=None, retired=())
     parser.add_argument(
         "--version", action="version", version=f"{PROGRAM} {version('mitsuba_diffraction')}"
     )
@@ -132,6 +133,7 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if args.json not in (None, STDOUT):
             check_writable(args.json)
+        retired(args.retired)
         args.began, args.code = time.perf_counter(), DONE
         save_report(args, args.run(args))
         sys.stdout.flush()

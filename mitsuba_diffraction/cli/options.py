@@ -71,7 +71,7 @@ HEIGHTS: dict[str, tuple[str, str]] = {
 #: Settings of a table.
 TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
-    "windows", "second_order",
+    "windows",
 )  # fmt: skip
 
 #: The settings of a table that the evaluators of the thesis take.
@@ -214,6 +214,23 @@ def add_option(
         shown = f"{default:g}" if isinstance(default, (int, float)) else default
         how["help"] = f"{text}; default: {shown}".removeprefix("; ")
     group.add_argument(*names, **{**how, **more})
+
+
+class _Retired(argparse.Action):
+    """Option of an earlier version, whose name is kept for the line about it."""
+
+    def __call__(
+        self, parser: Any, namespace: argparse.Namespace, values: Any, option: Any = None
+    ) -> None:
+        namespace.retired = (*getattr(namespace, "retired", ()), self.dest)
+
+
+def add_retired(group: Group, name: str, count: int) -> None:
+    """Add an option of an earlier version, with so many values; see `retired`."""
+    group.add_argument(
+        _option(name), action=_Retired, nargs=count, default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
+    )  # fmt: skip
 
 
 def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import warn
 from ..files import FileKind, kind_of
-from ..optics.second_order_change import applies
 from ..system import peak_memory
 from . import options
 from .console import Bar
@@ -40,6 +39,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group = parser.add_argument_group("the table")
     options.add_table(group)
     options.add_table(group, ("wavelength_range",))
+    options.add_retired(group, "second_order", 1)
     add_workers(parser)
     options.add_json(parser, "the table's summary")
 
@@ -134,17 +134,6 @@ def _built(
         return table, work.summary()
 
 
-def _second_order_line(table: DiffractionTable) -> str:
-    """Say by how much the second order changes the table's colours, and whether it is applied."""
-    asked, ratios = table.settings.second_order, table.slope_ratios
-    assert ratios is not None
-    word = "applied" if applies(asked, ratios) else "left out"
-    return (
-        f"the second order changes colours by {100 * ratios.change:.2g} % (n = 1.5, light from "
-        f"60°): {word} by second_order={str(asked).lower()}"
-    )
-
-
 def _report(
     fields: Sequence[HeightField], table: DiffractionTable, output: Path, seconds: float
 ) -> Iterator[tuple[str, str]]:
@@ -187,7 +176,5 @@ def _report(
         f"other orders; tolerance {table.tolerance:g}"
     )
     yield "error", error
-    if table.slope_ratios is not None:
-        yield "", _second_order_line(table)
     # of the whole process, which has to fit
     yield "cost", f"{seconds:.1f} s, {peak_memory() / 1e9:.2g} GB of memory at most"

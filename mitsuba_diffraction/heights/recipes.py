@@ -26,6 +26,7 @@ from typing import Any
 from ..atomic import atomic_path
 from ..errors import DiffractionError, check_keys
 from ..files import FileKind, kind_of, path_within, read_text
+from ..retired import retired
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
@@ -71,6 +72,8 @@ class Recipe:
                 f"{shown} is a recipe of solved orders: run the command 'solve "
                 f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
             )
+        for key in retired(content, shown):
+            del content[key]
         check_keys(shown, content, _KEYS)
         if ("source" in content) == ("generator" in content):
             raise DiffractionError(

@@ -11,11 +11,7 @@ geometry   directions, wave numbers, the coherence window, the Kirchhoff factor,
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   boundary models: K, B, their blend, and the registry `MODELS`
 blend      roughness of the heights by scale, and weights of K and B
-second_order         second order of small slope as a factor on powers: its coefficients
-slope_ratios         second order of small slope: the heights' part
 stack                flat stacks of layers: transfer matrices, and means over thickness
-second_order_change  change of a surface's colours by the second order, for "auto"
-mean_second_order    mean of the second order under a thin film, for either direction
 coat       a clear coat over a structure
 through    light that goes through a dielectric, or a thin sheet
 paths      paths of light by a boundary: sides, widths w, matrices, order 0

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arithmetic import Number, formula, of, one_minus_exp
+from .arithmetic import Number, formula, one_minus_exp
 
 Real = NDArray[np.float64]
 
@@ -139,16 +139,5 @@ def kirchhoff_weight(kappa: Number, variance: Number, normal_reflectance: Number
     variance : σ_q², µm² (`ScaleRoughness.at`).
     normal_reflectance : R₀, of a film with the film (`fresnel.normal_reflectance`).
     """
-    return one_minus_exp(_exponent(kappa, variance, normal_reflectance))
-
-
-@formula
-def small_slope_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
-    """Return s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3), eq. 9; arguments as for `kirchhoff_weight`."""
-    exponent = _exponent(kappa, variance, normal_reflectance)
-    return of(exponent).exp(-exponent)
-
-
-def _exponent(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
     roughness = kappa * kappa * variance  # (κσ_q)²
-    return roughness * (0.5 * normal_reflectance + roughness * (1.0 / 3.0))
+    return one_minus_exp(roughness * (0.5 * normal_reflectance + roughness * (1.0 / 3.0)))

@@ -193,11 +193,6 @@ def mixed(first: Jones, second: Jones, weight: Number) -> Jones:
     return tuple((a - b) * weight + b for a, b in zip(first, second, strict=True))
 
 
-def azimuth_cosine(wi: Direction, wo: Direction) -> Number:
-    """Return t̂·t̂0, the cosine between the tangential parts of −ωi and ωo."""
-    return geometry(wi, wo).dot
-
-
 def power(jones: Jones) -> Number:
     """Return N = ½ Σ|J|², the power of unpolarised light of unit power."""
     ss, sp, ps, pp = jones
@@ -228,14 +223,12 @@ class Model:
     statistic : from the table's σ_q² to the model's own statistic, looked up by q; None of a model
         that does not depend on the heights.
     power : ½ Σ|J|² of the same arguments, where it is shorter than by `jones`.
-    has_second_order : whether the second order of small slope belongs to the model.
     """
 
     name: str
     jones: Callable[[Geometry, Index, Heights | None], Jones]
     statistic: Callable[[RoughnessTable], RoughnessTable] | None = None
     power: Callable[[Geometry, Index], Number] | None = None
-    has_second_order: bool = False
 
 
 #: Boundary models by name. The first is the default of a material with an index.
@@ -247,7 +240,7 @@ def register(model: Model) -> None:
     MODELS[model.name] = model
 
 
-register(Model("small_slope", _blended, roughness, has_second_order=True))
+register(Model("small_slope", _blended, roughness))
 register(Model("kirchhoff", lambda g, index, heights: kirchhoff(g, index), power=kirchhoff_power))
 
 

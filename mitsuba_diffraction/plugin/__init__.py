@@ -41,7 +41,6 @@ energy_factors  factors on heights and lengths for which scales of energy are ta
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 boundary        reflected amplitude of the material, with its polarisation
-second_order    what light diffracted twice makes of orders
 conductors      optical constants of conductors in Mitsuba's tables
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
 layers          a clear coat, a thin film, and the light that reaches a nested BSDF

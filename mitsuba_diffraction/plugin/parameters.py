@@ -17,6 +17,7 @@ from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
+from ..retired import retired
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .arithmetic import plain
@@ -98,8 +99,8 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
     for name in OPTIONAL:
         if name in props and props.get(name) == "none":
             del props[name]
-    if "second_order" in props and props.get("second_order") is not True:
-        del props["second_order"]  # SPIKE ONLY: tests still pass second_order=False
+    for name in retired(props.keys()):
+        del props[name]
     nested = {name: value for name, value in props.objects() if isinstance(value, mi.BSDF)}
     if len(nested) > 1:
         raise DiffractionError(
@@ -362,7 +363,6 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
     if is_auto(asked.get("coherence_width", 0.0)):
         del asked["coherence_width"]
     settings = {name: checked(name, value) for name, value in asked.items()}
-    settings["second_order"] = False
     value = props.get(source)
     if source == "data":
         heights = heights_of_tensor(value, options).stretched(stretch)

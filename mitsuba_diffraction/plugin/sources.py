@@ -267,8 +267,6 @@ def _check_agreement(
         "terms": table.expansion.terms,
         "windows": table.settings.windows,
     }
-    asked = dict(asked)
-    asked.pop("second_order", None)
     for name, value in asked.items():
         if value != tabulated[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(

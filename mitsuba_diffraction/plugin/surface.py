@@ -1,4 +1,4 @@
-"""Surface with a table of heights: what `diffraction` and `diffraction_dielectric` share (Dr.Jit)."""
+"""Surface with a table of heights, shared by the two plugins of heights (Dr.Jit)."""
 
 from __future__ import annotations
 

@@ -170,15 +170,16 @@ def _lit(
 ) -> Real:
     """Measured light of directions above the surface."""
     if material.coat is not None:
+        assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
         jones = _matrices(field, inside, relative, material.model)
         powers = window_powers(field, *inside, *window)
         return coats.reflected(
             light, window.sigmas, material.coat, relative, powers, jones, measure
         )
-    if material.model == "small_slope" and window.coherence == COHERENCES[0]:
-        if not isinstance(index, Filmed):
-            return models.default_brdf(field, light, index, window.sigmas, measure)
+    averaged = window.coherence == COHERENCES[0]
+    if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
+        return models.default_brdf(field, light, index, window.sigmas, measure)
     jones = _matrices(field, light, index, material.model)
     others, zeroth = window_powers(field, *light, *window)
     rest = models.reflected(light, window.sigmas.orders, others, jones, measure)

@@ -19,9 +19,9 @@ from ..errors import DiffractionError, check_choice
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..plugin.dictionary import ORDERS, PLUGINS
+from ..plugin.parameters import NAMES
 from ..plugin.presets import MATERIALS, find_preset
 from ..plugin.presets import PLUGIN as PRESET_PLUGIN
-from ..plugin.parameters import NAMES
 from ..tables.orders import load_any_orders
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .orbit import ORBIT

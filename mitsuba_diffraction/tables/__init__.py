@@ -11,7 +11,6 @@ exr                tables as EXR files
 document           all but the coefficients as plain data, checked when read
 layout             where a table's numbers lie: for NumPy, the plugin and the shaders
 powers             powers of the orders as series in κ, whatever the table stores
-film               the mean of the second order under a film
 directional        functions of direction on a grid, and of wavelength
 energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from

@@ -6,7 +6,6 @@ field has its type, size and range, and agrees with the others.
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import itertools
 import math
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
-from ..optics.slope_ratios import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .layout import Grid
@@ -30,7 +28,6 @@ MAX_BYTES = 4 << 30
 _REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
 _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
 _TABLE_FIELDS = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
-_RATIOS = "slope_ratios"
 _COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
@@ -39,7 +36,6 @@ _ROUNDED = 1e-6  # relative tolerance of fields that follow from others
 #: Largest share of the light in an order: 1 and the error of a table of a large tolerance.
 _LARGEST_POWER = 2.0
 _LARGEST_RATIO_0 = 1e8  # windows of 500 and of 0.05 µm
-_LARGEST_RATIO, _MOST_CELLS = 128.0, 1 << 12  # r, and cells along an axis
 _BLOCK = 1 << 22  # coefficients at a time
 
 
@@ -55,20 +51,6 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "expansion": _present(table.expansion),
         "grid": _present(table.grid),
         "order_0": table.order_0.tolist(),
-        **({} if table.slope_ratios is None else {_RATIOS: _ratios_of(table.slope_ratios)}),
-    }
-
-
-def _ratios_of(ratios: SlopeRatios) -> dict[str, Any]:
-    """Return slope ratios as numbers, and their values as half floats in base 64."""
-    halves = np.ascontiguousarray(ratios.values).view(np.float32).astype("<f2")
-    return {
-        "cell": ratios.cell,
-        "orders": ratios.orders,
-        "kappa": ratios.kappa,
-        "shape": ratios.values.shape,
-        "values": base64.b64encode(halves.tobytes()).decode("ascii"),
-        "change": ratios.change,
     }
 
 
@@ -107,8 +89,7 @@ def parse_document(document: Any) -> DiffractionTable:
     """
     fields = _mapping(document, "the description")
     settings = _settings(fields)
-    wants = (_RATIOS,) if settings.second_order else ()
-    _names(fields, (*_TABLE_FIELDS, *_SETTINGS, *wants), (*_TABLE_FIELDS, *wants))
+    _names(fields, (*_TABLE_FIELDS, *_SETTINGS), _TABLE_FIELDS)
     expansion = _expansion(_mapping(fields["expansion"], "expansion"))
     components = _COMPONENTS[expansion.kind], expansion.series_terms
     table = DiffractionTable(
@@ -122,7 +103,6 @@ def parse_document(document: Any) -> DiffractionTable:
         error=_error(fields["error"]),
         roughness=_roughness(_mapping(fields["roughness"], "roughness")),
         source=_source(fields["source"]),
-        slope_ratios=_ratios(_mapping(fields[_RATIOS], _RATIOS)) if wants else None,
     )
     _check_agreement(table)
     shares = np.linspace(0.0, 1.0, 33)
@@ -156,7 +136,7 @@ def _check_agreement(table: DiffractionTable) -> None:
 def _settings(fields: Mapping[str, Any]) -> TableSettings:
     _names(fields, fields, _REQUIRED)
     settings = {name: fields[name] for name in _SETTINGS if name in fields}
-    checked = TableSettings(**{"second_order": False, **settings})
+    checked = TableSettings(**settings)
     _require(checked.coherence_width != "auto", "coherence_width")
     return checked
 
@@ -222,28 +202,6 @@ def _roughness(fields: Mapping[str, Any]) -> RoughnessTable:
     nodes = _numbers(fields["nodes"], "nodes", (None,))
     _require(2 <= len(nodes) <= _MOST_NODES and bool(np.all(nodes >= 0.0)), "nodes of roughness")
     return RoughnessTable(_number(fields["first"], "first", -64.0, 64.0), nodes)
-
-
-def _ratios(fields: Mapping[str, Any]) -> SlopeRatios:
-    names = ("cell", "orders", "kappa", "shape", "values", "change")
-    _names(fields, names, names)
-    orders, shape = _two(fields["orders"], "orders"), _list(fields["shape"], "shape")
-    _require(all(isinstance(number, bool) for number in orders), "orders")
-    _require(len(shape) == 4 and shape[1] == 2, f"{_RATIOS} of shape {shape}")
-    shape = [_whole(n, "shape", 2, _MOST_CELLS) for n in shape]
-    data = base64.b64decode(str(fields["values"]), validate=True)
-    _require(len(data) == 4 * math.prod(shape), f"{len(data)} bytes of {_RATIOS}")
-    values = np.frombuffer(data, "<f2").astype(np.float32)
-    _require(bool(np.all(np.abs(values) <= _LARGEST_RATIO)), _RATIOS)  # nor not a number
-    kappa = _pair(fields["kappa"], "kappa", 1e-9, 1e9)
-    _require(kappa[0] < kappa[1], f"kappa={kappa}")
-    return SlopeRatios(
-        _pair(fields["cell"], "cell", 1e-9, 1e9),
-        (orders[0], orders[1]),
-        kappa,
-        values.view(np.complex64).reshape(shape),
-        _number(fields["change"], "change", 0.0, 2.0),
-    )
 
 
 def _source(value: Any) -> dict[str, Any]:

@@ -16,14 +16,12 @@ from ..errors import DiffractionError
 from ..heights.coherence import REPEATS
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
-from ..optics.second_order_change import applies
-from ..optics.slope_ratios import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid
 
 #: Raised whenever the meaning of the coefficients changes; tables of another version are refused.
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +45,6 @@ class DiffractionTable:
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.
-    slope_ratios : slope statistics for the second order, where `settings` ask for it.
     """
 
     coefficients: NDArray[np.floating]
@@ -60,7 +57,6 @@ class DiffractionTable:
     error: Mapping[str, float]
     roughness: RoughnessTable
     source: Mapping[str, Any] = field(default_factory=dict)
-    slope_ratios: SlopeRatios | None = None
 
     # Assigned in the package `tables`, to avoid a circular import
     build: ClassVar[Callable[..., DiffractionTable]]  #: from heights: `build.build.build_table`
@@ -167,9 +163,6 @@ class DiffractionTable:
             if numbers is not None:
                 plain.append([numbers.dtype.str, numbers.shape])
                 content.update(np.ascontiguousarray(numbers).data)
-        if self.slope_ratios is not None:
-            plain.append([*self.slope_ratios.cell, *self.slope_ratios.kappa])
-            content.update(self.slope_ratios.values.data)
         content.update(json.dumps(plain, sort_keys=True).encode())
         return content.hexdigest()
 
@@ -221,7 +214,6 @@ class DiffractionTable:
     def summary(self) -> dict[str, Any]:
         """Plain numbers and strings for people and for JSON."""
         intervals, ny, nx, components, terms = self.coefficients.shape
-        ratios = self.slope_ratios
         return {
             "basis": self.expansion.basis,
             "stores": self.expansion.kind,
@@ -240,12 +232,6 @@ class DiffractionTable:
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
             **({"frequency_limit": list(self.frequency_limit)} if self.limited else {}),
-            "second_order": ratios is not None
-            and {
-                "asked": self.settings.second_order,
-                "applied": applies(self.settings.second_order, ratios),
-                "changes_colours_by": ratios.change,
-            },
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),

@@ -117,17 +117,6 @@ def test_materials_reflect_less(run, heights):
     assert greens[0] > greens[1]
 
 
-def test_the_second_order_is_told_and_changes_the_map(run, heights):
-    greens = []
-    for name, second in (("a.exr", "false"), ("b.exr", "true")):
-        keratin = ["--int-ior", "1.56", "--theta", "60", "--second-order", second, "-o", name]
-        assert run("brdf-map", heights, *QUICK, *keratin).code == 0
-        channels, document = channels_of(name)
-        greens.append(channels["G"])
-        assert ("second order" in json.dumps(document)) == (second == "true")
-    assert 0.0 < np.abs(greens[1] - greens[0]).sum() < 0.2 * greens[0].sum()
-
-
 @pytest.mark.parametrize(
     ("options", "text"),
     [
@@ -143,7 +132,6 @@ def test_the_second_order_is_told_and_changes_the_map(run, heights):
         (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
         (["--material", "Unobtainium"], "Unobtainium"),
         (["--fill", "hope"], "fill"),
-        (["--second-order", "true", "--material", "none"], "second_order=true"),
     ],
 )
 def test_what_does_not_fit_is_one_line(run, heights, here, options, text):

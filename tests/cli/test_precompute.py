@@ -43,17 +43,20 @@ def test_options_reach_the_table(run, heights, here):
     assert table.height_scale_max == 2
 
 
-def test_the_second_order_is_held_unless_the_recipe_or_the_options_say_no(run, recipe, here):
+def test_a_retired_setting_is_named_and_changes_nothing(run, recipe, here):
     text = recipe.read_text()
-    for line, options, held in (
-        ("", [], True),
-        ("", ["--second-order", "false"], False),
-        ("second_order = false", [], False),
-        ("second_order = false", ["--second-order", "true"], True),
+    tables = []
+    for line, options in (
+        ("", []),
+        ("second_order = true", []),
+        ("", ["--second-order", "true"]),
     ):
-        recipe.write_text(f"{text}\n{line}")
-        assert run("precompute", recipe, "-o", "out.exr", *options).code == 0
-        assert (DiffractionTable.load("out.exr").slope_ratios is not None) == held
+        recipe.write_text(f"{line}\n{text}")
+        ran = run("precompute", recipe, "-o", "out.exr", *options)
+        assert ran.code == 0
+        assert ran.err.count("second_order is no longer a parameter") == bool(line or options)
+        tables.append(DiffractionTable.load("out.exr").digest())
+    assert len(set(tables)) == 1
 
 
 def test_the_report_says_size_terms_taps_error_and_cost(run, heights, here):

@@ -103,7 +103,7 @@ def test_patch_reflects_as_in_mitsuba(tmp_path, material):
         bsdf = mi.load_dict(md.bsdf_dict(grooves, coherence_width=24, material="none"))
         assert bsdf.describe().energy_scale(1.0).values.min() < 0.9
     else:
-        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False))
+        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
     seen = plane_seen(md.osl.export(bsdf, tmp_path), [30], WorkingSpace="Linear Rec.2020")
     expected = colour(bsdf, 30.0, "Linear Rec.2020")
     # closures have the scale at the middle of a lobe, and Cycles' noise

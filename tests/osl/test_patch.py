@@ -70,12 +70,12 @@ def test_draws_have_the_probabilities_that_weigh_them():
         {"shadowing": "vcavity"},
         {"beneath": {"type": "plastic"}},
         {"pigment": {"type": "diffuse", "reflectance": {"type": "checkerboard"}}},
-        {"plugin": "diffraction_dielectric", "energy_conserving": None, "second_order": None},
+        {"plugin": "diffraction_dielectric", "energy_conserving": None},
     ],
     ids=lambda value: next(iter(value)),
 )  # fmt: skip
 def test_surfaces_that_the_shader_lacks_are_refused(tmp_path, some_variant, parameters):
-    parameters = {"energy_conserving": False, "second_order": False, **parameters}
+    parameters = {"energy_conserving": False, **parameters}
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, **parameters))
     with pytest.raises(DiffractionError) as refused:
         md.osl.export(bsdf, tmp_path / "out")
@@ -88,15 +88,9 @@ def test_a_picture_of_one_colour_almost_everywhere_is_refused(tmp_path, some_var
     grey[0, 0] = 255
     Image.fromarray(grey).save(tmp_path / "base.png")
     parameters = {"energy_conserving": False, "pigment": str(tmp_path / "base.png")}
-    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=False, **parameters))
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, **parameters))
     with pytest.raises(DiffractionError, match="no single diffuse colour"):
         md.osl.export(bsdf, tmp_path / "out")
-
-
-def test_second_order_is_left_out_with_a_warning(tmp_path, some_variant):
-    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, second_order=True))
-    with pytest.warns(md.DiffractionWarning, match="second_order"):
-        md.osl.export(bsdf, tmp_path)
 
 
 @settings(deadline=None, max_examples=50)
@@ -133,7 +127,7 @@ def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path,
         (SMALL_SCAN, "4.8"),
         (SMALL_SCAN.treated(periodic="exact"), "1000000000.0"),
     ):
-        exported = md.osl.export(mi.load_dict(md.bsdf_dict(field, second_order=False)), tmp_path)
+        exported = md.osl.export(mi.load_dict(md.bsdf_dict(field)), tmp_path)
         document = json.loads(exported.document.read_text(encoding="utf-8"))
         values = {item["identifier"]: item["default"] for item in document["inputs"]}
         assert values["CoherenceWidth"] == 65.0
@@ -141,7 +135,7 @@ def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path,
 
 
 def test_patch_has_a_height_scale(tmp_path, some_variant):
-    raw = {"energy_conserving": False, "second_order": False}
+    raw = {"energy_conserving": False}
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, height_scale=0.5, **raw))
     exported = md.osl.export(bsdf, tmp_path, "skin")
     document = json.loads(exported.document.read_text(encoding="utf-8"))
@@ -154,9 +148,7 @@ def test_patch_has_a_height_scale(tmp_path, some_variant):
 def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_variant):
     colour = [0.3, 0.1, 0.02]
     pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour}}
-    bsdf = md.bsdf_dict(
-        PATCH, **DEFAULTS, coat_ior=1.25, pigment=pigment, lateral_scale=0.8, second_order=False
-    )
+    bsdf = md.bsdf_dict(PATCH, **DEFAULTS, coat_ior=1.25, pigment=pigment, lateral_scale=0.8)
     exported = md.osl.export(mi.load_dict(bsdf), tmp_path, "skin")
     document = json.loads(exported.document.read_text(encoding="utf-8"))
     values = {item["identifier"]: item["default"] for item in document["inputs"]}

@@ -154,10 +154,6 @@ def test_variants_evaluate_what_they_sample(name):
         ({"coat_ior": float("nan")}, "coat_ior=nan"),
         ({"coat_ior": 1.2, "ext_ior": 1.33}, "below the index of the medium above"),
         ({"coat_ior": 1.5, "material": "none"}, "material='none'"),
-        (
-            {"coat_ior": 1.5, "layering": "thesis", "nested": {"type": "diffuse"}},
-            "layering='thesis' cannot be combined with coat_ior",
-        ),
     ],
 )
 def test_what_is_no_coat_is_one_line(some_variant, parameters, line):

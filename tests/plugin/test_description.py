@@ -22,7 +22,6 @@ from mitsuba_diffraction.plugin.description import (
     Material,
     Nested,
     Quantity,
-
     Surface,
     describe,
 )
@@ -41,7 +40,7 @@ from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH
 
 ALL = [GLSL, SHADER, OSL, MAPS, SPECTRA, *CONSUMERS.values()]
-TABLE = md.DiffractionTable.build(PATCH, **DEFAULTS, second_order=True)
+TABLE = md.DiffractionTable.build(PATCH, **DEFAULTS)
 TEXTURE = object()  # stands for a texture of Mitsuba, which features do not read
 
 

@@ -27,13 +27,10 @@ SCALES = np.full((2, 2, 1), 0.7, np.float32)
 #: Parameters of the plugin, and of the reference where it knows the kind.
 KINDS: dict[str, tuple[dict[str, Any], dict[str, Any] | None]] = {
     "mirror": ({"material": "none"}, {}),
-    "dielectric": (INDICES | {"second_order": False}, GLASS),
-    "second order": (INDICES | {"second_order": True}, None),
+    "dielectric": (INDICES, GLASS),
     "metal": (METAL, METAL | {"model": "small_slope"}),
     "coat": (METAL | {"coat_ior": 1.58}, METAL | {"model": "small_slope", "coat": 1.58}),
-    # small slope's film has a mean factor that is tabulated
-    "film": (METAL | FILM | {"model": "kirchhoff"},
-             METAL | {"model": "kirchhoff", "film": (1.77, 250.0)}),
+    "film": (METAL | FILM, METAL | {"model": "small_slope", "film": (1.77, 250.0)}),
     "pigment": (INDICES | {"pigment": PIGMENT}, None),
     "height scales": ({"material": "none", "height_scale": {"type": "bitmap", "raw": True}}, None),
     "surface": ({"material": "none", "coherence": "surface", "uv_scale": 10.0}, None),

@@ -1,4 +1,4 @@
-"""Shadowing, layering and orientation of the plugin."""
+"""Shadowing and orientation of the plugin."""
 
 from __future__ import annotations
 
@@ -62,25 +62,9 @@ def test_vcavity_is_its_formula_and_none_is_the_default():
     assert shadowed == pytest.approx(plain * factor, rel=1e-4, abs=1e-6 * float(plain.max()))
 
 
-def test_the_thesis_blend_is_its_formula():
-    wi, wo = pairs()
-    # which has the tangent plane beside it, as the thesis of 2014 does
-    diffraction = values(plugin(model="kirchhoff"), wi, wo)
-    beneath = values(mi.load_dict(GREY), wi, wo)
-    blend = plugin(beneath=GREY, layering="thesis", diffuse_weight=0.3)
-    half = np.sqrt(0.5 * (1.0 + np.sum(wi * wo, axis=1)))
-    fresnel = np.array(mi.fresnel(mi.Float(half.astype(np.float32)), 1.5 / 1.000277)[0])
-    expected = 0.7 * diffraction + (1.0 - fresnel + 0.3) * beneath
-    assert values(blend, wi, wo) == pytest.approx(expected, rel=1e-4)
-
-
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
-        ({"layering": "blend"}, "transmission, thesis"),
-        ({"layering": "thesis"}, "nested BSDF"),
-        ({"diffuse_weight": 0.2}, "layering='thesis'"),
-        ({"layering": "thesis", "diffuse_weight": 1.5, "beneath": GREY}, "between 0 and 1"),
         ({"shadowing": "smith"}, "none, vcavity"),
         ({"orientation": "north"}, "must be a number"),
         ({"orientation": GREY}, "cos, sin"),

@@ -28,8 +28,6 @@ MATERIALS = {
 
 def load(**parameters: Any) -> Any:
     raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
-    # the second order is interpolated between angles, and has tests of its own
-    raw |= {"second_order": False}
     return mi.load_dict(md.bsdf_dict(PATCH, **(raw | parameters)))
 
 
@@ -136,7 +134,6 @@ def test_derivatives_are_difference_quotients(some_variant, key):
         ({}, "small_slope"),
         ({"material": "Al"}, "small_slope"),
         ({"material": "none"}, "kirchhoff"),
-        ({"layering": "thesis", "nested": {"type": "diffuse"}}, "kirchhoff"),
         ({"nested": {"type": "diffuse"}}, "small_slope"),
         ({"model": "kirchhoff"}, "kirchhoff"),
     ],

@@ -64,23 +64,6 @@ def matrices(bsdf: Any, wi: Array, wo: Array, mode: Any = None) -> Array:
     return np.stack(rows)
 
 
-# the window is wider than the patch, for orders that stand apart
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-def test_matrices_have_the_unpolarised_light_s_second_order(polarised):
-    wi, wo = pairs()
-    wo = as_single(wo[:, [1, 0, 2]])  # away from the mirror direction, whose order has none
-    keratin = {"int_ior": 1.56, "ext_ior": 1.0, "coherence_width": 16.0}
-    first, both = (
-        matrices(load(second_order=second, **keratin), wi, wo) for second in (False, True)
-    )
-    lit = first[..., 0, 0] > 1e-4 * first[..., 0, 0].max()
-    factor = both[lit][:, 0, 0] / first[lit][:, 0, 0]
-    assert np.ptp(factor) > 0.01
-    assert both[lit] == pytest.approx(
-        factor[:, None, None] * first[lit], rel=1e-4, abs=1e-7 * first.max()
-    )
-
-
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 @pytest.mark.parametrize(
     "material",
@@ -88,8 +71,7 @@ def test_matrices_have_the_unpolarised_light_s_second_order(polarised):
 )
 def test_matrices_are_the_reference_s(polarised, model, material):
     wi, wo = pairs()
-    # the second order is interpolated between angles, and has tests of its own
-    found = matrices(load(model=model, second_order=False, **material), wi, wo)
+    found = matrices(load(model=model, **material), wi, wo)
     index = {"eta": 1.56, "k": 0.0} if "int_ior" in material else CONDUCTOR
     if "coat_ior" in material:
         index = index | {"coat": material["coat_ior"]}
@@ -97,9 +79,7 @@ def test_matrices_are_the_reference_s(polarised, model, material):
     s_in, s_out = md.reference.boundary.polarisation_axes(wo, wi)
     before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
     for n, lam in enumerate(LAM):
-        exact = reference.mueller(
-            PATCH, wo, wi, lam, coherence_width=WIDTH, model=model, second_order=False, **index
-        )
+        exact = reference.mueller(PATCH, wo, wi, lam, coherence_width=WIDTH, model=model, **index)
         exact = after @ exact @ before * wo[:, 2, None, None]
         # the table's tolerance, and a phase in single precision
         allowed = 1e-3 * exact[:, :1, :1] + 1e-4 * np.abs(exact).max()

@@ -88,7 +88,7 @@ def test_an_ensemble_is_the_mean_over_all_places():
     step = np.array(SMALL.extent) / n
     places = np.indices((n, n)).reshape(2, -1).T * step + 0.017
     wi, wo, given = polar(15, 200), polar(30, 30), {
-        "coherence_width": 4 * SIGMA, "eta": 1.5, "second_order": False,
+        "coherence_width": 4 * SIGMA, "eta": 1.5,
     }  # fmt: skip
     values = reference.brdf(
         SMALL, wi, wo, np.full(n * n, 550.0), coherence="surface", place=places, **given

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction import reference
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.reference import fresnel
 from tests.support.directions import polar, rough_patch
 
@@ -69,51 +68,3 @@ def test_below_the_surface_there_is_no_light_in_any_model():
 def test_a_model_or_index_that_is_none_is_refused(arguments, word):
     with pytest.raises(DiffractionError, match=word):
         reference.brdf(SMALL, polar(30), polar(10), 520.0, **arguments)
-
-
-# ------------------------------------------------------------------------ the second order
-
-DIELECTRIC = {"coherence_width": 4 * SIGMA, "model": "small_slope", "eta": 1.56}
-
-
-def test_the_second_order_is_reciprocal():
-    wi, wo = polar(50, 30), polar(25, 160)
-    there = reference.brdf(SMALL, wi, wo, 550.0, second_order=True, **DIELECTRIC)
-    back = reference.brdf(SMALL, wo, wi, 550.0, second_order=True, **DIELECTRIC)
-    assert there == pytest.approx(back, rel=1e-9)
-    assert there != pytest.approx(
-        reference.brdf(SMALL, wi, wo, 550.0, **DIELECTRIC), rel=1e-3
-    )
-
-
-def test_the_second_order_knows_hills_from_pits_and_leaves_the_mirror_direction():
-    hills = gratings.sinusoidal(1.6, 0.05, periods=1, pixels_per_period=32)
-    heights = hills.heights + 20.0 * hills.heights**2
-    arguments = {**DIELECTRIC, "coherence_width": 20.0}
-    wi = polar(60, 0)
-    wo = np.array([0.55 / 1.6 * np.arange(3) - wi[0], [0] * 3, [0] * 3]).T
-    wo[:, 2] = np.sqrt(1 - wo[:, 0] ** 2)
-    found = []
-    for sign in (1, -1):
-        field = HeightField(sign * heights, hills.pixel_size)
-        first = reference.brdf(field, wi, wo, 550.0, **arguments)
-        found.append(reference.brdf(field, wi, wo, 550.0, second_order=True, **arguments) / first)
-    assert found[0][0] == pytest.approx(1.0, abs=1e-6)  # but for the first order's lobe
-    assert np.all(np.abs(found[0][1:] - found[1][1:]) > 1e-3)
-
-
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {"model": "kirchhoff"},
-        {"coherence": "patch"},
-        {"k": 3.0},
-        {"eta": None, "model": "kirchhoff"},
-        {"film": (1.5, 100.0)},
-    ],
-)
-def test_the_second_order_is_refused_where_it_is_not_known(changed):
-    with pytest.raises(DiffractionError, match="second_order=True"):
-        reference.brdf(
-            SMALL, polar(20, 0), polar(30, 9), 550.0, second_order=True, **{**DIELECTRIC, **changed}
-        )

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics import blend, second_order
+from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
-from mitsuba_diffraction.optics.slope_ratios import Slopes, along
 from mitsuba_diffraction.reference import boundary, model
 from tests.support.directions import rough_patch
 from tests.support.matrices import pairs
@@ -34,37 +33,17 @@ def test_matrices_are_those_of_the_tables(index):
     assert both == pytest.approx(boundary.blended(WI, WO, index, s))
 
 
-def test_factors_are_those_of_the_plugin_s_twin():
-    screen, c = np.exp(9j * FIELD.heights), np.array([0.9 - 0.2j, -0.1 + 2.4j])
-    slopes = Slopes.from_heights(FIELD.heights, FIELD.pixel_size)
-    orders = model.orders_near((3.0, -2.0), 0.45, screen, FIELD.pixel_size)
-    found = model.second_order_factors(orders, screen, slopes, c, 0.8)
-    spectra = orders.waves_y @ (slopes.products * screen) @ orders.waves_x.T / screen.size
-    q = np.stack(np.meshgrid(orders.qx, orders.qy), axis=-1)
-    q = np.where(q == 0.0, 1e-9, q)
-    ratios = along(q, np.moveaxis(spectra, 0, -1)).conj() / orders.a.conj()[..., None]
-    expected = second_order.factor(c, slopes.gate * ratios, 0.8)
-    other = np.hypot(*np.meshgrid(orders.qx, orders.qy)) > 0.0
-    assert found[other] == pytest.approx(expected[other])
-    assert np.all(found[~other] == 1.0)
-
-
-@pytest.mark.parametrize("second", [False, True])
-def test_the_reference_s_default_is_the_model(second):
-    index = INDICES[0]
-    found = reference.brdf(
-        FIELD, WI, WO, LIGHT.wavelength, eta=1.5, coherence_width=2.0, second_order=second
-    )
-    expected = model.default_brdf(FIELD, LIGHT, index, model.Sigmas.same(sigma_of(2.0)), second)
+def test_the_reference_s_default_is_the_model():
+    light = {"eta": 1.5, "coherence_width": 2.0}
+    found = reference.brdf(FIELD, WI, WO, LIGHT.wavelength, **light)
+    expected = model.default_brdf(FIELD, LIGHT, INDICES[0], model.Sigmas.same(sigma_of(2.0)))
     assert np.array_equal(found, expected)
-    matrices = reference.mueller(
-        FIELD, WI, WO, LIGHT.wavelength, eta=1.5, coherence_width=2.0, second_order=second
-    )
+    matrices = reference.mueller(FIELD, WI, WO, LIGHT.wavelength, **light)
     assert matrices[:, 0, 0] == pytest.approx(found)
 
 
 def test_small_slope_is_the_default_where_there_is_an_index():
-    light = {"coherence_width": 2.0, "second_order": False}
+    light = {"coherence_width": 2.0}
     pair = WI[:4], WO[:4], 550.0
     for material, name in (({"eta": 0.7, "k": 5.0}, "small_slope"), ({}, "kirchhoff")):
         default, told = (

@@ -54,7 +54,7 @@ def load_scene(**surface: Any) -> Any:
     grating = md.gratings.sinusoidal(period=1.6, depth=0.06, periods=4)
     grey = {"type": "diffuse", "reflectance": 0.1}
     parameters = {
-        "coherence_width": 6, "orientation": 30.0, "int_ior": 1.5, "second_order": True,
+        "coherence_width": 6, "orientation": 30.0, "int_ior": 1.5,
         "pigment": grey,
     } | surface  # fmt: skip
     film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1]}

@@ -17,7 +17,6 @@ COARSE = EnergySettings(
     side_wavelengths=3,
     parts=(1, 1),
     side_parts=(1, 1),
-    fringe_step=0.8,
     fringes=12,
     rings=16,
     steps=36,

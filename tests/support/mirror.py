@@ -8,7 +8,7 @@ from tests.support.directions import polar
 
 LAMP = polar(30.0, 180.0)
 #: Settings of tables that are quick to build.
-FAST = {"height_scale_max": 1.0, "second_order": False, "wavelength_range": (440.0, 810.0)}
+FAST = {"height_scale_max": 1.0, "wavelength_range": (440.0, 810.0)}
 
 
 def beside_the_mirror(table, degrees, wavelengths):

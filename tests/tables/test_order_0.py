@@ -27,10 +27,10 @@ def test_beside_the_mirror_of_a_flat_scan_is_no_light(width):
 
 
 def test_the_window_of_the_light_changes_order_0_alone():
-    table = md.DiffractionTable.build(SMALL_SCAN, second_order=False)
+    table = md.DiffractionTable.build(SMALL_SCAN)
     assert (table.coherence_width, table.window_width) == (65.0, min(SMALL_SCAN.extent))
     one = md.DiffractionTable.build(
-        md.HeightField(SMALL_SCAN.heights, SMALL_SCAN.pixel_size), second_order=False,
+        md.HeightField(SMALL_SCAN.heights, SMALL_SCAN.pixel_size),
         coherence_width=table.window_width,
     )  # fmt: skip
     assert one.order_0_ratio == 1.0
@@ -58,12 +58,12 @@ def test_tables_of_a_small_scan_meet_their_tolerance(basis):
 
 
 def test_files_hold_the_window_of_a_scan_and_older_ones_have_one_window(tmp_path):
-    scan = md.DiffractionTable.build(SMALL_SCAN, second_order=False)
+    scan = md.DiffractionTable.build(SMALL_SCAN)
     scan.save(tmp_path / "scan.exr")
     loaded = md.DiffractionTable.load(tmp_path / "scan.exr")
     assert (loaded.sigma, loaded.sigma_0) == (scan.sigma, scan.sigma_0)
     assert loaded.digest() == scan.digest()
     whole = SMALL_SCAN.treated(periodic="exact")
-    table = md.DiffractionTable.build(whole, coherence_width=4.5, second_order=False)
+    table = md.DiffractionTable.build(whole, coherence_width=4.5)
     assert "window_width" not in table.settings.as_json()
     assert table.sigma == table.sigma_0

@@ -81,9 +81,8 @@ def test_equal_content_is_found_whatever_it_is_called():
         Builder(coherence_width=1.7),
         Builder(coherence_width=1.6, tolerance=1e-4),
         Builder(coherence_width=1.6, coherence="patch"),
-        Builder(coherence_width=1.6, second_order=False),
     ],
-    ids=["heights", "pixel size", "coherence width", "tolerance", "coherence", "second order"],
+    ids=["heights", "pixel size", "coherence width", "tolerance", "coherence"],
 )
 def test_any_other_content_is_another_table(folder, other):
     other.built = 0

@@ -6,8 +6,7 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...optics.blend import small_slope_weight
-from ...optics.boundary import MODELS, Model, azimuth_cosine
+from ...optics.boundary import MODELS, Model
 from ...optics.coat import (
     Coat,
     coated_reflectance,
@@ -19,7 +18,7 @@ from ...optics.coat import (
 from ...optics.colour import encoded_colour
 from ...optics.dialects import GLSL
 from ...optics.display import shown_colour
-from ...optics.fresnel import normal_reflectance, reflectance
+from ...optics.fresnel import reflectance
 from ...optics.geometry import vcavity
 from ...optics.orders import (
     cell_wavelengths,
@@ -33,7 +32,6 @@ from ...optics.orders import (
     wavenumber_step,
 )
 from ...optics.programs import Program
-from ...optics.second_order import added_power
 from .rewriting import declared_names
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
@@ -45,7 +43,6 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "FACE": {face_transmittance: 2, order_direction: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
-    "SECOND_ORDER": {small_slope_weight: 3},
 }  # fmt: skip
 _KINDS = {"1": "float", "2": "complex"}
 
@@ -74,10 +71,6 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(refracted, "vector", "float")
     if index is not None:
         program.add(reflectance, "float", index, name="interface_reflectance")
-    if index is not None and "SECOND_ORDER" in names:
-        program.add(normal_reflectance, index)
-        program.add(azimuth_cosine, "vector", "vector")
-        program.add(added_power, ("float",) * 4, ("float",) * 4, "float")
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(

@@ -66,11 +66,9 @@ class Modelled:
 
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
-        if (energy := self.described.energy) is None:
-            return Packed()
-        ratios = [energy.reflected(scale) for scale in scales]
+        ratios = [self.described.reflected(scale) for scale in scales]
         beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
-        pages = [energy.scale(scale) for scale in scales]
+        pages = [self.described.energy_scale(scale) for scale in scales]
         if all(page is None for page in pages):
             return beneath
         return beneath | pack_energy([FINE.ones if s is None else luminous_mean(s) for s in pages])

@@ -15,8 +15,6 @@ from ...optics.boundary import Model
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
-from ...optics.second_order import LIMIT, NODES, coefficient_table
-from ...optics.slope_ratios import SlopeRatios
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
@@ -277,35 +275,3 @@ def pack_boundary(model: Model, roughness: RoughnessTable) -> Packed:
         },
         {**name, "STATISTIC": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},
     )
-
-
-def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
-    """Pack the second order's coefficients and slope ratios (`optics.second_order`).
-
-    index : index of a dielectric relative to the medium above it.
-    """
-    first, last = ratios.kappa
-    count, _, rows, columns = ratios.values.shape
-    steps = [1.0 / width for width in ratios.cell] + [(count - 1) / (last - first)]
-    return Packed(
-        (
-            _paged("second_coefficients", coefficient_table(index)),
-            _paged("slope_ratios", np.moveaxis(ratios.values, 1, -1)),
-        ),
-        {
-            "ratio_size": (float(columns), float(rows), float(count)),
-            "ratio_steps": tuple(steps),
-            "ratio_zero": (*map(float, ratios.middle), -first * steps[2]),
-            "ratio_orders": tuple(map(float, ratios.orders)),
-        },
-        {
-            "SECOND_ORDER": "", "SECOND_ORDER_LIMIT": repr(LIMIT),
-            "COEFFICIENT_NODES": f"{NODES}.0",
-        },
-    )  # fmt: skip
-
-
-def _paged(name: str, values: NDArray[np.complexfloating]) -> Texture:
-    """Pack two complex numbers at nodes (pages, rows, columns, 2), pages one below another."""
-    floats = np.stack([values.real, values.imag], axis=-1).astype(np.float16)
-    return Texture(name, floats.reshape(-1, values.shape[2], 4), smooth=True)

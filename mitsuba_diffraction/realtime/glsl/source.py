@@ -94,8 +94,6 @@ def part(name: str, definitions: Mapping[str, str]) -> str:
 def surface_files(definitions: Mapping[str, str]) -> list[str]:
     """Return the files of a surface that all methods share, which come first."""
     files = ["library.glsl", "formulas", "reflectance.glsl", "boundary.glsl", "layers.glsl"]
-    if "SECOND_ORDER" in definitions:
-        files.append("second_order.glsl")
     if "ORDERS" in definitions:
         return [*files, "orders.glsl"]
     return [*files, "pair.glsl"] if "DIFFRACTING" in definitions else files

@@ -35,7 +35,7 @@ from ..glsl.shader_materials import (
 from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
 from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
-from .material_choices import changeable, named_definitions, packed_materials
+from .material_choices import INDEXED, changeable, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
@@ -258,7 +258,7 @@ def _packed(
                 "height_scale": described.height_scale.number if described else None,
                 "table": number,
                 "programs": {m: program(m, d) for m, d in known.items()},
-                "named": {m: program(m, named_definitions(d)) for m, d in given.items()},
+                "named": {m: program(m, {**d, **INDEXED}) for m, d in given.items()},
                 "coat": coats.index(_coat(surface.material)) if given else 0,
                 "pigmented": described is not None and described.nested is not None,
             }

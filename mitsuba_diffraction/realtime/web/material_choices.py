@@ -18,18 +18,14 @@ from .sections import Sections, as_columns, packed_array, packed_parts
 NAMES = {name: name for name in TISSUES} | {
     symbol: name for name, symbol in reversed(METALS.items())
 }
+#: Definition of a surface with a material of `packed_materials`.
+INDEXED = {"SURFACE_KIND": "2"}
 
 
 def changeable(surface: Diffracting | None) -> bool:
     """Return whether a surface can show another material: solved orders and mirrors cannot."""
     material = surface.described.material if surface else None
     return material is not None and material.index is not None
-
-
-def named_definitions(definitions: dict[str, str]) -> dict[str, str]:
-    """Return a surface's definitions with a material of `packed_materials`."""
-    others = {name: text for name, text in definitions.items() if name != "SECOND_ORDER"}
-    return {**others, "SURFACE_KIND": "2"}
 
 
 def packed_materials(coats: Sequence[float], sections: Sections) -> list[dict[str, Any]]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
-from ...optics.second_order_change import applies
 from ...plugin.sources import TableRequest
 from ...settings import RECIPE_SETTINGS, TableSettings
 from ...tables.table import DiffractionTable
@@ -24,7 +23,7 @@ from .paths import TracedPaths, trace
 from .recording import Session, described_table
 
 #: Settings that a plan chooses.
-CHOSEN = ("frequency_limit", "height_scale_max", "second_order")
+CHOSEN = ("frequency_limit", "height_scale_max")
 #: Share of a table's size above which a limited one is not worth it.
 WORTH = 0.8
 
@@ -138,13 +137,11 @@ def plan_table(recorded: RecordedTable, tolerance: float) -> PlannedTable:
     # a series in κ has as many terms as before, so that the size follows the area
     if limit[0] * limit[1] > WORTH * whole.q_limit**2:
         return unlimited
-    request, ratios = recorded.request, whole.slope_ratios
+    request = recorded.request
     settings = replace(
         request.settings,
         frequency_limit=(_rounded(limit[0]), _rounded(limit[1])),
         height_scale_max=request.height_scale,
-        # decided by all orders, not by those within the limit
-        second_order=ratios is not None and applies(request.settings.second_order, ratios),
     )
     table = request.cached(settings)
     if table.nbytes > WORTH * whole.nbytes:

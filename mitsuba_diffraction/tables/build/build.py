@@ -40,7 +40,7 @@ from .choose import (
     too_many_intervals,
 )
 from .coefficients import coefficients_of, half_precision
-from .describe import describe, roughness_of, slope_ratios
+from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .powers import Spectra
 from .windows import Run, shape_of, windows_of
@@ -197,7 +197,6 @@ def build_table(
     taps: int | None = None,
     frequency_limit: float | tuple[float, float] | None = None,
     windows: str | float | None = None,
-    second_order: str | bool = "auto",
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
@@ -210,12 +209,12 @@ def build_table(
     heights : the patch, which tiles the plane; or several of one size, whose powers are
         averaged (`ensemble` only).
     coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
-    frequency_limit, windows, second_order : see `settings.TableSettings`.
+    frequency_limit, windows : see `settings.TableSettings`.
     progress : called as progress(done, total, text) while it works.
     """
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
-        height_scale_max, checked("frequency_limit", frequency_limit), windows, second_order,
+        height_scale_max, checked("frequency_limit", frequency_limit), windows,
     )  # fmt: skip
     table = build_with(heights, settings, progress)
     for line in warnings_of([heights] if isinstance(heights, HeightField) else heights, settings):
@@ -321,7 +320,6 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
     patches, settings = wanted.patches, wanted.settings
     limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
     settings = replace(settings, frequency_limit=limit)
-    roughness = roughness_of(patches, wanted.q_limit)
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -331,9 +329,8 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
         spacing=wanted.spacing,
         settings=settings,
         error=attempt.measured,
-        roughness=roughness,
+        roughness=roughness_of(patches, wanted.q_limit),
         source=describe(patches, settings),
-        slope_ratios=slope_ratios(patches, settings, roughness) if settings.second_order else None,
     )
 
 

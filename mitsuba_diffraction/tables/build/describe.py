@@ -1,23 +1,18 @@
-"""Description of the heights in a table: statistics, digest, roughness and slope ratios."""
+"""Description of the heights in a table: statistics, digest and roughness."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...heights.coherence import repeats, width_reason
 from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
-from ...optics.second_order_change import colour_change
-from ...optics.slope_ratios import CellGrid, CellSums, SlopeRatios
 from ...settings import TableSettings
-from ..table import q_limit_of
 from .spectrum import Spectrum
 from .windows import Windows
 
@@ -65,43 +60,6 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
         else:
             roughness.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
     return ScaleRoughness.mean(roughness).table(q_max)
-
-
-def sections(
-    patches: Sequence[HeightField],
-) -> Iterator[tuple[HeightField, NDArray[np.float64]]]:
-    """Yield patches, or some windows of wide scans that represent them, with their tapers."""
-    if isinstance(patches, Windows):
-        parts = _parts(patches)
-        yield from ((window, parts.taper) for window in parts.some())
-        return
-    for patch in patches:
-        if patch.heights.size <= LARGE:
-            yield patch, np.ones((1, 1))
-        else:
-            yield from sections(Windows([patch], math.inf))
-
-
-def slope_ratios(
-    patches: Sequence[HeightField], settings: TableSettings, roughness: RoughnessTable
-) -> SlopeRatios:
-    """Return the slope ratios as far as the table has orders, and by how much they change colours.
-
-    roughness : of the patches, as in the table.
-    """
-    q_limit = q_limit_of(settings.wavelength_range)
-    x, y = settings.frequency_limit or (q_limit, q_limit)
-    grid = CellGrid.for_patches(
-        next(sections(patches))[0].extent,
-        max(patch.rms_height for patch in patches),
-        q_limit,
-        (min(x, q_limit), min(y, q_limit)),
-        q_limit * settings.height_scale_max,
-    )
-    sums = CellSums.of_patches(sections(patches), grid)
-    ratios = sums.ratios()
-    change = colour_change(sums, ratios, roughness, settings.wavelength_range)
-    return replace(ratios, change=change)
 
 
 def _parts(windows: Windows) -> Windows:

@@ -17,7 +17,6 @@ from functools import partial
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ...optics import mean_second_order
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
 from ..order_mixture import MOST_STRONG, STRONG
@@ -90,7 +89,7 @@ class Surface:
         if largest <= self._limit:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
-        fringes = math.ceil(self.material.phase(wavelength_range) / settings.scale_fringe_step)
+        fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
         nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
         solve = self._balanced if self._both_sides else self._limited
@@ -271,7 +270,7 @@ class Energy:
             conservation = surface.conservation(self.wavelength_range)
             return {name: table for name, table in vars(conservation).items() if table is not None}
 
-        versions = VERSION, mean_second_order.VERSION, STRONG, MOST_STRONG
+        versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
         return Conservation(**cached_directions("energy", self.table, made_of, make))

@@ -14,7 +14,6 @@ from scipy.ndimage import map_coordinates
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Heights, model_of
 from ...optics.fresnel import Filmed
-from ...optics.mean_second_order import mean_gain
 from ...optics.paths import Path
 from ..directional import Real
 
@@ -100,11 +99,7 @@ class Gain:
         q_i, q_o = path.came.normal(cos_i), path.left.normal(cos_o)
         common = path.common(cos_i, cos_o, cos_turn)
         ratio = 4.0 * q_i * q_o / (w**2 * common)
-        ratio = ratio * path.power(cos_i, cos_o, cos_turn, heights)
-        if isinstance(path.index, Filmed) and model.has_second_order:
-            film = path.index, self.roughness, k, self.height_scale
-            ratio = ratio * mean_gain(cos_i, *film) * mean_gain(cos_o, *film)
-        return np.asarray(ratio)
+        return np.asarray(ratio * path.power(cos_i, cos_o, cos_turn, heights))
 
 
 def thick(index: object) -> bool:

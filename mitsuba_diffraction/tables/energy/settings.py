@@ -26,11 +26,8 @@ class EnergySettings:
         looked at: first of dielectrics and of surfaces with more than `few_orders` strong orders,
         then of reflectors with fewer.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
-    fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of the second order's
-        mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
-        2 n d of 3 µm, and three times that at 12 µm. Under thin films waves in between come and go,
-        which three times the step misses by 0.03.
-    scale_fringe_step : likewise from one wavelength of a scale to the next.
+    fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of a scale to the
+        next, and most wavelengths. Under thin films waves in between come and go.
     sweeps : of Sinkhorn and Knopp's iteration.
     threshold : an albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; the margin to 1 is for directions between nodes.
@@ -47,8 +44,7 @@ class EnergySettings:
     side_polar: int = 80
     side_wavelengths: int = 8
     wavelengths: int = 16
-    fringe_step: float = 0.1
-    scale_fringe_step: float = 0.6
+    fringe_step: float = 0.6
     fringes: int = 64
     parts: tuple[int, int] = (3, 5)
     side_parts: tuple[int, int] = (1, 2)

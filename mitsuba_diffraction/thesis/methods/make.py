@@ -109,7 +109,7 @@ def make_all(
         arguments = {
             "coherence_width": width, "tolerance": common.tolerance, "height_scale_max": 1.0,
             "wavelength_range": tuple(common.wavelength_range), "progress": progress,
-            "second_order": False, **changes,
+            **changes,
         }  # fmt: skip
         return (build or DiffractionTable.build)(heights, **arguments)
 

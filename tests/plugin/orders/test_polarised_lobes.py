@@ -70,7 +70,7 @@ def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarise
     heights = 5e-4 * np.cos(2.0 * np.pi * np.arange(16) / 16)
     field = md.HeightField(np.tile(heights, (16, 1)), 0.6 / 16)
     model = load(
-        field, eta=0.9, k=6.0, orientation=20.0, energy_conserving=False, second_order=False,
+        field, eta=0.9, k=6.0, orientation=20.0, energy_conserving=False,
         coherence_width=60.0,
     )  # fmt: skip
     grating = load(shallow_grating(INDEX, 0.1), orientation=20.0, coherence_width=60.0)

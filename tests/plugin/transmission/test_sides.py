@@ -52,7 +52,7 @@ def test_values_are_the_reference_s_in_both_directions(some_variant, kind, model
 def test_above_it_reflects_what_it_does_alone_and_below_as_from_within(some_variant, kind):
     wi, wo, lam = pairs(60)
     found = evaluated(both(**SIDES[kind]), wi, wo, lam)
-    alone = evaluated(load(second_order=False, **INDICES), wi, wo, lam)
+    alone = evaluated(load(**INDICES), wi, wo, lam)
     if kind == "dielectric":
         assert found == pytest.approx(alone, rel=1e-4, abs=1e-6 * alone.max())
     else:  # and what the flat side sends back
@@ -206,7 +206,6 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
         ({"coat_ior": 1.4}, ["coat_ior", "'diffraction'"]),
         ({"film_ior": 1.4, "film_thickness": 100.0}, ["film_", "'diffraction'"]),
         ({"shadowing": "vcavity"}, ["shadowing", "'diffraction'"]),
-        ({"second_order": True}, ["second_order", "'diffraction'"]),
         ({"coherence": "surface"}, ["coherence='surface'", "diffraction_dielectric"]),
         ({"thin": 1.0}, ["thin=1.0", "true or false"]),
         ({"transmission": True}, ["transmission", "diffraction_dielectric"]),

@@ -25,7 +25,7 @@ def patch() -> HeightField:
 @pytest.fixture(scope="session")
 def table(patch: HeightField) -> DiffractionTable:
     """Its table of powers, for a window a little narrower than the patch."""
-    return DiffractionTable.build(patch, coherence_width=6.5, second_order=True)
+    return DiffractionTable.build(patch, coherence_width=6.5)
 
 
 @pytest.fixture(scope="session")

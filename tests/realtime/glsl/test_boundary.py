@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.optics import second_order
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from mitsuba_diffraction.optics.geometry import wavenumber
@@ -19,7 +18,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_conductor,
     pack_powers,
     pack_responses,
-    pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.reference import boundary, fresnel
@@ -29,7 +27,7 @@ from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
 DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})
-MATERIALS = {"dielectric": DIELECTRIC, "twice": DIELECTRIC, "conductor": pack_conductor(*METAL)}
+MATERIALS = {"dielectric": DIELECTRIC, "conductor": pack_conductor(*METAL)}
 HEIGHTS = 0.8  # their scale
 UNTINTED = Packed(uniforms={f"tint_{n}": tuple(np.eye(3)[n]) for n in range(3)})
 
@@ -72,40 +70,17 @@ def share(
     )
 
 
-def twice(
-    power: NDArray[Any],
-    mirror: NDArray[Any],
-    table: DiffractionTable,
-    pair: tuple[Any, ...],
-    lam: NDArray[Any],
-) -> NDArray[np.float64]:
-    """Power (n, m) of orders that light is diffracted into twice, but for a mirror's lobe."""
-    wi, wo, _ = pair
-    total, k = wi + wo, wavenumber(lam)
-    ratios = table.slope_ratios.at(total[:, None, :2] * k[:, None], HEIGHTS * total[:, 2:] * k)
-    gain = second_order.factor(
-        second_order.interpolated(1.5, wi, wo)[:, None],
-        HEIGHTS**2 * ratios,
-        share(table, "twice", total, lam),
-    )
-    mirror = np.abs(mirror)
-    return power + (power - np.clip(power, -mirror, mirror)) * (gain - 1.0)
-
-
 def shaded(
     gl: Any,
     method: str,
     table: DiffractionTable,
     parts: Packed,
     pair: tuple[Any, ...],
-    kind: str = "",
 ) -> NDArray[np.float64]:
     wi, wo, at = pair
     directions = np.zeros((2, len(wi), 4), np.float32)
     directions[0, :, :3], directions[1, :, :3] = wi, wo
     paired = Packed((Texture("directions", directions),), {"height_scale": HEIGHTS}, {"PAIRED": ""})
-    if kind == "twice":
-        paired |= pack_second_order(1.5, table.slope_ratios)
     return probed(
         gl, method, parts | pack_boundary(MODELS["small_slope"], table.roughness) | paired, at
     )
@@ -117,7 +92,7 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
     colours = pack_colours(ColourTable.build(table))
     plain = probed(gl, "fast", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
-    found = shaded(gl, "fast", table, colours | material, pair, kind)
+    found = shaded(gl, "fast", table, colours | material, pair)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
@@ -126,9 +101,6 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
         expected /= boundary.unpolarised(tangent) * scale[:, None] ** 2
         expected *= probed_reflectance(gl, colours, plain, pair[2])
     lit = np.abs(plain) > 1e-3 * np.abs(plain).max()
-    if kind == "twice":
-        level = probed(gl, "fast", colours | PERFECT, pair[2] * [1, 1, 0, 1])
-        plain = twice(plain, level, table, pair, np.array(RGB_WAVELENGTHS))
     # single precision, and fast's reading of reflectances between 129 angles
     assert found[lit] / plain[lit] == pytest.approx(expected[lit], rel=1e-3)
 

@@ -30,7 +30,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_energy,
     pack_powers,
     pack_responses,
-    pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.source import (
     METHODS,
@@ -124,7 +123,7 @@ def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable)
 
 
 def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
-    table = DiffractionTable.build(SMALL_SCAN, second_order=False)
+    table = DiffractionTable.build(SMALL_SCAN)
     assert table.order_0_ratio > 100.0
     at = places(600)
     # many in the lobe of the light, 0.3° wide
@@ -256,13 +255,12 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
     definitions = {"TEXELS": "2", "TAPS_X": "3", "TAPS_Y": "3", "DIFFRACTING": ""}
     if all_parts:
         scale = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
-        parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "THESIS", "COHERENT")
+        parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "COHERENT")
         definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
         definitions |= pack_energy([scale, scale]).definitions
         ratio = DirectionalTable(np.array([550.0]), scale[None])
         definitions |= pack_beneath([ratio, ratio]).definitions
         definitions |= pack_boundary(MODELS["small_slope"], table.roughness).definitions
-        definitions |= pack_second_order(1.5, table.slope_ratios).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")

@@ -102,7 +102,7 @@ def several_surfaces(table_file: Path, directory: Path) -> dict[str, Any]:
             "type": "disk",
             "to_world": transform().translate([0, -1.7, 0.1]).rotate([0, 1, 0], 15).scale(0.7),
             "bsdf": {
-                **skin, "int_ior": 1.8, "layering": "thesis", "diffuse_weight": 0.1,
+                **skin, "int_ior": 1.8,
                 "nested": {"type": "diffuse", "reflectance": 0.3},
             },
         },

@@ -115,7 +115,7 @@ def sphere(scene: Any) -> Any:
             "ball": {
                 "type": "sphere",
                 "bsdf": md.bsdf_dict(
-                    GRATING, coherence_width=6, int_ior=1.5, second_order=True,
+                    GRATING, coherence_width=6, int_ior=1.5,
                     pigment={"type": "diffuse", "reflectance": 0.1},
                 ),
             },
@@ -238,9 +238,9 @@ def test_a_white_room_is_mirrored_by_order_0(opened: Any) -> None:
     [
         {"material": "Al", "coat_ior": 1.5},
         {"int_ior": 1.5, "model": "kirchhoff", "pigment": {"type": "diffuse"}},
-        {"int_ior": 1.7, "coat_ior": 1.5, "second_order": True, "shadowing": "vcavity"},
+        {"int_ior": 1.7, "coat_ior": 1.5, "shadowing": "vcavity"},
     ],
-    ids=["coated", "kirchhoff", "twice"],
+    ids=["coated", "kirchhoff", "shadowed"],
 )
 def test_every_surface_is_valid_glsl_of_its_own(
     scene: Any, browser: Any, surface: dict[str, Any]
@@ -284,7 +284,6 @@ def test_every_surface_is_valid_glsl_of_its_own(
     page.close()
     said, names = found
     assert said.strip("\0\n ") == ""
-    assert ("md_slope_ratios" in names) == ("second_order" in surface)
     # what the shader reads is what the constants give, or what the page declared
     given = set(shader.uniforms) | {texture.name for texture in shader.textures}
     assert set(names) - {"energy", "eta"} <= given

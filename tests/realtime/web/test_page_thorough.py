@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -160,16 +159,6 @@ def test_the_page_is_small_and_says_what_rounding_costs(page: Page) -> None:
         assert 0.0 < mean < 0.15  # nobody sees a tenth
         assert mean < most
     assert page.left_out == {}
-
-
-def test_only_what_diffracts_light_twice_carries_what_that_takes(page: Page) -> None:
-    text = page.text.partition('id="header" type="application/json">')[2].partition("</script>")[0]
-    surfaces = json.loads(text)["surfaces"]
-    assert len(surfaces) == 2
-    for surface in surfaces:
-        names = {texture["name"] for texture in surface["parts"]["textures"]}
-        carried = {"slope_ratios", "second_coefficients"} & names
-        assert len(carried) == (0 if surface["height_scale"] is None else 2)
 
 
 def test_what_does_not_fit_is_left_out_from_the_last_on(

@@ -24,7 +24,7 @@ CHOOSE = """async ([name, value]) => {
 
 ORANGE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1.0, 0.21586, 0.0]}}
 GOLD: dict[str, Any] = {
-    "int_ior": None, "second_order": None, "pigment": None, "material": "gold",
+    "int_ior": None, "pigment": None, "material": "gold",
 }  # fmt: skip
 
 

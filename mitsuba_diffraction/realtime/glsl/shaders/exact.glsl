@@ -111,9 +111,6 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
         }
         vec2 mean = clamp(moment / max(power, 1e-20), -reach, reach);
         vec2 at = k + mean * shift + vec2(-deviation, deviation);
-#ifdef SECOND_ORDER
-        power *= vec2(second_order(uv, r, at.x, z), second_order(uv, r, at.y, z));
-#endif
         sum += power.x * boundary_at(cos_half, at.x, r, z) * response(at.x, light)
              + power.y * boundary_at(cos_half, at.y, r, z) * response(at.y, light);
     }
@@ -155,9 +152,6 @@ float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
     float apart = sigma * k * r;
     float mirror = order_0_ratio * exp(-order_0_ratio * apart * apart);  // lobe of order 0
     power += mirror * specular;
-#ifdef SECOND_ORDER
-    power += max(power - mirror, 0.0) * (second_order(uv, r, k, z) - 1.0);
-#endif
     float reflected = power * boundary_at(cos_half, k, r, z);
 #ifdef COATED
     reflected += mirror * face_reflected;

@@ -124,12 +124,6 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
     vec3 colour = other_orders(uv, r * r, z) + order_0(r, z);
-#ifdef SECOND_ORDER
-    vec3 factors;
-    for (int n = 0; n < 3; ++n) factors[n] = second_order(uv, r, channel_wavenumbers[n], z);
-    vec3 mirror = abs(order_0(r, 0.0));
-    colour += (colour - clamp(colour, -mirror, mirror)) * (factors - 1.0);
-#endif
     colour = tinted(colour * boundary(cos_half, r, z));
 #ifdef COATED
     colour += face_reflected * order_0(r, 0.0);

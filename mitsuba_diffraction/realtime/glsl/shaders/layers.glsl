@@ -2,7 +2,6 @@
 
 uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
 uniform float height_scale;
-uniform float diffuse_weight;     // weight of the base with layering `thesis`
 
 float patch_area = 1.0;           // square of the factor by which the patch is stretched
 
@@ -67,8 +66,6 @@ vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
     return vec3((1.0 - metallic) * burley(wi, wo));
 #elif !defined(DIFFRACTING)
     return vec3(1.0);
-#elif defined(THESIS)
-    return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;
 #else
     return (1.0 - albedo(wi, rotation)) * (1.0 - albedo(wo, rotation));
 #endif

@@ -21,9 +21,6 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     sum.z *= coat;  // κ is larger by the index of the coat
 #endif
     begin_pair(wi, wo, outer);
-#ifdef SECOND_ORDER
-    begin_second_order(wi, wo);
-#endif
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
              * energy_scale(in_patch(wo, rotation), wo.z);

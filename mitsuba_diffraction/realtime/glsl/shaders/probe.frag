@@ -16,9 +16,6 @@ void main()
 #ifndef ORDERS
     begin_pair(wi, wo, vec2(wi.z, wo.z));
 #endif
-#ifdef SECOND_ORDER
-    begin_second_order(wi, wo);
-#endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
 #ifdef ORDERS

@@ -38,8 +38,6 @@ vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
 #ifdef GLOSS
     return light_colour[light] * gloss(wi, wo);
-#elif defined(THESIS)
-    return (1.0 - diffuse_weight) * diffraction(wi, wo, rotation, light);
 #else
     return diffraction(wi, wo, rotation, light);
 #endif

@@ -205,7 +205,7 @@ class Controls {
     const lines = [`Error of rounded colours: ${losses.join("; ")}; 1 is just visible.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
     for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
-    lines.push("Sliders and materials change direct light; energy is conserved for the scene's material, and the second order is left out of others. Light between surfaces is a mean over small parts of the scene, in the scene's own light. While something moves, a few lights represent all, without it. Lights other than the scene's and moved lights are sets of points, without reflections of their shapes in narrow lobes.");
+    lines.push("Sliders and materials change direct light; energy is conserved for the scene's material. Light between surfaces is a mean over small parts of the scene, in the scene's own light. While something moves, a few lights represent all, without it. Lights other than the scene's and moved lights are sets of points, without reflections of their shapes in narrow lobes.");
     element("about").textContent = lines.join(" ");
   }
 
