@@ -74,13 +74,14 @@ from .energy import DielectricEnergy
 from .materials import Dielectric, Inside
 from .properties import flag
 from .sampling import EVEN, direction_of, with_even_share
-from .surface import DiffractingSurface
+from .surface import DiffractingSurface, interfering
 from .types import (
     Colour,
     Context,
     Float,
     Interaction,
     Mask,
+    Powers,
     Properties,
     Spectrum,
     Vector2f,
@@ -197,7 +198,7 @@ class DiffractionDielectric(DiffractingSurface):
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
         pair = Pair(site.si, wo, site.frame, lit)
-        power = self.geometry(pair) * self._power(site, pair, change)
+        power = self._power(site, pair, change)
         value = self.lobe(ctx, site, pair, self.boundary, power, lit)
         if self.thin:
             value += self._returned(site, pair, change)
@@ -211,13 +212,13 @@ class DiffractionDielectric(DiffractingSurface):
         if self.thin:
             outer = Turned(site.si, wo, site.frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            power = self.geometry(pair) * self._power(site, pair, change)
+            power = self._power(site, pair, change)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
             face = self.face(ctx, site, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             return value, self.power.density(outer, site.scale * n, site.si)
         inner = Turned(site.si, wo, site.frame, lit, n)
-        power = self.geometry(inner) * self._power(site, inner.place, change)
+        power = self._power(site, inner.place, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
         value = self.lobe(ctx, site, inner, self.inner_boundary, power, lit) * dr.square(n)
@@ -236,16 +237,13 @@ class DiffractionDielectric(DiffractingSurface):
         power = self._power(site, point, change)
         ends_factor = dr.safe_sqrt(returned[0] * returned[1])
         factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
-        return mi.depolarizer(power * factor)
+        both = (mi.depolarizer(each * factor) for each in power[:2])
+        return interfering(*both, power.cosine)
 
-    def _power(self, site: Site, point: Pair | TablePoint, change: Colour | None) -> Colour:
+    def _power(self, site: Site, point: Pair | TablePoint, change: Colour | None) -> Powers:
         """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
         power = self.power.power(point, site.scale, site.si)
-        if change is None:
-            return power
-        # Speckle may be dark where the ensemble's order 0 is not
-        zeroth = dr.minimum(self.power.zeroth(point, site.scale, site.si), power)
-        return power + (change - 1.0) * zeroth
+        return power if change is None else power._replace(zeroth=power.zeroth * change)
 
     # ------------------------------------------------------------------ transmission
 
@@ -256,15 +254,14 @@ class DiffractionDielectric(DiffractingSurface):
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        si, scale, point = site.si, site.scale, crossing.place
-        power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
-        zeroth = dr.minimum(zeroth, power)  # speckle may be dark
+        si, point = site.si, crossing.place
+        power = self._power(site, point, change)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
-        value = mi.Spectrum((power - zeroth) * per_w) * others
-        value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
+        rest, mirror = mi.Spectrum(power.others * per_w) * others, mi.Spectrum(power.zeroth) * flat
+        value = interfering(rest, mirror, power.cosine)
         outside = mi.Float(self.area_factor * crossing.frame.area)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo

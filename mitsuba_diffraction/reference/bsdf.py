@@ -25,7 +25,7 @@ from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
 from .integral import window_powers
-from .mirror import horizon_correction
+from .mirror import horizon_correction, interfering
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -97,10 +97,11 @@ def brdf(
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     material = _material(model, index_of(eta, k, light.wavelength, film), coat)
     if material.index is None:
-        others, zeroth = window_powers(field, *light, *window)
+        others, zeroth, cosine = window_powers(field, *light, *window)
         others *= kirchhoff_factor(*light, window.sigmas.orders)
+        zeroth *= horizon_correction(light, window.sigmas.zeroth, None)
         area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
-        return others + zeroth * horizon_correction(light, window.sigmas.zeroth, None) / area
+        return interfering(others, zeroth / area, cosine)
     return _reflected(boundary.unpolarised, field, light, material, window)
 
 
@@ -181,9 +182,10 @@ def _lit(
     if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
         return models.default_brdf(field, light, index, window.sigmas, measure)
     jones = _matrices(field, light, index, material.model)
-    others, zeroth = window_powers(field, *light, *window)
+    others, zeroth, cosine = window_powers(field, *light, *window)
     rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
-    return rest + models.mirrored(light, window.sigmas, zeroth, index, measure)
+    mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
+    return interfering(rest, mirror, cosine)
 
 
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics.geometry import wavenumber
 from . import model
 from .fresnel import amplitudes
-from .mirror import horizon_correction
+from .mirror import horizon_correction, interfering
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -37,7 +37,7 @@ def reflected(
     ----------
     light : outside of the coat.
     index : of the structure relative to the coat.
-    powers : ⟨|P|²⟩ of the structure in the coat, of all orders but 0 and of order 0, (2, n).
+    powers : ⟨|P|²⟩ of the structure in the coat (`integral.window_powers`).
     jones : J of the structure in the coat.
     """
     inside = refracted_light(light, coat)
@@ -52,7 +52,8 @@ def reflected(
     lobe = np.exp(-((sigma_0 * wavenumber(light.wavelength)) ** 2) * np.sum(tangential**2, axis=1))
     flat = 4 * np.pi**2 * sigma**2 * sigma_0**2 * lobe
     face = np.full(len(flat), coat, complex)
-    return others + zeroth + model.mirrored(light, sigmas, flat, face, measure)
+    structure = interfering(others, zeroth, powers[2])
+    return structure + model.mirrored(light, sigmas, flat, face, measure)
 
 
 def refracted(direction: ArrayLike, n: float) -> Real:

@@ -62,3 +62,15 @@ def horizon_correction(light: Any, sigma: float, index: Index | None, bare: bool
         slope = np.clip(-np.log(np.maximum(there, 1e-6)) / SLOPE_AT, 0.0, MOST_SLOPE)
     at_i, at_o = (correction(w[:, 2], sharpness, slope) for w in (light.wi, light.wo))
     return at_i * at_o
+
+
+def interfering(others: Real, mirror: Real, cosine: Real) -> Real:
+    """Return the sum of f of all orders but 0 and of order 0, under one window.
+
+    Mueller matrices add up as powers do, and have the interference of unpolarised light.
+
+    cosine : (n,) of the phase between both; 0 in an ensemble.
+    """
+    a, b = (f if f.ndim == 1 else f[:, 0, 0] for f in (others, mirror))
+    beats = 2.0 * cosine * np.sqrt(a * b) / np.maximum(a + b, 1e-300)
+    return np.asarray(((others + mirror).T * (1.0 + beats)).T)
