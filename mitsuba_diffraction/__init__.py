@@ -44,7 +44,7 @@ import importlib
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from .plugin.llvm import select_llvm
+from .llvm import select_llvm
 
 select_llvm()  # before Dr.Jit picks a library by itself: some would end the process
 

@@ -86,13 +86,6 @@ CLAIMS = (
         VALIDATION,
     ),
     Claim(
-        "the same cuts with `second_order=true`",
-        "6.4 %",
-        "docs/validation.md",
-        line("keratin, cuts of scales, slope 0.2 ", "| 6.4 %,"),
-        VALIDATION,
-    ),
-    Claim(
         "vertical walls deeper than 0.08 of the period, light from 0°: least mean deviation",
         "22 to 73 % in the mean",
         "docs/validation.md",

@@ -8,7 +8,7 @@ from typing import Any
 
 import psutil
 
-from ..plugin.llvm import loaded_llvm_version
+from ..llvm import loaded_llvm_version
 from ..system import cores, processor
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")

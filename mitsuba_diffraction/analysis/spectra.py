@@ -25,10 +25,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, check_choice
+from ..llvm import require_loaded_llvm
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.geometry import kirchhoff_factor, wavenumber
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
-from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
 from .known_wavelengths import check_material

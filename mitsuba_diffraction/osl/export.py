@@ -261,7 +261,7 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
 
     if described.nested is None:
         return 0.0, 0.0, 0.0
-    bsdf, lam = described.nested.bsdf, np.linspace(380.0, 740.0, 36)
+    bsdf, lam = described.nested, np.linspace(380.0, 740.0, 36)
     refusal = (
         "the BSDF beneath the surface has no single diffuse colour, which OSL cannot show; leave "
         "it out, and link its picture to Pigment in Blender"

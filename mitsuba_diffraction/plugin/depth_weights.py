@@ -56,7 +56,7 @@ class DepthWeights:
         value = number(props, DEPTH, 0.0) if value is None else value
         # bounds are of single precision, and so are values but in scalar variants
         ends = (float(np.float32(end)) for end in self.ends)
-        self.depth = Varying(DEPTH, value, *ends, advice=" µm, the depths of the surfaces")
+        self.depth = Varying(DEPTH, value, *ends, unit=" µm", advice=", the depths of the surfaces")
 
     def at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the weights, in the order of the surfaces."""

@@ -53,8 +53,8 @@ class Feature(Enum):
     VARYING_LENGTH = "", "a lateral_scale that varies"
     ORIENTATION = "", "an orientation other than 0"
     VARYING_ORIENTATION = "", "an orientation that varies"
-    NESTED = "", "a BSDF beneath"
-    OPAQUE = "", "a material or layer that absorbs the light that is not reflected"
+    NESTED = "", "a nested BSDF or pigment"
+    OPAQUE = "", "a conductor or layer that absorbs the light that is not reflected"
     COLOURS = "", "an RGB variant, whose light has no wavelengths to tell speckle by"
 
     def phrase(self, model: str = "") -> str:
@@ -107,7 +107,8 @@ class Film:
     thickness: float
 
 
-def _none(height_scale: float) -> DirectionalTable | None:
+def unscaled(height_scale: float) -> DirectionalTable | None:
+    """Return None: all values are 1 at every height scale."""
     return None
 
 
@@ -157,8 +158,8 @@ class Surface:
     coat: float | None = None
     film: Film | None = None
     model: str = ""
-    energy_scale: Callable[[float], DirectionalTable | None] = _none
-    reflected: Callable[[float], DirectionalTable | None] = _none
+    energy_scale: Callable[[float], DirectionalTable | None] = unscaled
+    reflected: Callable[[float], DirectionalTable | None] = unscaled
     nested: BSDF | None = None
     shadowing: bool = False
     transmits: bool = False
@@ -189,6 +190,12 @@ class Surface:
     def shortest_wavelength(self) -> float:
         """Shortest wavelength that the table serves, nm; 0 for solved orders."""
         return 0.0 if self.solved else self.patch.wavelength_range[0]
+
+    @property
+    def wavelengths(self) -> tuple[float, float]:
+        """Shortest and longest wavelength of the light that the table reflects, nm."""
+        table = self.table
+        return table.wavelength_range if isinstance(table, DiffractionTable) else table.reach
 
     def features(self) -> set[Feature]:
         """Return all features that the surface has."""

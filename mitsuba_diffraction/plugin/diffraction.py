@@ -215,7 +215,7 @@ from ..optics.geometry import vcavity
 from . import parameters as read
 from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
-from .description import Feature, Surface
+from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
 from .energy import ReflectedEnergy
 from .layers import UnderCoat
@@ -361,8 +361,8 @@ class Diffraction(DiffractingSurface):
             nested=self.nested,
             shadowing=self.vcavity,
             # shaders have no scale under a coat, where it is near 1
-            **({"energy_scale": energy.scale} if energy.conserving and self.coat is None else {}),
-            **({"reflected": energy.ratio} if energy.beneath else {}),
+            energy_scale=unscaled if self.coat is not None else energy.scale,
+            reflected=energy.ratio,
         )
 
     def shown(self) -> dict[str, Any]:

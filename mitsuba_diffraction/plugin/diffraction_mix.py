@@ -188,7 +188,9 @@ class DiffractionMix(PluginBSDF):
             return [
                 dr.select(active, weight, 0.0) for weight in self.depths.at(si, mi.Mask(active))
             ]
-        explicit = [weight and weight.at(si, active) for weight in self.weights.values()]
+        explicit = [
+            None if weight is None else weight.at(si, active) for weight in self.weights.values()
+        ]
         rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
         weights = [rest if weight is None else weight for weight in explicit]
         total: Float = sum(weights, mi.Float(0.0))

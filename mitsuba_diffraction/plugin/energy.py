@@ -132,16 +132,16 @@ class ReflectedEnergy(EnergyModel):
             yield self._ratio, self._ratio_of
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
-        """Return s on `FINE`, for shaders."""
+        """Return s on `FINE`, for shaders; None where it is 1."""
 
         def fine(energy: Conservation) -> DirectionalTable | None:
             return None if energy.scale is None else energy.scale.on(FINE)
 
-        return self.tabulated(fine, height_scale)
+        return self.tabulated(fine, height_scale) if self.conserving else None
 
     def ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Return the table of `reflected`, for shaders."""
-        return self.tabulated(self._ratio_of, height_scale)
+        """Return the table of `reflected`, for shaders; None where it is 1."""
+        return self.tabulated(self._ratio_of, height_scale) if self.beneath else None
 
     @property
     def scales(self) -> bool:

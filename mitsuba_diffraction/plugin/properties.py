@@ -1,11 +1,8 @@
-"""Words, flags and numbers from Mitsuba's Properties, refused by name; what elements are called."""
+"""Words, flags and numbers from Mitsuba's Properties, refused by name."""
 
 from __future__ import annotations
 
 import math
-import re
-from pathlib import Path
-from typing import Any
 
 from ..errors import DiffractionError, check_choice
 from .types import BSDF, Properties
@@ -43,39 +40,3 @@ def number(props: Properties, name: str, default: float) -> float:
 def class_of(element: BSDF) -> str:
     """Return the class of an element of a scene, for example `SmoothDielectric`."""
     return str(element.class_name())
-
-
-#: What Mitsuba's parser gives to elements without an id, numbered.
-_UNNAMED = "_unnamed"
-# Meshes print the name of their file, plugins that were not given one nothing.
-_FILE = re.compile(r'\w*Mesh\[\s*name = "([^"]+)"')
-
-
-def name_of(element: Any, number: int | None = None) -> str:
-    """An element's id; else its mesh's file, or its kind, and which of the scene's shapes it is.
-
-    Parameters
-    ----------
-    element : of Mitsuba's, with `id()`.
-    number : of a shape, its place in `scene.shapes()`, counted from 0.
-    """
-    scene_id = own_id(element.id())
-    if scene_id:
-        return scene_id
-    file = _FILE.match(str(element))
-    if file:
-        kind = f"the mesh {Path(file[1]).name}"
-    else:
-        kind = f"{_with_article(element.class_name())} without id"
-    return kind if number is None else f"shape {number + 1} ({kind})"
-
-
-def own_id(name: str) -> str:
-    """Return the id that the scene gives, empty if Mitsuba made it up."""
-    return "" if name.startswith(_UNNAMED) else name
-
-
-def _with_article(kind: str) -> str:
-    """`AreaLight` as "an area light"."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
-    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"

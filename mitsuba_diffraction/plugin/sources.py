@@ -75,7 +75,10 @@ _providers: list[TableProvider] = [lambda request: request.cached(request.settin
 
 @contextmanager
 def tables_by(provider: TableProvider) -> Iterator[None]:
-    """Let a provider choose the tables of all scenes that are loaded inside."""
+    """Let a provider choose the tables of all scenes that are loaded inside.
+
+    In all threads: Mitsuba's own, which make the BSDFs of a scene, inherit no context variables.
+    """
     _providers.append(provider)
     try:
         yield

@@ -79,7 +79,7 @@ class DiffractingSurface(SurfaceBSDF):
         stretch = self.lateral_scale.of_table
         self.table, self.heights = read.read_patch(props, largest * optical, stretch)
         most = largest if varies else self.table.height_scale_max / optical
-        advice = "; load the plugin anew with that height_scale"
+        advice = ", the table's range; load the plugin anew with that height_scale"
         self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)
         self.orientation = read.orientation_of(props)
         self.wavelength = read.mono_wavelength(props, self.table.wavelength_range)
@@ -187,7 +187,8 @@ class DiffractingSurface(SurfaceBSDF):
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
         yield self.height_scale.refusal()
-        yield self.lateral_scale.factor and self.lateral_scale.factor.refusal()
+        if self.lateral_scale.factor is not None:
+            yield self.lateral_scale.factor.refusal()
         yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:

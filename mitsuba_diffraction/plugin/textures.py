@@ -1,13 +1,8 @@
-"""Orientation of the patch, and checks of textures and mesh attributes.
-
-A BSDF cannot see whether the shape has the attributes that it reads: `check_attributes` does.
-"""
+"""Orientation of the patch, and checks of textures."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -16,75 +11,21 @@ import numpy as np
 from ..errors import DiffractionError
 from .arithmetic import plain
 from .description import Quantity
-from .meshes import has_texcoords
 from .parameter_changes import Bounded, Changeable, ObjectValues
-from .properties import name_of
 from .types import Interaction, Mask, Rotation, Texture
-
-#: What `meshes.write_ply` calls a field of directions.
-ORIENTATION = "vertex_orientation"
-
-#: Of the plugin's `to_string`, where its windows follow places.
-PLACED = "coherence = surface"
 
 #: Points a side of the unit square of UV coordinates at which procedural textures are checked.
 _POINTS = 32
 
-_MADE = "make it with the command 'tangents MESH -o FIELD.ply', and use that file"
-_READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
-_STRETCHES = re.compile(r'lateral_scale = MeshAttribute\[\s*name = "([^"]+)"')
-
-
-def check_attributes(shape: Any, number: int | None = None) -> None:
-    """Refuse a shape that lacks a mesh attribute or the UV coordinates that its BSDF reads.
-
-    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
-    coordinates of each triangle.
-
-    Parameters
-    ----------
-    shape : `mi.Shape` of the variant that is set.
-    number : its place among the scene's shapes, counted from 0, to name one without an id.
-
-    Raises a DiffractionError that names the attribute, and the way to get one of directions.
-    """
-    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not has_texcoords(shape):
-        raise DiffractionError(
-            f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
-            "places on the surface; unwrap it, or use coherence='ensemble'"
-        )
-    stretching = _STRETCHES.findall(str(shape.bsdf()))
-    for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
-        if np.all(shape.has_attribute(name)):
-            if name in stretching and (least := _least(shape, name)) <= 0.0:
-                raise DiffractionError(
-                    f"{name_of(shape, number)}: lateral_scale reads the attribute {name}, whose "
-                    f"least number is {least:g}; factors must be above 0"
-                )
-            continue
-        if not shape.is_mesh():
-            remedy = "only meshes have any: leave the texture out, or use a mesh"
-        else:
-            added = "add it to the mesh's file, or correct the name"
-            remedy = _MADE if name == ORIENTATION else added
-        raise DiffractionError(
-            f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
-        )
-
-
-def _least(shape: Any, name: str) -> float:
-    """Return the least number of a mesh attribute."""
-    return float(np.array(mi.traverse(shape)[name]).min())
-
 
 def is_bitmap(texture: Texture) -> bool:
     """Whether a texture is a bitmap, whose values can be read."""
-    return str(texture).startswith("BitmapTexture[")
+    return str(texture.class_name()).startswith("BitmapTexture")
 
 
 def is_attribute(texture: Texture) -> bool:
     """Whether a texture is a mesh attribute, which has values on that mesh only."""
-    return str(texture).startswith("MeshAttribute[")
+    return str(texture.class_name()) == "MeshAttribute"
 
 
 def range_of(texture: Texture) -> tuple[float, float] | None:

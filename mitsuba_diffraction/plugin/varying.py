@@ -33,7 +33,7 @@ class Varying:
     value : number or raw texture of one channel.
     low, high : bounds; a texture's numbers are clamped to them.
     positive : whether the number must be above 0, where `low` is; a texture's 0 is a tiny number.
-    advice : end of the message on a number out of bounds.
+    unit : of the number, for messages; advice : end of the message on a number out of bounds.
 
     Attributes
     ----------
@@ -51,9 +51,11 @@ class Varying:
         high: float,
         *,
         positive: bool = False,
+        unit: str = "",
         advice: str = "",
     ) -> None:
-        self.name, self.low, self.high, self._advice = name, low, high, advice
+        self.name, self.low, self.high = name, low, high
+        self._unit, self._advice = unit, advice
         self._least = LEAST_SCALE if positive and low == 0.0 else low
         self.texture = value if isinstance(value, mi.Texture) else None
         self.changeable: tuple[Changeable, ...]
@@ -103,12 +105,17 @@ class Varying:
             return None
         # to single precision; procedural textures are clipped, as the documentation says
         high = known[1] if is_bitmap(self.texture) else min(known[1], self.high)
-        wrong = [x for x in (known[0], high) if not self.low <= x <= self.high * (1.0 + 1e-6)]
-        return self._message(wrong[0]) if wrong else None
+        if self.low <= known[0] and high <= self.high * (1.0 + 1e-6):
+            return None
+        return (
+            f"{self.name}: the texture's numbers go from {known[0]:g} to {known[1]:g}{self._unit}; "
+            f"they must be between {self.low:g} and {self.high:g}{self._unit}"
+        )
 
     def _message(self, value: float) -> str:
-        low = "above 0" if self._least > self.low else f"{self.low:g}"
-        return f"{self.name}={value:g} must be {low} to {self.high:g}{self._advice}"
+        low = "above 0" if self._least > self.low else f"at least {self.low:g}{self._unit}"
+        bounds = f"{low} and at most {self.high:g}{self._unit}{self._advice}"
+        return f"{self.name}={value:g}{self._unit} must be {bounds}"
 
     def __str__(self) -> str:
         return f"{self.number:g}" if self.texture is None else " ".join(str(self.texture).split())
@@ -176,7 +183,7 @@ class LateralScale:
         self.factor: Varying | None = None
         if name in props:
             high = largest if isinstance(value, mi.Texture) else self.of_table
-            advice = "; load the plugin anew with that lateral_scale_max"
+            advice = ", the table's range; load the plugin anew with that lateral_scale_max"
             self.factor = Varying(name, value, LEAST_STRETCH, high, advice=advice)
 
     def over_table(self, si: Interaction, active: Mask) -> Float:

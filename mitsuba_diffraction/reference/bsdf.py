@@ -7,7 +7,7 @@ its equation (4).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,7 +34,8 @@ Complex = NDArray[np.complex128]
 Measure = Callable[[Complex], Real]
 
 
-class Material(NamedTuple):
+@dataclass(frozen=True)
+class Material:
     """Material of a surface, and the model of its boundary.
 
     Attributes

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import functools
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,9 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, warn
-from ..plugin.description import describe
-from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest
-from ..tables.orders import CrossedTable, OrderTable
+from ..plugin.description import Surface
+from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest, tables_by
 from ..tables.table import DiffractionTable
 
 # Parameters of a film that its size and format follow from.
@@ -25,8 +22,6 @@ _KEPT = (
     "sample_border",
 )  # fmt: skip
 
-#: Kind and wavelengths of a table, as `to_string` of the plugins shows them.
-_SERVED = re.compile(r"\btable = (\w+).*\s+wavelengths = (\S+) to (\S+) nm")
 #: Wavelengths, nm, by which a film may exceed a table without a warning: rounding of both.
 _MARGIN = 0.5
 
@@ -79,9 +74,6 @@ def wider_tables(first: float) -> Iterator[None]:
 
     first : nm; default tables begin at 360.
     """
-    from ..plugin.diffraction import Diffraction
-    from ..plugin.diffraction_dielectric import DiffractionDielectric
-
     first = min(first, SHORTEST_WAVELENGTH)
 
     def table(request: TableRequest) -> DiffractionTable:
@@ -89,32 +81,32 @@ def wider_tables(first: float) -> Iterator[None]:
         wider = replace(request.settings, wavelength_range=(min(first, low), last))
         return request.cached(wider)
 
-    def make(kind: Callable[..., Any], props: Any) -> Any:
-        bsdf = kind(props, table)
-        shortest = getattr(describe(bsdf), "shortest_wavelength", 0.0)
+    with tables_by(table):
+        yield
+
+
+def check_bands(bands: Bands, surfaces: Mapping[str, Sequence[Surface]]) -> None:
+    """Refuse a table of heights, a file, that begins above the light that bands respond to.
+
+    surfaces : surfaces that diffract, by the names of their shapes.
+    """
+    first = min(bands.first, SHORTEST_WAVELENGTH)
+    for name, described in surfaces.items():
+        shortest = max(surface.shortest_wavelength for surface in described)
         if shortest > first:
             raise DiffractionError(
-                f"the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; give "
-                f"heights, or DiffractionTable.build(wavelength_range=({first:g}, 830))"
+                f"{name}: the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; "
+                f"give heights, or DiffractionTable.build(wavelength_range=({first:g}, 830))"
             )
-        return bsdf
-
-    kinds = {"diffraction": Diffraction, "diffraction_dielectric": DiffractionDielectric}
-    for name, kind in kinds.items():
-        mi.register_bsdf(name, functools.partial(make, kind))
-    try:
-        yield
-    finally:
-        for name, kind in kinds.items():
-            mi.register_bsdf(name, kind)
 
 
-def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> None:
+def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]]) -> None:
     """Warn of each surface that is black at wavelengths that a camera records.
 
     Colours need no warning: tables that miss visible light are refused or named when they load.
 
-    sensors : cameras of the scene; surfaces : BSDFs that diffract, by the names of their shapes.
+    sensors : cameras of the scene.
+    surfaces : surfaces that diffract, by the names of their shapes.
     """
     # spectral variants alone use a film's own responses
     banded = [
@@ -124,16 +116,15 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Any]) -> N
     if not ranges:
         return
     first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
-    for name, bsdf in surfaces.items():
-        for kind, low, high in dict.fromkeys(_SERVED.findall(str(bsdf))):
-            least, most = min(first, float(low)), max(last, float(high))
-            if least < float(low) - _MARGIN or most > float(high) + _MARGIN:
+    for name, described in surfaces.items():
+        for solved, (low, high) in dict.fromkeys((s.solved, s.wavelengths) for s in described):
+            least, most = min(first, low), max(last, high)
+            if least < low - _MARGIN or most > high + _MARGIN:
                 wider = f"DiffractionTable.build(wavelength_range=({least:.4g}, {most:.4g}))"
-                if kind in (OrderTable.__name__, CrossedTable.__name__):
-                    wider = "a wider range of wavelengths"
                 warn(
-                    f"{name} is black outside {low} to {high} nm, the range of its table, and the "
-                    f"camera records {first:.4g} to {last:.4g} nm; make the table with {wider}"
+                    f"{name} is black outside {low:.4g} to {high:.4g} nm, the range of its table, "
+                    f"and the camera records {first:.4g} to {last:.4g} nm; make the table with "
+                    f"{'a wider range of wavelengths' if solved else wider}"
                 )
 
 

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
-from ..plugin.meshes import has_texcoords
-from ..plugin.properties import name_of
-from ..plugin.textures import check_attributes
+from ..llvm import require_llvm
 from ..system import memory
+from .elements import check_attributes, name_of, surfaces_within
+from .meshes import has_texcoords
 from .parameters import check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
@@ -79,9 +79,7 @@ def set_variant(name: str | None) -> str:
             f"{name.replace(backend, 'llvm', 1)}, or install the driver of the GPU"
         )
     if backend == "llvm":
-        from ..plugin.llvm import require_llvm  # an unsuitable LLVM ends the process
-
-        require_llvm()
+        require_llvm()  # an unsuitable LLVM ends the process
     mi.set_variant(name)
     return name
 
@@ -103,7 +101,7 @@ def load_scene(
     import mitsuba as mi
 
     from .additions import split_values
-    from .bands import warn_of_dark_bands, wider_tables
+    from .bands import check_bands, warn_of_dark_bands, wider_tables
     from .orbit import turn_cameras
 
     readable_file(file)
@@ -121,17 +119,16 @@ def load_scene(
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # Found inside twosided, blendbsdf and the like, too
-    surfaces = {
-        number: shape
-        for number, shape in enumerate(scene.shapes())
-        if re.search(r"Diffraction(Dielectric|Orders)?\[", str(shape.bsdf()))
-    }
+    within = {n: surfaces_within(shape.bsdf()) for n, shape in enumerate(scene.shapes())}
+    surfaces = {n: shape for n, shape in enumerate(scene.shapes()) if within[n]}
     for number, shape in surfaces.items():
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
     if values.orbit:
         turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
-    named = {name_of(shape, number): shape.bsdf() for number, shape in surfaces.items()}
+    named = {name_of(shape, number): within[number] for number, shape in surfaces.items()}
+    if bands is not None:
+        check_bands(bands, named)
     warn_of_dark_bands(scene.sensors(), named)
     return scene
 

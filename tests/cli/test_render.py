@@ -22,4 +22,5 @@ def test_a_scene_that_names_a_retired_parameter_is_rendered(run, heights, here, 
         ran = run("render", file, *QUICK, "-s", "1", "-o", file.replace("xml", "exr"))
         assert ran.code == 0
         assert ran.err.count(f"{name} is no longer a parameter") == (file == "old.xml")
-    assert np.array_equal(pixels("old.exr"), pixels("new.exr"))
+    # threads add the samples of a pixel in any order, in single precision
+    np.testing.assert_allclose(pixels("old.exr"), pixels("new.exr"), rtol=1e-5)

@@ -73,7 +73,7 @@ _HAVE_OPTIONS = (
     "osl/blender_material.py",
     "realtime/glsl/viewer.py",
     "cluster/workers.py",
-    "plugin/llvm.py",
+    "llvm.py",
     "heights/load.py",
 )
 

@@ -21,7 +21,7 @@ from mitsuba_diffraction.osl.patch import (
     interpolated,
     patch_textures,
 )
-from mitsuba_diffraction.plugin.description import Energy, Quantity, Surface
+from mitsuba_diffraction.plugin.description import Quantity, Surface
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.tables.powers import powers_at
 from tests.support.patches import DEEP, DEFAULTS, PATCH, SMALL_SCAN
@@ -37,7 +37,7 @@ def scale_of(height_scale):
 
 ENERGETIC = Surface(
     md.DiffractionTable.build(PATCH, **DEFAULTS, height_scale_max=1.5), "mirror", 4.5,
-    Quantity(0.0), energy=Energy(scale_of, lambda height_scale: None),
+    Quantity(0.0), energy_scale=scale_of,
 )  # fmt: skip
 TABLE = md.DiffractionTable.build(DEEP, **DEFAULTS)
 TEXTURES = patch_textures(TABLE)

@@ -51,7 +51,7 @@ def test_a_height_scale_beyond_the_table_is_a_named_error(some_variant, scale):
     with pytest.raises((md.DiffractionError, RuntimeError)) as caught:
         parameters.update()
     *_, line = str(caught.value).splitlines()
-    assert "is outside the table's range, above 0 and up to 1.5; load the plugin anew" in line
+    assert "must be above 0 and at most 1.5, the table's range; load the plugin anew" in line
 
 
 @pytest.mark.parametrize(

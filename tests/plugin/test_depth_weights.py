@@ -90,7 +90,7 @@ def test_the_depth_changes(variant):
     parameters.update()
     assert "0.3 µm" in str(bsdf)
     parameters["depth"] = 0.5
-    with pytest.raises(Exception, match=r"0\.1 to 0\.4 µm"):
+    with pytest.raises(Exception, match=r"at most 0\.4 µm"):
         parameters.update()
 
 
@@ -102,7 +102,7 @@ def named(**change):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"depth": 0.5}, r"depth=0\.5 µm must be 0\.1 to 0\.4 µm"),
+        ({"depth": 0.5}, r"depth=0\.5 µm must be at least 0\.1 µm and at most 0\.4 µm"),
         ({"depth": "deep"}, "must be"),
         ({"weight_deep": 0.5}, "takes no weights beside depth"),
         ({"deep": grating(0.2, 0.5)}, r"both 0\.2 µm deep"),

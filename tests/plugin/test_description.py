@@ -16,11 +16,9 @@ from mitsuba_diffraction.analysis.maps.evaluate import MAPS
 from mitsuba_diffraction.analysis.spectra import SPECTRA
 from mitsuba_diffraction.osl.export import OSL, shader_of
 from mitsuba_diffraction.plugin.description import (
-    Energy,
     Feature,
     Film,
     Material,
-    Nested,
     Quantity,
     Surface,
     describe,
@@ -41,7 +39,7 @@ from tests.support.patches import DEFAULTS, PATCH
 
 ALL = [GLSL, SHADER, OSL, MAPS, SPECTRA, *CONSUMERS.values()]
 TABLE = md.DiffractionTable.build(PATCH, **DEFAULTS)
-TEXTURE = object()  # stands for a texture of Mitsuba, which features do not read
+TEXTURE = object()  # stands for an object of Mitsuba, which features do not read
 
 
 def half(height_scale: float) -> DirectionalTable:
@@ -67,7 +65,7 @@ CHANGES: Mapping[Feature, dict] = {
     Feature.FILM: {"film": Film(1.3 + 0j, 100.0)},
     Feature.KIRCHHOFF: {"model": "kirchhoff"},
     Feature.OWN_MODEL: {"model": "level"},
-    Feature.ENERGY_SCALE: {"energy": Energy(half, lambda scale: None)},
+    Feature.ENERGY_SCALE: {"energy_scale": half},
     Feature.SHADOWING: {"shadowing": True},
     Feature.PATCH: {"coherence": "patch"},
     Feature.PLACED: {"coherence": "surface"},
@@ -77,7 +75,7 @@ CHANGES: Mapping[Feature, dict] = {
     Feature.VARYING_LENGTH: {"lateral_scale": Quantity(1.0, TEXTURE)},
     Feature.ORIENTATION: {"orientation": Quantity(30.0)},
     Feature.VARYING_ORIENTATION: {"orientation": Quantity(0.0, TEXTURE)},
-    Feature.NESTED: {"nested": Nested(None)},
+    Feature.NESTED: {"nested": TEXTURE},
 }
 
 
@@ -107,7 +105,7 @@ def test_consumer_shows_a_feature_or_refuses_it_in_one_line(chosen, consumer):
 
 def of_osl(described: Surface) -> object:
     if described.nested is not None:
-        described = replace(described, nested=Nested(mi.load_dict({"type": "diffuse"})))
+        described = replace(described, nested=mi.load_dict({"type": "diffuse"}))
     shader = shader_of(described)
     arrays = {name: pixels.tobytes() for name, pixels in shader.textures.items()}
     return shader.formulas, shader.constants, list(shader.arrays), shader.sockets, arrays
@@ -121,11 +119,11 @@ def of_shaders(described: Surface) -> object:
     return packed.uniforms, packed.definitions, textures, scale, axis
 
 
-#: Features of tables, mixes, textures and users' models: tests of these show them.
+#: Features of tables, mixes, textures, users' models and variants: tests of these show them.
 ELSEWHERE = {
     Feature.HEIGHTS, Feature.ORDERS, Feature.MIX, Feature.LIMITED, Feature.PATCH,
     Feature.VARYING_WEIGHTS, Feature.VARYING_LENGTH, Feature.VARYING_ORIENTATION,
-    Feature.DIELECTRIC, Feature.SMALL_SLOPE, Feature.OWN_MODEL,
+    Feature.DIELECTRIC, Feature.SMALL_SLOPE, Feature.OWN_MODEL, Feature.OPAQUE, Feature.COLOURS,
 }  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def test_films_that_are_none_leave_the_surface_bare(some_variant, material, mode
 
 @pytest.mark.parametrize(
     ("depth", "thickness", "warned"),
-    [(0.1, 700.0, True), (0.08, 700.0, False), (0.1, 400.0, False)],
+    [(0.08, 700.0, True), (0.06, 700.0, False), (0.1, 400.0, False)],
 )
 def test_where_the_model_does_not_follow_the_fringes_it_says_so(
     some_variant, depth, thickness, warned

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
+from mitsuba_diffraction.plugin.conductors import tabulated_index
 from tests.support.directions import as_single, polar, uniform_directions
 from tests.support.lanes import evaluated, interaction, refusal, spectra
 
@@ -132,3 +136,19 @@ def test_a_material_whose_table_ends_amid_the_spectrum_is_refused_in_one_line(so
     line = refusal(lambda: load(material="AlSb"))
     for word in ("AlSb", "302.4", "590.4", "eta and k"):
         assert word in line
+
+
+@pytest.mark.parametrize("thickness", [20.0, 60.0, 400.0])
+def test_colours_of_a_film_on_a_metal_are_those_of_its_spectrum(thickness):
+    mi.set_variant("llvm_ad_rgb")
+    wavelengths = np.arange(390.0, 711.0)
+    film = Filmed(
+        np.interp(wavelengths, *tabulated_index("Al")), 1.77, 2 * np.pi * thickness / wavelengths
+    )
+    weights = linear_srgb(response(wavelengths))
+    expected = normal_reflectance(film) @ (weights / weights.sum(axis=0))
+    bsdf = load(material="Al", film_ior=1.77, film_thickness=thickness)
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    found = np.array(bsdf.eval_diffuse_reflectance(si)).ravel()
+    # aluminium's index, linear between three colours; of equal energy instead of daylight 2 to 4 %
+    assert found == pytest.approx(expected, rel=5e-3)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.plugin.textures import check_attributes
+from mitsuba_diffraction.scene.elements import check_attributes
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import refusal, vectors
@@ -101,7 +101,7 @@ def test_derivatives_with_respect_to_factors_are_those_of_differences(mono):
     [
         ({"height_scale": partial(bitmap, -FACTORS)}, "largest factor, -0, must be above 0"),
         ({"height_scale": partial(bitmap, FACTORS * np.nan)}, "largest factor, nan, must be"),
-        ({"height_scale": partial(bitmap, FACTORS - 1.0)}, "factors go from -1 to 0.25"),
+        ({"height_scale": partial(bitmap, FACTORS - 1.0)}, "numbers go from -1 to 0.25"),
         ({"height_scale": partial(bitmap, 2e3 * FACTORS)}, "must be"),
         ({"height_scale": bitmap, "height_scale_max": 1.0}, "must be between 0 and 1"),
         ({"height_scale": partial(bitmap, raw=False)}, "the bitmap is not raw"),

@@ -10,7 +10,7 @@ import ctypes
 import os
 from pathlib import Path
 
-from mitsuba_diffraction.plugin.llvm import VARIABLE as LIBRARY
+from mitsuba_diffraction.llvm import VARIABLE as LIBRARY
 
 
 def compile_quickly() -> int:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.plugin import llvm
-from mitsuba_diffraction.plugin.llvm import Library
+from mitsuba_diffraction import llvm
+from mitsuba_diffraction.llvm import Library
 
 HERE = [Library.at(path) for path in llvm.in_folders()]
 

@@ -32,7 +32,6 @@ DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
 KIRCHHOFF = "diffraction, kirchhoff"
 KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
-SECOND_ORDER = "diffraction, second_order=true"
 COARSE = "diffraction, tolerance 1e-2"
 ONE_WINDOW = "diffraction, patch"
 ON_SURFACE = "diffraction, surface"
@@ -109,7 +108,6 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         KIRCHHOFF: ours("default", model="kirchhoff"),
         DEFAULT_AL: ours("default", material="Al"),
         KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
-        SECOND_ORDER: ours("default", second_order=True),
         COARSE: ours("1e-2"),
         ONE_WINDOW: ours("patch"),
         ON_SURFACE: ours("patch", coherence="surface", uv_scale=1e4),

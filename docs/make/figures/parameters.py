@@ -25,7 +25,7 @@ _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
 PLUGINS = {
     "diffraction": _FOLDER / "diffraction.py",
-    "diffraction_dielectric": _FOLDER / "transmission/diffraction_dielectric.py",
+    "diffraction_dielectric": _FOLDER / "diffraction_dielectric.py",
     "diffraction_orders": _FOLDER / "orders/diffraction_orders.py",
 }
 

@@ -25,8 +25,6 @@ models           deviations of Kirchhoff, small slope and their blend
 goals            goals of the default, and deviations beside them
 limits           slopes at which the package warns
 cells            deviations in two dimensions
-second_order     exact second order of small slope
-second_order_factor  second order as the factor that tables hold
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from .compare import GRAZING
 from .model import efficiencies, jones_of, shares
 from .patch_solutions import Solved, solved
-from .patches import KINDS, PatchCase, cell, patch_index, ratios_of
+from .patches import KINDS, PatchCase, cell, patch_index
 
-_MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
-_POLARISED = ("kirchhoff", "first_order", "small_slope")
+_MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
+_POLARISED = ("kirchhoff", "small_slope")
 
 
 @dataclass(frozen=True)
 class PatchComparison:
     """Deviations of colours of each model, of s and p light, and the change of the solution.
 
-    `by_model` has Kirchhoff, small slope alone, the default in the first order and the default;
-    `polarised` all but the second of them for incident s, then p light.
+    `by_model` has Kirchhoff, small slope alone and the default; `polarised` the first and the last
+    of them for incident s, then p light.
     """
 
     case: PatchCase
@@ -88,11 +88,7 @@ def _compare(solution: Solved) -> PatchComparison:
     keep = coloured & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     truth = solution.efficiency(field)[keep]
     light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
-    powers = {
-        model: efficiencies(*light, model, sigma=sigma, ratios=ratios_of(case.surface))
-        for model in _MODELS
-    }
-    powers = {model: power[keep] for model, power in powers.items()}
+    powers = {model: efficiencies(*light, model, sigma=sigma)[keep] for model in _MODELS}
     by_model = {model: _deviation(power, truth) for model, power in powers.items()}
     exact = np.sum(np.abs(solution.rows["jones"]) ** 2, axis=1) * (wo[:, 2] / wi[2])[:, None]
     polarised = {}

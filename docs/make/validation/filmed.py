@@ -24,10 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.blend import ScaleRoughness
-from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.mean_second_order import mean_gain
 from mitsuba_diffraction.progress import Progress, silent
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
@@ -73,8 +70,6 @@ ANGLES = (0.0, 30.0, 60.0)
 #: Highest order of the expansion: first and finally.
 _HARMONICS = (14, 18)
 _PIXELS = 256
-#: The default model without the mean of the second order.
-FIRST = "first order"
 
 
 def name() -> str:
@@ -179,26 +174,20 @@ def deviations(stack: Stack, model: str) -> Real:
 
 @dataclass(frozen=True)
 class FilmDeviations:
-    """Deviations of colours under a film by three models, each (gratings, angles)."""
+    """Deviations of colours under a film by both models, each (gratings, angles)."""
 
     stack: Stack
     kirchhoff: Real
-    first_order: Real
     default: Real
 
 
 def compare_models(stack: Stack) -> FilmDeviations:
-    """Compare three models with the stored solutions of a film."""
-    return FilmDeviations(
-        stack, *(deviations(stack, model) for model in ("kirchhoff", FIRST, "small_slope"))
-    )
+    """Compare both models with the stored solutions of a film."""
+    return FilmDeviations(stack, deviations(stack, "kirchhoff"), deviations(stack, "small_slope"))
 
 
 def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, model: str) -> Real:
     """The model's efficiencies of the orders, for unpolarised light."""
-    if model == FIRST:
-        default = model_of(grating, stack, theta, wavelength, "small_slope")
-        return default / _of_mean(grating, stack, theta, wavelength)
     _, sines = order_sines(grating.period, wavelength, theta)
     sigma, index = lobe_sigma(grating), stack.index[wavelength]
     brdf = reference.brdf(
@@ -209,24 +198,12 @@ def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, mo
     return np.asarray(brdf * np.pi / (sigma * float(wavenumber(wavelength))) ** 2)
 
 
-def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) -> Real:
-    """g(ωi) g(ωo) of the orders, by which the default model differs from its first order."""
-    field, k = grating.heights(), float(wavenumber(wavelength))
-    film = Filmed(stack.index[wavelength], stack.film, k * stack.thickness * 1e-3)
-    _, sines = order_sines(grating.period, wavelength, theta)
-    cosines = np.sqrt(1.0 - np.append(sines, np.sin(np.radians(theta))) ** 2)
-    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
-    gains = mean_gain(cosines, film, roughness, k)
-    return np.asarray(gains[:-1] * gains[-1])
-
-
 class Beyond(NamedTuple):
-    """Deviations under lacquer on a sinusoid of 2.5 µm at 60°; thickness in nm, depth in µm."""
+    """Deviation under lacquer on a sinusoid of 2.5 µm at 60°; thickness in nm, depth in µm."""
 
     thickness: float
     depth: float
-    first_order: float
-    default: float
+    deviation: float
 
 
 def beyond() -> list[Beyond]:
@@ -235,14 +212,14 @@ def beyond() -> list[Beyond]:
     compared = []
     for thickness, depth in ((700.0, 0.12), (1400.0, 0.05), (1400.0, 0.08)):
         stack, grating = replace(lacquer, thickness=thickness), Grating("sinusoidal", 2.5, depth)
-        sums = np.zeros((2, 2))
+        off = light = 0.0
         for wavelength in FEW_WAVELENGTHS:
             exact = solve(grating, stack, theta, wavelength, _HARMONICS[-1]).mean(axis=0)
             counted = _counted(*order_sines(grating.period, wavelength, theta))
-            for n, model in enumerate((FIRST, "small_slope")):
-                off = np.abs(model_of(grating, stack, theta, wavelength, model) - exact)[counted]
-                sums[n] += off.sum(), exact[counted].sum()
-        compared.append(Beyond(thickness, depth, *(float(off / light) for off, light in sums)))
+            found = model_of(grating, stack, theta, wavelength, "small_slope")
+            off += float(np.abs(found - exact)[counted].sum())
+            light += float(exact[counted].sum())
+        compared.append(Beyond(thickness, depth, off / light))
     return compared
 
 

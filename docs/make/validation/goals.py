@@ -101,20 +101,19 @@ class Goal(NamedTuple):
     band: tuple[float, float]
     goal: float
     kirchhoff: float
-    first_order: float
-    second_order: float
+    default: float
 
 
 def keratin_goals(sides: Sides) -> list[Goal]:
     """Goals on gratings of keratin beside what each model reaches."""
-    kirchhoff, first, second = (
+    kirchhoff, default = (
         {(profile, band): values[0] for profile, band, values in banded(part, [60.0])}
-        for part in (sides["keratin", name] for name in ("kirchhoff", "first_order", "small_slope"))
+        for part in (sides["keratin", name] for name in ("kirchhoff", "small_slope"))
     )
     return [
-        Goal(*key, goal, kirchhoff[key], first[key], second[key])
+        Goal(*key, goal, kirchhoff[key], default[key])
         for key, goal in KERATIN.items()
-        if key in second
+        if key in default
     ]
 
 

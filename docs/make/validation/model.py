@@ -10,8 +10,7 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
     η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
 For a mirror this is R; for m = 0 of any grating R·|a_0|². Kirchhoff's model has
-R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.boundary`. The
-default has the second order on dielectrics, from what a table holds of it: `second_order`.
+R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.boundary`.
 """
 
 from __future__ import annotations
@@ -23,10 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import blend
-from mitsuba_diffraction.optics.colour import SHORTEST
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.second_order import factor, interpolated
-from mitsuba_diffraction.optics.slope_ratios import CellGrid, CellSums, SlopeRatios
 from mitsuba_diffraction.reference import boundary
 
 from .cases import PIXELS, Grating, index_of, order_sines
@@ -34,11 +30,8 @@ from .cases import PIXELS, Grating, index_of, order_sines
 # Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
 _SIGMA_PER_PERIOD = 1.0
 
-#: The default, of which dielectrics have the second order.
-DEFAULT = "small_slope"
-#: As the plugin has them, and the default in the first order, the small-slope matrix alone, or in
-#: equal parts with Kirchhoff.
-MODELS = (*reference.MODELS, "first_order", "small_slope_alone", "half_and_half")
+#: As the plugin has them, and the small-slope matrix alone, or in equal parts with Kirchhoff.
+MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
 
 
 def order_efficiencies(
@@ -78,7 +71,6 @@ def efficiencies(
     *,
     sigma: float,
     coat: float | None = None,
-    ratios: SlopeRatios | None = None,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -88,22 +80,17 @@ def efficiencies(
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     model : of `MODELS`.
     sigma : of a window (µm) through which the lobes are separate.
-    ratios : slope ratios of the second order; the surface's own by default.
     """
     width = WIDTHS_PER_SIGMA * sigma
     per_brdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
     if index is None:
         return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
-    if model == DEFAULT and not index.imag and coat is None:
-        first = efficiencies(field, index, wi, wo, wavelength, "first_order", sigma=sigma)
-        return first * second_order(field, index.real, wi, wo, wavelength, ratios)
-    known = DEFAULT if model in (DEFAULT, "first_order") else "kirchhoff"
+    known = model if model in reference.MODELS else "kirchhoff"
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
         coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
-        second_order=False,
     )  # fmt: skip
-    if model in (*reference.MODELS, "first_order"):
+    if model == known:
         return brdf
     # what Kirchhoff's matrix weighs, replaced
     alone, tangent = (
@@ -143,30 +130,6 @@ def share_of(
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
     return np.asarray(boundary.small_slope_weight(k * total[:, 2], variance, index))
-
-
-def second_order(
-    field: HeightField,
-    index: float,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: float,
-    ratios: SlopeRatios | None = None,
-) -> NDArray[np.float64]:
-    """Factor of the second order on orders of a dielectric, (n,); arguments as `efficiencies`."""
-    total = float(wavenumber(wavelength)) * (wi + wo)
-    places = (ratios or slope_ratios(field)).at(total[:, :2], total[:, 2])
-    places[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
-    share = share_of(field, index, wi, wo, wavelength)
-    return factor(interpolated(index, wi, wo), places, share)
-
-
-@cache
-def slope_ratios(patch: HeightField) -> SlopeRatios:
-    """Return the slope ratios of a patch that tiles the plane."""
-    q_limit = 2.0 * float(wavenumber(SHORTEST))
-    grid = CellGrid.for_patches(patch.extent, patch.rms_height, q_limit)
-    return CellSums.of_patches([(patch, np.ones((1, 1)))], grid).ratios()
 
 
 @cache

@@ -19,16 +19,11 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.heights.preprocess import periodic_smooth
-from mitsuba_diffraction.optics.slope_ratios import SlopeRatios
 
 from .cases import ALUMINIUM, KERATIN
-from .model import slope_ratios
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
-#: Kinds whose cell is the whole surface, not a cut of a patch.
-GRATINGS = ("sinusoid", "crossed")
-
-#: Cuts of the measured patch, which is no part of the project, and slope ratios of all of it.
+#: Cuts of the measured patch, which is no part of the project.
 _MEASURED = "measured_scale.npz"
 
 #: Pixels along each side of a cut or a crossed grating, and along a sinusoid.
@@ -71,11 +66,10 @@ class PatchCase:
 
 @dataclass(frozen=True)
 class Cut:
-    """Heights of a cut and its side, both in µm, and slope ratios of the whole patch."""
+    """Heights of a cut and its side, both in µm."""
 
     heights: NDArray[np.float64]
     side: float
-    ratios: SlopeRatios
 
 
 #: Slopes of the sinusoids are those of 2.5/0.05 and 1.6/0.1 µm.
@@ -137,20 +131,10 @@ def cell(surface: Surface) -> HeightField:
     return HeightField(heights, side / PIXELS, name=surface.name)
 
 
-@cache
-def ratios_of(surface: Surface) -> SlopeRatios:
-    """Slope ratios of the surface's table: those of a grating's cell, or of the patch of a cut."""
-    if surface.kind == "elaphe":
-        return _measured()[surface.name].ratios
-    return slope_ratios(
-        cell(surface) if surface.kind in GRATINGS else _whole(surface, _source(surface))
-    )
-
-
 def measured_cuts(patch: HeightField) -> dict[str, Cut]:
     """Cuts of the measured scale, by the names of their surfaces."""
     return {
-        surface.name: Cut(*_cut(surface, patch), slope_ratios(_whole(surface, patch)))
+        surface.name: Cut(*_cut(surface, patch))
         for surface in SURFACES.values()
         if surface.kind == "elaphe"
     }
@@ -160,14 +144,8 @@ def save_measured(cuts: dict[str, Cut], folder: Path) -> Path:
     """Write the cuts of the measured scale, and return the file."""
     parts: dict[str, NDArray[Any]] = {}
     for n, cut in enumerate(cuts.values()):
-        ratios = cut.ratios
-        # tables keep 16 bits of a ratio
-        halves = ratios.values.astype(np.complex64).view(np.float32).astype(np.float16)
-        parts |= {
-            f"heights_{n}": cut.heights.astype(np.float32), f"side_{n}": np.array(cut.side),
-            f"cell_{n}": np.array(ratios.cell), f"kappa_{n}": np.array(ratios.kappa),
-            f"orders_{n}": np.array(ratios.orders), f"values_{n}": halves,
-        }  # fmt: skip
+        parts[f"heights_{n}"] = cut.heights.astype(np.float32)
+        parts[f"side_{n}"] = np.array(cut.side)
     path = folder / _MEASURED
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, names=np.array(list(cuts)), **parts)
@@ -179,31 +157,9 @@ def _measured() -> dict[str, Cut]:
     """Cuts of the measured scale, from the file that is kept."""
     with np.load(Path(__file__).parent / "data" / _MEASURED) as parts:
         return {
-            str(name): Cut(
-                parts[f"heights_{n}"].astype(float),
-                float(parts[f"side_{n}"]),
-                SlopeRatios(
-                    tuple(parts[f"cell_{n}"]),
-                    tuple(parts[f"orders_{n}"]),
-                    tuple(parts[f"kappa_{n}"]),
-                    parts[f"values_{n}"].astype(np.float32).view(np.complex64),
-                    change=np.nan,
-                ),
-            )
+            str(name): Cut(parts[f"heights_{n}"].astype(float), float(parts[f"side_{n}"]))
             for n, name in enumerate(parts["names"])
         }
-
-
-def _whole(surface: Surface, patch: HeightField) -> HeightField:
-    """The patch that a cut is from, smoothed and scaled as the cut is, mean 0."""
-    cut, side = _cut(surface, patch)
-    field = periodic_smooth(patch)
-    ny, nx = field.shape
-    qx, qy = (2 * np.pi * np.fft.fftfreq(n, field.pixel_size[0]) for n in (nx, ny))
-    weight = np.exp(-0.5 * (qx**2 + qy[:, None] ** 2) * _SMOOTHING**2)
-    heights = np.fft.ifft2(np.fft.fft2(field.heights) * weight).real
-    heights *= surface.slope / _slope(cut - cut.mean(), side)
-    return HeightField(heights - heights.mean(), field.pixel_size, name=surface.kind)
 
 
 def _cases(material: str) -> Iterator[PatchCase]:

@@ -26,7 +26,6 @@ from scipy.signal import resample
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.optics.second_order import axes
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
@@ -112,6 +111,24 @@ def transmitted(
     orders = through(field, index, wavelength, wi, harmonics)
     cosines = -complex(index).real * orders.wo[:, 2]
     return float(np.sum(boundary.unpolarised(orders.jones) * cosines) / wi[2])
+
+
+def axes(vector: Complex, index: complex) -> Complex:
+    """Electric fields s and p of plane waves κ (..., 3) in a medium, (2, ..., 3).
+
+    s = ẑ×κ̂, p = κ̂×s.
+    """
+    x, y = vector[..., 0].real, vector[..., 1].real
+    length = np.hypot(x, y)
+    slanted = length > 1e-12
+    safe = np.where(slanted, length, 1.0)
+    sine, cosine = np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0)
+    fields = np.zeros((2, *vector.shape), complex)
+    fields[0, ..., 0], fields[0, ..., 1] = sine, cosine
+    z = vector[..., 2] / index
+    fields[1, ..., 0], fields[1, ..., 1] = -z * cosine, z * sine
+    fields[1, ..., 2] = (x * cosine - y * sine) / index
+    return fields
 
 
 class Waves:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from ...llvm import require_loaded_llvm
 from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature
-from ...plugin.llvm import require_loaded_llvm
 from ...plugin.loops import sum_of
 from ...plugin.memory import read_record, upload
 from ...plugin.types import Buffer, Float, Index, Spectrum, Vector3f

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError, check_choice
+from ...llvm import require_loaded_llvm
 from ...optics.colour import ILLUMINANTS, LONGEST, SHORTEST, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
-from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
 from ...progress import Progress, silent
 from ...tables.build.spectrum import GLOSSY_RADIUS

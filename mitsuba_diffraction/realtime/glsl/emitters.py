@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.properties import name_of
+from ...scene.elements import name_of
 from .lights import (
     Lamp,
     area_of,

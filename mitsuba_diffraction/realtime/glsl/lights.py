@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import daylight
-from ...plugin.properties import name_of
+from ...scene.elements import name_of
 from .maps import uploaded
 from .packing import daylight_colour
 

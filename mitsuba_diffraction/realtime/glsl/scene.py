@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.meshes import has_texcoords, mesh_arrays
-from ...plugin.properties import name_of
-from ...plugin.textures import check_attributes
+from ...scene.elements import check_attributes, name_of
+from ...scene.meshes import has_texcoords, mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights

@@ -219,7 +219,7 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
     if described is not None:
         pigment = Map(np.zeros(3))
         if (nested := described.nested) is not None:
-            pigment = _diffuse(nested.bsdf, omissions, f"the base beneath {name}", light)
+            pigment = _diffuse(nested, omissions, f"the base beneath {name}", light)
         material = Material(pigment, packed_by(described), axis=axis_map(described))
     elif (gloss := Gloss.read(bsdf)) is not None:
         omissions += [f"{part} of {name}" for part in gloss.omissions]

@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.properties import name_of
+from ...scene.elements import name_of
 from .lights import area_of, emitted_radiance, radiance_along
 from .scene import sample_normal
 from .shadows import frame_along

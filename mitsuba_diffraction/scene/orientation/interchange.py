@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import DiffractionError, one_line
 from ...extras import optional
 from ...files import GLTF, USD
-from ...plugin.meshes import Floats, Ints, MeshArrays
+from ..meshes import Floats, Ints, MeshArrays
 
 
 def interchange_mesh(file: Path) -> MeshArrays:

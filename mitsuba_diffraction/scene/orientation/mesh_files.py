@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, read_bytes, readable_file
-from ...plugin.meshes import MeshArrays, mesh_arrays, mesh_faces
-from ...plugin.textures import ORIENTATION
+from ..elements import ORIENTATION
+from ..meshes import MeshArrays, mesh_arrays, mesh_faces
 from .interchange import interchange_mesh
 from .trimesh import TriangleMesh
 

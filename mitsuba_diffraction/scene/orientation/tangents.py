@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ...plugin.textures import ORIENTATION
+from ..elements import ORIENTATION
 from .trimesh import texture_tangents, unit
 
 Floats = NDArray[np.float64]

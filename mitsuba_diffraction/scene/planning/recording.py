@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair, Site
-from ...plugin.properties import own_id
-from ...plugin.sources import TableRequest
+from ...plugin.sources import TableRequest, tables_by
 from ...plugin.types import (
     BSDF,
     Colour,
@@ -36,6 +35,7 @@ from ...plugin.types import (
 from ...settings import TableSettings
 from ...tables.store import table_key
 from ...tables.table import DiffractionTable
+from ..elements import own_id
 
 _one_at_a_time = threading.Lock()
 
@@ -91,7 +91,8 @@ class Session:
             self.close()
 
     def _make(self, props: Properties) -> BSDF:
-        bsdf = _kind(self)(props, self.table)
+        with tables_by(self.table):
+            bsdf = _kind(self)(props)
         heights = described_table(bsdf).source.get("name") or "heights without a name"
         name = own_id(props.id()) or f"a diffraction BSDF without id (of {heights})"
         self.bsdfs.append((name, bsdf))

@@ -39,8 +39,6 @@ def test_every_parameter_is_described_once(some_variant):
 
 
 def test_the_defaults_are_those_of_the_code(some_variant, patch):
-    from mitsuba_diffraction.plugin import diffraction_parameters as code
-    from mitsuba_diffraction.plugin.sources import from_cache
     from mitsuba_diffraction.tables.table import DiffractionTable
 
     def default(name):
@@ -52,35 +50,30 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
     for name in ("coherence", "basis"):
         assert default(name) == build[name].default
 
-    properties = mi.Properties("diffraction")
-    given = md.bsdf_dict(patch, coherence_width=4, tolerance=0.1)
-    for name in ("data", "coherence_width", "tolerance"):
-        properties[name] = given[name]
-    read = code.read_parameters(properties, from_cache)
-    surface = read.surface
-    assert float(default("height_scale")) == surface.height_scale
-    assert float(default("wavelength")) == surface.wavelength
-    assert default("energy_conserving") == str(surface.energy_conserving).lower()
-    assert default("shadowing") == ("vcavity" if read.vcavity else "none")
-    assert default("layering") == str(read.layering)
-    assert float(default("orientation")) == surface.orientation.degrees[0]
+    bsdf = mi.load_dict(md.bsdf_dict(patch, coherence_width=4, tolerance=0.1))
+    described = bsdf.describe()
+    assert float(default("height_scale")) == described.height_scale.number
+    assert float(default("wavelength")) == bsdf.wavelength
+    assert default("energy_conserving") == str(bsdf.energy_conserving).lower()
+    assert default("shadowing") == ("vcavity" if described.shadowing else "none")
+    assert float(default("orientation")) == described.orientation.number
+    assert default("model") == described.model
     interior, exterior = (float(index) for index in default("int_ior").split(","))
     # single precision
-    assert read.reflectance.eta[0] == pytest.approx(interior / exterior, rel=1e-6)
+    assert bsdf.fresnel.eta[0] == pytest.approx(interior / exterior, rel=1e-6)
 
 
 def test_the_choices_are_those_of_the_code(some_variant):
     from mitsuba_diffraction.heights import preprocess
     from mitsuba_diffraction.heights import read as options
-    from mitsuba_diffraction.plugin import diffraction_parameters as code
+    from mitsuba_diffraction.plugin.directions import SHADOWINGS
     from mitsuba_diffraction.tables.expansion import BASES
 
     choices = {
         "fill": ("none", *preprocess.FILLS),
         "level": ("auto", "none", *options.LEVELS),
         "periodic": ("auto", "none", *options.PERIODICS),
-        "shadowing": code.SHADOWINGS,
-        "layering": code.LAYERINGS,
+        "shadowing": SHADOWINGS,
         "basis": (*BASES, "auto"),
     }
     for name, allowed in choices.items():

@@ -7,7 +7,6 @@ measurements   comparisons that the pages share, each computed on first use
 front          docs/validation.md: the figures that users decide by
 gratings       gratings of dielectrics and metals, by slope, profile and polarisation
 surfaces       crossed gratings, cuts of scales and of a CD
-second_order   second order of small slope: exact, and as the factor that tables hold
 layers         gratings under a coat and under a film
 transmission   orders that go through, and the sum of reflected and transmitted light
 conductor      a perfect conductor

@@ -29,8 +29,7 @@ Deviation of colours of three models from rigorous solutions
 
 - *Kirchhoff*: `model="kirchhoff"`.
 - *Small slope*: first-order small slope alone, which the plugin does not offer.
-- *Blend*: `model="small_slope"`, on dielectrics with `second_order=true`; without it:
-  [second_order.md](second_order.md#gratings).
+- *Blend*: `model="small_slope"`.
 
 Light falls across the grooves. Keratin has the index 1.56."""
 
@@ -178,7 +177,7 @@ that are worse on average, then gratings:
 
 *Best share* is the share of small slope, equal for all orders, with the least deviation; *bound* is
 the deviation if every order had its own. Where the best share is 0, Kirchhoff's errors cancel: both
-matrices lack light that is [diffracted twice](second_order.md), and Kirchhoff's is brighter."""
+matrices lack light that is diffracted twice, and Kirchhoff's is brighter."""
 
 
 def _side_by_side(

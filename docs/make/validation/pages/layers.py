@@ -46,17 +46,12 @@ the critical angle."""
 def _film(measured: Measurements) -> str:
     rows = []
     for film in measured.films:
-        for grating, *by_model in zip(
-            GRATINGS, film.kirchhoff, film.first_order, film.default, strict=True
-        ):
+        for grating, *by_model in zip(GRATINGS, film.kirchhoff, film.default, strict=True):
             cells = [" / ".join(map(percent, angles)) for angles in zip(*by_model, strict=True)]
             rows.append([film.stack.name, f"{grating.period:g}/{grating.depth:g} µm", *cells])
     stacks = [film.stack for film in measured.films]
     sizes = [[s.name, f"{s.film:g}", f"{s.thickness:g} nm"] for s in stacks]
-    thick = [
-        [f"{b.thickness:g} nm", f"2.5/{b.depth:g} µm", percent(b.first_order), percent(b.default)]
-        for b in beyond()
-    ]
+    thick = [[f"{b.thickness:g} nm", f"2.5/{b.depth:g} µm", percent(b.deviation)] for b in beyond()]
     worst = max(film.default.max() for film in measured.films)
     return f"""## Under a film
 
@@ -64,14 +59,13 @@ Beside Rayleigh's expansion at both faces. The steepest slopes are 0.03 to 0.1.
 
 {table(["film", "`film_ior` + i `film_k`", "`film_thickness`"], sizes)}
 
-Deviation of colours as Kirchhoff / small slope of first order / the default, which adds the
-[mean of the second order](../theory/layers.md#the-mean-of-the-second-order):
+Deviation of colours as Kirchhoff / the default:
 
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 
-The goal was 10 %; the default deviates by at most {percent(float(worst))}.
-
-Thicker films and deeper gratings deviate more; the plugin warns of thick films on rough metals.
+The default deviates by at most {percent(float(worst))}: in a thick film, light that the rough
+faces diffract twice meets another part of the fringes, which the model leaves out. Thicker films
+and deeper gratings deviate more; the plugin warns of thick films on rough metals.
 Lacquer at {angle(ANGLES[-1])}:
 
-{table(["`film_thickness`", "sinusoid", "first order", "default"], thick)}"""
+{table(["`film_thickness`", "sinusoid", "deviation"], thick)}"""

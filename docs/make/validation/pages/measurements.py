@@ -76,7 +76,7 @@ class Measurements:
 
     @cached_property
     def default(self) -> dict[str, Comparison]:
-        """Small slope on gratings, by material; dielectrics with the second order."""
+        """Small slope on gratings, by material."""
         return {material: self.by_model[material, "small_slope"] for material in models.MATERIALS}
 
     @cached_property

@@ -10,8 +10,8 @@ from ..cells import PatchComparison
 from .markdown import angle, percent, table
 from .measurements import Measurements
 
-_MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
-_POLARISED = ("kirchhoff", "first_order", "small_slope")
+_MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
+_POLARISED = ("kirchhoff", "small_slope")
 _ANGLES = (0.0, 30.0, 60.0)
 
 
@@ -28,19 +28,14 @@ does not converge on steeper metals than these.
 
 ## Unpolarised light
 
-Mean over the planes of incidence, as Kirchhoff / small slope alone / `second_order=false` /
-`second_order=true`. *Change* is the largest change of the solution by more harmonics.
-
-Slope ratios are of each order on gratings, of the whole patch, 20 to 65 µm wide, on cuts. Metals
-have no second order.
+Mean over the planes of incidence, as Kirchhoff / small slope alone / the default. *Change* is the
+largest change of the solution by more harmonics.
 
 {table(header, list(_unpolarised(cells)))}
 
 ## Polarised light
 
-Light from 60°, mean over the planes of incidence, as Kirchhoff / `second_order=false` /
-`second_order=true`, one factor for both polarisations.
-{_nearer(cells)}.
+Light from 60°, mean over the planes of incidence, as Kirchhoff / the default.
 
 {table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
 
@@ -74,23 +69,6 @@ def _by_surface(cells: Sequence[PatchComparison]) -> Iterator[tuple[str, list[Pa
         groups.setdefault((c.case.material, c.case.surface, c.case.wavelength), []).append(c)
     for same in groups.values():
         yield f"{same[0].case.material}, {same[0].case.surface.name}", same
-
-
-def _nearer(cells: Sequence[PatchComparison]) -> str:
-    """For how many directions on keratin the second order is better in s and in p light."""
-    oblique = [c.polarised for c in cells if c.case.material == "keratin" and c.case.theta == 60.0]
-    sentences = []
-    for n, light in enumerate("sp"):
-        gains = [
-            100.0 * (polarised["first_order"][n] - polarised["small_slope"][n])
-            for polarised in oblique
-        ]
-        better, best, worst = sum(gain > 0.0 for gain in gains), max(gains), -min(gains)
-        sentences.append(
-            f"{light} light is closer in {better} of {len(gains)} directions, by at most "
-            f"{best:.2g} points;\nin the others it is further off by at most {worst:.2g} points"
-        )
-    return ".\n".join(text[:1].upper() + text[1:] for text in sentences)
 
 
 def _mean(values: Sequence[float]) -> float:

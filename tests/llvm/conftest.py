@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from mitsuba_diffraction.plugin.llvm import VARIABLE
+from mitsuba_diffraction.llvm import VARIABLE
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,8 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction import DiffractionError, bsdf_dict
-from mitsuba_diffraction.plugin.textures import check_attributes
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
+from mitsuba_diffraction.scene.elements import check_attributes, name_of, own_id
 from tests.support.directions import rough_patch
 
 PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
@@ -63,3 +63,41 @@ def test_the_realtime_renderer_refuses_places():
     disk = {"type": "disk", "bsdf": bsdf_dict(PATCH, **ON_SURFACE)}
     with pytest.raises(DiffractionError, match=r"coherence='surface'"):
         read_scene(mi.load_dict({"type": "scene", "disk": disk, "s": sensor}))
+
+
+class Element:
+    """What Mitsuba's elements say of themselves."""
+
+    def __init__(self, given, kind, text=""):
+        self.given, self.kind, self.text = given, kind, text
+
+    def id(self):
+        return self.given
+
+    def class_name(self):
+        return self.kind
+
+    def __str__(self):
+        return self.text
+
+
+MESH = 'PLYMesh[\n  name = "meshes/knot.ply",\n  bbox = ...'
+
+
+@pytest.mark.parametrize(
+    ("element", "number", "name"),
+    [
+        (Element("foil", "Sphere"), 3, "foil"),
+        (Element("", "Sphere"), 0, "shape 1 (a sphere without id)"),
+        (Element("_unnamed_3", "Sphere"), None, "a sphere without id"),
+        (Element("", "AreaLight"), None, "an area light without id"),
+        (Element("_unnamed_0", "PLYMesh", MESH), 1, "shape 2 (the mesh knot.ply)"),
+        (Element("", "PLYMesh", "PLYMesh["), None, "a plymesh without id"),
+    ],
+)
+def test_without_an_id_it_is_the_file_or_the_kind_and_place(element, number, name):
+    assert name_of(element, number) == name
+
+
+def test_ids_that_mitsuba_makes_up_are_none():
+    assert [own_id(given) for given in ("foil", "_unnamed_12", "")] == ["foil", "", ""]

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import DiffractionError
+from .errors import DiffractionError
 
 #: Environment variable that names the LLVM library for Dr.Jit.
 VARIABLE = "DRJIT_LIBLLVM_PATH"

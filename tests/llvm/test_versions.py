@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.plugin.llvm import OLDEST, VARIABLE
+from mitsuba_diffraction.llvm import OLDEST, VARIABLE
 from tests.support.machine import HERE, python
 
 KERNELS = """

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.plugin import llvm
-from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
+from mitsuba_diffraction import llvm
+from mitsuba_diffraction.llvm import VARIABLE, Library
 from tests.support.machine import only
 
 

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.plugin.meshes import has_texcoords, mesh_arrays, mesh_faces
+from mitsuba_diffraction.scene.meshes import has_texcoords, mesh_arrays, mesh_faces
 
 # a square of two triangles
 POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from mitsuba_diffraction import llvm
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.plugin import llvm
-from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
+from mitsuba_diffraction.llvm import VARIABLE, Library
 from tests.support.machine import installed, only, python
 
 
@@ -42,7 +42,7 @@ package = types.ModuleType("mitsuba_diffraction")
 package.__path__ = importlib.util.find_spec("mitsuba_diffraction").submodule_search_locations
 sys.modules["mitsuba_diffraction"] = package
 os.environ.pop("DRJIT_LIBLLVM_PATH", None)
-from mitsuba_diffraction.plugin import llvm
+from mitsuba_diffraction import llvm
 """
 
 
@@ -80,7 +80,7 @@ def test_unusable_choice_of_the_user_is_one_line(
 def test_file_that_is_no_library_is_one_line(tmp_path: Path):
     (tmp_path / "libLLVM.so").write_bytes(b"not a library")
     code = """
-import mitsuba_diffraction.plugin.llvm as llvm
+import mitsuba_diffraction.llvm as llvm
 try:
     llvm.require_llvm()
 except ValueError as error:
@@ -105,7 +105,7 @@ def test_machine_without_a_usable_llvm_is_one_line(tmp_path: Path, monkeypatch: 
 
 def test_import_of_the_package_makes_drjit_load_what_it_chose():
     installed(19)
-    code = "import mitsuba_diffraction.plugin.llvm as llvm; print(*llvm.loaded_llvm_version())"
+    code = "import mitsuba_diffraction.llvm as llvm; print(*llvm.loaded_llvm_version())"
     assert python(code).stdout.startswith("19 ")
 
 
@@ -114,7 +114,7 @@ def test_drjit_that_was_imported_first_with_an_unusable_llvm_is_one_error_not_an
 import os
 import drjit  # before the package, which can then only look on
 del os.environ["DRJIT_LIBLLVM_PATH"]
-import mitsuba_diffraction.plugin.llvm as llvm
+import mitsuba_diffraction.llvm as llvm
 try:
     llvm.require_llvm()
 except ValueError as error:
@@ -143,7 +143,7 @@ except Exception as error:
 
 def test_scalar_variants_need_no_llvm():
     code = """
-import mitsuba_diffraction.plugin.llvm as llvm
+import mitsuba_diffraction.llvm as llvm
 import mitsuba as mi
 mi.set_variant("scalar_spectral")
 llvm.require_loaded_llvm()

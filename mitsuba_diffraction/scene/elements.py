@@ -1,0 +1,126 @@
+"""Elements of a scene: their names, the surfaces in their BSDFs, and what a shape has to have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..plugin.description import Surface, describe
+from ..plugin.parameter_changes import children
+from ..plugin.textures import is_attribute
+from .meshes import has_texcoords
+
+#: What `meshes.write_ply` calls a field of directions.
+ORIENTATION = "vertex_orientation"
+
+#: What Mitsuba's parser gives to elements without an id, numbered.
+_UNNAMED = "_unnamed"
+# Meshes print the name of their file, plugins that were not given one nothing.
+_FILE = re.compile(r'\w*Mesh\[\s*name = "([^"]+)"')
+# Mitsuba has no other way to ask a mesh attribute for its name.
+_ATTRIBUTE = re.compile(r'name = "([^"]+)"')
+_MADE = "make it with the command 'tangents MESH -o FIELD.ply', and use that file"
+
+
+def name_of(element: Any, number: int | None = None) -> str:
+    """An element's id; else its mesh's file, or its kind, and which of the scene's shapes it is.
+
+    Parameters
+    ----------
+    element : of Mitsuba's, with `id()`.
+    number : of a shape, its place in `scene.shapes()`, counted from 0.
+    """
+    scene_id = own_id(element.id())
+    if scene_id:
+        return scene_id
+    file = _FILE.match(str(element))
+    if file:
+        kind = f"the mesh {Path(file[1]).name}"
+    else:
+        kind = f"{_with_article(element.class_name())} without id"
+    return kind if number is None else f"shape {number + 1} ({kind})"
+
+
+def own_id(name: str) -> str:
+    """Return the id that the scene gives, empty if Mitsuba made it up."""
+    return "" if name.startswith(_UNNAMED) else name
+
+
+def _with_article(kind: str) -> str:
+    """`AreaLight` as "an area light"."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
+    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
+
+
+def surfaces_within(bsdf: Any) -> list[Surface]:
+    """Return the descriptions of all surfaces that diffract within a BSDF, itself included."""
+    return [d for part in _parts(bsdf) if isinstance(d := describe(part), Surface)]
+
+
+def _parts(thing: Any) -> Iterator[Any]:
+    """Yield an object of Mitsuba's, and everything within it that it shows to `traverse`."""
+    if thing is not None:
+        yield thing
+        for part in children(thing).values():
+            yield from _parts(part)
+
+
+def check_attributes(shape: Any, number: int | None = None) -> None:
+    """Refuse a shape that lacks a mesh attribute or the UV coordinates that its BSDF reads.
+
+    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
+    coordinates of each triangle.
+
+    Parameters
+    ----------
+    shape : `mi.Shape` of the variant that is set.
+    number : its place among the scene's shapes, counted from 0, to name one without an id.
+
+    Raises a DiffractionError that names the attribute, and the way to get one of directions.
+    """
+    surfaces = surfaces_within(shape.bsdf())
+    placed = any(surface.coherence == "surface" for surface in surfaces)
+    if placed and shape.is_mesh() and not has_texcoords(shape):
+        raise DiffractionError(
+            f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
+            "places on the surface; unwrap it, or use coherence='ensemble'"
+        )
+    stretching = [_attribute(surface.lateral_scale.texture) for surface in surfaces]
+    attributes = [name for part in _parts(shape.bsdf()) if (name := _attribute(part))]
+    for name in dict.fromkeys(attributes):
+        if np.all(shape.has_attribute(name)):
+            if name in stretching and (least := _least(shape, name)) <= 0.0:
+                raise DiffractionError(
+                    f"{name_of(shape, number)}: lateral_scale reads the attribute {name}, whose "
+                    f"least number is {least:g}; factors must be above 0"
+                )
+            continue
+        if not shape.is_mesh():
+            remedy = "only meshes have any: leave the texture out, or use a mesh"
+        else:
+            added = "add it to the mesh's file, or correct the name"
+            remedy = _MADE if name == ORIENTATION else added
+        raise DiffractionError(
+            f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
+        )
+
+
+def _attribute(thing: Any) -> str:
+    """Return the name of the attribute that a texture reads; empty for anything else."""
+    if thing is None or not is_attribute(thing):
+        return ""
+    match = _ATTRIBUTE.search(str(thing))
+    assert match is not None
+    return match[1]
+
+
+def _least(shape: Any, name: str) -> float:
+    """Return the least number of a mesh attribute."""
+    import mitsuba as mi
+
+    return float(np.array(mi.traverse(shape)[name]).min())
