@@ -54,10 +54,11 @@ class DiffractingSurface(SurfaceBSDF):
     orientation, lateral_scale, height_scale : the patch as it lies on the surface.
     boundary : model of the structure's material; fresnel : flat surface with all layers.
     power : `power.PowerModel` of the variant.
+    energy : scale by which energy is conserved, made after all layers are known.
     wavelength : nm, of mono variants.
     """
 
-    energy: EnergyModel | None = None
+    energy: EnergyModel
     fresnel: Material
 
     def __init__(
@@ -207,8 +208,7 @@ class DiffractingSurface(SurfaceBSDF):
     def derive(self) -> None:
         """Compute what depends on the parameters: indices and scales of energy."""
         self.fresnel.derive()
-        if self.energy is not None:
-            self.energy.update(self.scale_range())
+        self.energy.update(self.scale_range())
 
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""
