@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import unicodedata
@@ -82,3 +83,20 @@ def test_no_text_controls_the_terminal(text):
 @pytest.mark.parametrize("text", ["µm, κ and ×", "a\nb\tc", "10\u202f000 µm", "鱗"])
 def test_readable_text_stays_as_it_is(text):
     assert printable(text) == text
+
+
+def test_commands_that_messages_name_exist():
+    from mitsuba_diffraction.cli.main import build_parser
+
+    (commands,) = (a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
+    named = {
+        (command, option)
+        for file in PACKAGE.rglob("*.py")
+        for command, option in re.findall(
+            r"the command (?:\"\n\s*f?\")?'([\w-]+)(?: (--[\w-]+))?", file.read_text("utf-8")
+        )
+    }
+    assert ("solve", "--import") in named
+    for command, option in named:
+        assert command in commands
+        assert not option or option in commands[command].format_help()

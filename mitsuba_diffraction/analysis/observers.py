@@ -41,8 +41,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
-from ..files import read_text
 from ..optics.colour import cone_fundamentals, illuminant_power, leaf_green
+from ..text_spectra import SPECTRA, choice_of, read_spectra
 
 Reals = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ EYES: dict[str, Callable[[], Eye]] = {
 
 
 def eye_of(name: str) -> Eye:
-    """Return an eye by name, or from a CSV: wavelengths in nm and a column for each receptor.
+    """Return an eye by name, or from a text: wavelengths and a column for each receptor.
 
     Raises a DiffractionError if the animal is unknown, or the file has no sensitivities from 400 to
     700 nm.
@@ -158,7 +158,7 @@ def eye_of(name: str) -> Eye:
     if len(names) < 2:
         raise DiffractionError(
             f"'{name}' is not a table of receptors: give a header, wl and a name for each of two "
-            "receptors or more, and rows of wavelengths in nm, increasing, and sensitivities"
+            "receptors or more, and rows of wavelengths in nm and sensitivities"
         )
     if wrong := [n for n in names if names.count(n) > 1 or not n.isidentifier() or n in _TAKEN]:
         raise DiffractionError(
@@ -178,33 +178,28 @@ def eye_of(name: str) -> Eye:
 def _columns(
     name: str, parameter: str, known: Collection[str], columns: str
 ) -> tuple[tuple[str, ...], Reals]:
-    """Return the names of a CSV's columns behind wavelengths, and its numbers; none if wrong.
+    """Return the names of the columns of a text, and its numbers, wavelengths (nm) first.
 
-    Raises a DiffractionError for other files; the message lists known values of the parameter.
+    Raises a DiffractionError if it is no spectrum; the message on a name that is none lists the
+    known values of the parameter.
     """
-    if Path(name).suffix.lower() != ".csv":
+    choice = choice_of(name)
+    if Path(choice.path).suffix.lower() not in SPECTRA:
         close = difflib.get_close_matches(name.lower(), known, cutoff=0.65)
         hint = f" (did you mean {' or '.join(close)}?)" if close else ""
         raise DiffractionError(
             f"{parameter}={quoted(name)} is unknown{hint}; choose one of {', '.join(known)}, or a "
-            f"CSV of wavelengths (nm) and {columns}"
+            f"text of wavelengths (nm) and {columns}"
         )
-    header, *lines = read_text(name).splitlines() or [""]
-    names = tuple(word.strip() for word in header.split(",")[1:])
-    try:
-        table = np.array([[float(x) for x in line.split(",")] for line in lines if line.strip()])
-    except ValueError:
-        return (), np.empty((0, 0))
-    right = table.ndim == 2 and len(table) > 1 and table.shape[1] == 1 + len(names)
-    if not (right and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()):
-        return (), np.empty((0, 0))
-    return names, table
+    lam, table = read_spectra(choice, columns, every=parameter == "observer")
+    return table.names, np.column_stack([lam, table.numbers])
 
 
 def illuminant_of(name: str) -> Reals:
-    """Return the quanta of a light at `GRID`, of mean 1: by name, or from a CSV of photons.
+    """Return the quanta of a light at `GRID`, of mean 1: by name, or from a text of photons.
 
-    name : one of `ILLUMINANTS`, or a CSV of wavelengths in nm and relative photons.
+    name : one of `ILLUMINANTS`, or a text of wavelengths and relative photons, see
+        `columns`, with a column's name behind a colon if there are several.
 
     Raises a DiffractionError if the light is unknown, or the file does not cover 300 to 700 nm.
     """
@@ -214,12 +209,11 @@ def illuminant_of(name: str) -> Reals:
     if light in ILLUMINANTS:
         power = 1.0 / GRID if light == "ideal" else illuminant_power(light.upper(), GRID)
         return _of_mean_1(power * GRID)
-    names, table = _columns(name, "illuminant", ILLUMINANTS, "photons")
-    covers = len(names) == 1 and table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
+    _, table = _columns(name, "illuminant", ILLUMINANTS, "photons")
+    covers = table[0, 0] <= GRID[0] and table[-1, 0] >= GRID[-1]
     if not (covers and table[:, 1].min() >= 0.0 < table[:, 1].max()):
         raise DiffractionError(
-            f"'{name}' is not a spectrum: give a header, wl and a name, and rows of wavelengths "
-            "from 300 to 700 nm, increasing, and photons"
+            f"'{name}' is not a spectrum: give rows of wavelengths from 300 to 700 nm and photons"
         )
     return _of_mean_1(np.interp(GRID, table[:, 0], table[:, 1]))
 

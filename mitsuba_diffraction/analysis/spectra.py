@@ -150,8 +150,8 @@ def spectrum(
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
                 f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
-                "longer ones, or build a wider table with "
-                "DiffractionTable.build"
+                "longer ones, or build a table of a wider wavelength_range "
+                "(the command 'precompute')"
             )
     signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":

@@ -18,7 +18,6 @@ from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
 from .report import Figures
-from .wording import worded
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -388,8 +387,8 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
         check_window(fields[0].extent, resolved(settings, fields))
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
-        return [worded(line) for line in (*doubts, f"{fields[0].name}: {error}")]
-    return [worded(line) for line in warnings_of(fields, settings)]
+        return [*doubts, f"{fields[0].name}: {error}"]
+    return warnings_of(fields, settings)
 
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..columns import read_columns
 from ..errors import DiffractionError
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.materials import METALS, TISSUES
@@ -93,7 +94,8 @@ def _table(material: str, name: str) -> Array:
     if tissue := TISSUES.get(material):
         index = tissue.index(tissue.nodes)
         return np.stack([tissue.nodes, index.real if name == "eta" else index.imag])
-    return np.asarray(np.loadtxt(_file(material, name)).T)
+    what = "wavelengths in nm and values"
+    return read_columns(_file(material, name)).finite((0, 1), what).T
 
 
 def _file(material: str, name: str) -> Path:

@@ -159,7 +159,8 @@ The light beneath
     components follow.
 pigment : string or float [none]
     Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
-    or a spectrum, a CSV of wavelengths in nm and reflectances, constant beyond its ends. Or a
+    or a spectrum, constant beyond its ends: a text of wavelengths and reflectances, `brown.csv`,
+    `feathers.csv:male` (one column of several), `brown.csv:percent` (or `fraction`). Or a
     picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
 Variants
 --------

@@ -153,7 +153,7 @@ def scales_of(
 ) -> Sequence[Sequence[DirectionalTable]] | None:
     """Scales of all sides at several height scales, 1 where there is none; None if all are 1."""
     some = next((sides for sides in tables if sides is not None), None)
-    return some and [sides or _ones(some) for sides in tables]
+    return None if some is None else [sides or _ones(some) for sides in tables]
 
 
 def _ones(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:

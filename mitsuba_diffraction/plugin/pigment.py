@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,13 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError, quoted
 from ..extras import optional
-from ..files import GLTF, read_text, readable_file
+from ..files import GLTF, readable_file
 from ..optics.colour import decode_srgb
+from ..text_spectra import SPECTRA, choice_of, read_shares
 from .types import BSDF
 
 #: Wavelengths that a measured reflectance has to cover, nm; beyond its ends it is constant.
 REQUIRED = (400.0, 700.0)
-#: Suffixes of measured spectra.
-SPECTRA = (".csv", ".txt", ".tsv")
 #: Suffixes of pictures, which texture coordinates lay over the surface.
 PICTURES = (".png", ".jpg", ".jpeg", ".exr")
 
@@ -32,8 +30,9 @@ def pigment_bsdf(text: str | float) -> BSDF:
     """Return a diffuse BSDF of a pigment.
 
     text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
-        "sienna", a CSV of wavelengths (nm) and reflectances, of which values above 1 mean per
-        cent, a picture, or a glTF file, whose material's base colour is taken.
+        "sienna", a text of wavelengths and reflectances (`text_spectra`), a picture, or a glTF
+        file, whose material's base colour is taken. The name of a column and a unit may follow a
+        text: "feathers.csv:male:percent".
 
     Raises a DiffractionError if the text is not one of these, or the spectrum is not one or ends
     within 400 to 700 nm.
@@ -54,7 +53,7 @@ def pigment_range(text: str | float | None) -> tuple[float, float]:
             f"pigment={quoted(str(text))} varies over a mesh, and a patch alone has one pigment; "
             "give a colour or a spectrum"
         )
-    if Path(str(text)).suffix.lower() not in SPECTRA:
+    if not _is_spectrum(str(text)):
         _reflectance(str(text))
         return 0.0, math.inf
     lam, _ = read_reflectance(str(text))
@@ -62,43 +61,20 @@ def pigment_range(text: str | float | None) -> tuple[float, float]:
 
 
 def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read wavelengths (n,) in nm and reflectances (n,) from 0 to 1 from a file of two columns.
+    """Read wavelengths (n,) in nm and reflectances (n,) from 0 to 1 from FILE[:COLUMN][:UNIT].
 
-    A header is skipped; numbers are separated by commas, semicolons, tabs or spaces.
-
-    Raises a DiffractionError if the file has no such columns, or its reflectances are out of range.
+    Raises a DiffractionError if the file has no such column, or its reflectances are out of range.
     """
-    rows = []
-    for line in read_text(path).splitlines():
-        cells = next(csv.reader([line.replace(";", ",").replace("\t", ",")]), [])
-        cells = cells if len(cells) > 1 else line.split()
-        try:
-            rows.append((float(cells[0]), float(cells[1])))
-        except (ValueError, IndexError):
-            if rows and line.strip():
-                raise DiffractionError(
-                    f"'{path}': {quoted(line)} is not a wavelength and a reflectance"
-                ) from None
-    table = np.array(sorted(rows)).reshape(-1, 2)
-    lam, value = table[:, 0], table[:, 1]
-    if len(lam) < 2 or not np.isfinite(table).all() or not np.all(np.diff(lam) > 0.0):
-        raise DiffractionError(
-            f"'{path}' is not a spectrum: give two columns, wavelengths in nm, each once, and "
-            "reflectances from 0 to 1 or in per cent"
-        )
-    if value.max() > 1.0:
-        value = value / 100.0
-    if not 0.0 <= value.min() <= value.max() <= 1.0:
-        raise DiffractionError(
-            f"'{path}': reflectances are {table[:, 1].min():g} to {table[:, 1].max():g}; a "
-            "pigment's are from 0 to 1, or from 0 to 100 per cent"
-        )
-    return lam, value
+    return read_shares(path, "reflectances", REQUIRED)
+
+
+def _is_spectrum(text: str) -> bool:
+    return Path(choice_of(text).path).suffix.lower() in SPECTRA
 
 
 def _reflectance(text: str) -> dict[str, Any]:
     """Return a reflectance as Mitsuba's dictionary of a spectrum."""
-    if Path(text).suffix.lower() in SPECTRA:
+    if _is_spectrum(text):
         lam, value = read_reflectance(text)
         if lam[0] > REQUIRED[0] or lam[-1] < REQUIRED[1]:
             raise DiffractionError(

@@ -122,8 +122,8 @@ def table_of_file(
             raise DiffractionError(
                 f"height_scale={height_scale:g} is beyond the table's "
                 f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
-                "the height field instead of the table, or build it with "
-                f"DiffractionTable.build(height_scale_max={height_scale:.4g}) or more"
+                "the height field instead of the table, or build the table with "
+                f"height_scale_max={height_scale:.4g} or more (the command 'precompute')"
             )
     elif kind is FileKind.RECIPE:
         recipe = Recipe.load(path)
@@ -275,7 +275,7 @@ def _check_agreement(
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has "
                 f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
-                f"DiffractionTable.build({name}={value})"
+                f"{name}={value} (the command 'precompute')"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
@@ -286,5 +286,5 @@ def _check_agreement(
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
-            "DiffractionTable.build(wavelength_range=(360, 830))"
+            "wavelength_range=(360, 830) (the command 'precompute')"
         )

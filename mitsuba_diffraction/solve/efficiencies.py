@@ -21,7 +21,6 @@ light, for light of s and of p polarisation. T is transmitted by a thin sheet.
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 from collections.abc import Sequence
@@ -31,9 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
+from ..columns import read_columns
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
-from ..files import FileKind, kind_of, read_bytes, read_text
+from ..files import FileKind, kind_of, read_bytes
 from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
 from .stations import Real
 
@@ -44,8 +44,6 @@ CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
 PAIR = ("order_x", "order_y")
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
-#: Bytes of a CSV at most: two million lines. NetCDF files may be larger.
-_LARGEST_CSV = 100_000_000
 _LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
             "micron": 1e3, "m": 1e9, "meter": 1e9}  # fmt: skip
 _ANGLES = {"deg": 1.0, "degree": 1.0, "°": 1.0, "rad": 180.0 / np.pi, "radian": 180.0 / np.pi}
@@ -113,39 +111,16 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
 
 
 def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
-    """Return the grid of a CSV, whose delimiters are commas, semicolons or tabs."""
-    text = read_text(path, _LARGEST_CSV).removeprefix("\ufeff")
-    first = text.partition("\n")[0]
-    delimiter = next((mark for mark in ";\t" if mark in first), ",")
-    reader = csv.reader(text.splitlines(), delimiter=delimiter)
-    names = [name.strip() for name in first.split(delimiter)]
-    kinds = _kinds(names, shown, "column")
+    """Return the grid of a text of columns with names."""
+    columns = read_columns(path)
+    if not len(columns.numbers):
+        raise DiffractionError(f"{shown} has no lines of efficiencies")
+    names = columns.names
+    kinds = _kinds(list(names), shown, "column")
     crossed = not set(PAIR).isdisjoint(names)
     axes = [name for name in CSV_AXES[:3] if name != "phi_deg" or name in names]
     axes += PAIR if crossed else CSV_AXES[3:]
-    if missing := [name for name in axes if name not in names]:
-        raise DiffractionError(
-            f"{shown} has no column {missing[0]}; the first line must name "
-            f"{', '.join((*CSV_AXES, *kinds))}"
-        )
-    wanted = (*axes, *kinds)
-    if twice := [name for name in wanted if names.count(name) > 1]:
-        raise DiffractionError(f"{shown} has several columns {twice[0]}; keep one")
-    columns = [names.index(name) for name in wanted]
-    try:
-        next(reader)
-        rows = [
-            [float(row[column]) for column in columns]
-            for row in reader
-            if row and not row[0].startswith("#")
-        ]
-    except (ValueError, IndexError, csv.Error) as error:
-        raise DiffractionError(
-            f"{shown}, line {reader.line_num}: expected numbers in {', '.join((*axes, *kinds))}"
-        ) from error
-    if not rows:
-        raise DiffractionError(f"{shown} has no lines of efficiencies")
-    table = np.array(rows)
+    table = columns.of((*axes, *kinds))
     if "phi_deg" not in axes:
         table = np.insert(table, 2, 0.0, axis=1)
     if not crossed:

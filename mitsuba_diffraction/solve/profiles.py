@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionError, warn
-from ..files import FileKind, kind_of, read_text
-from ..heights.lengths import number_between
+from ..columns import read_columns
+from ..errors import DiffractionError, quoted, warn
+from ..files import FileKind, kind_of
+from ..heights.lengths import micrometres_of, number_between
 
 Real = NDArray[np.float64]
 
@@ -167,7 +168,7 @@ GENERATORS: dict[str, Callable[..., Profile]] = {
 
 
 def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
-    """Read a line: CSV with two columns x and z in µm, with or without a header line.
+    """Read a line: two columns x and z in µm, or in the units that a header line names.
 
     Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
     no `Profile`, or less than half a period.
@@ -177,24 +178,19 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
             f"'{path}' ({kind}): profiles are one-dimensional, one period of a line, CSV of x, z "
             "in µm; crossed gratings: one period of heights, by solve_crossed"
         )
-    rows: list[list[float]] = []
-    for number, line in enumerate(read_text(path).splitlines(), 1):
-        text = line.partition("#")[0].strip()
-        if not text:
-            continue
-        try:
-            x, z = (float(part) for part in text.replace(",", " ").replace(";", " ").split())
-        except ValueError as error:
-            if not rows and any(c.isalpha() for c in text):
-                continue  # names of the columns
-            raise DiffractionError(
-                f"'{path}', line {number}: expected two numbers x, z in µm, got {text[:60]!r} "
-                "(read_orders reads efficiencies)"
-            ) from error
-        rows.append([x, z])
-    if not rows:
-        raise DiffractionError(f"'{path}' has no points; expected two columns x, z in µm")
-    x, z = np.array(rows).T
+    what = "two columns x, z in µm ('solve --import', or read_orders, reads efficiencies)"
+    table = read_columns(path)
+    if not len(table.numbers):
+        raise DiffractionError(f"'{path}' has no points; expected {what}")
+    if table.numbers.shape[1] != 2:
+        raise DiffractionError(
+            f"'{path}', line {table.lines[0]}: {table.numbers.shape[1]} numbers; expected {what}"
+        )
+    factors = [micrometres_of(unit) if unit else 1.0 for unit in table.units]
+    if None in factors:
+        unit = table.units[factors.index(None)]
+        raise DiffractionError(f"'{path}': {quoted(unit)} is not a unit of length; expected µm, nm")
+    x, z = (table.finite((0, 1), what) * np.array(factors, np.float64)).T
     x = x - x.min()
     if len(x) > 2 and x.max() < 0.5 * period:
         raise DiffractionError(

@@ -164,11 +164,11 @@ def test_templates_peak_at_their_wavelength():
     ("content", "named"),
     [
         ("", "is empty"),
-        ("wl,a,b\n300,1\n", "is not a table of receptors"),
+        ("wl,a,b\n300,1\n", "a column for each receptor"),
         ("wl,a,b\n500,1,1\n600,1,1\n", "400"),
         ("wl,a,b\n300,1,-1\n700,1,1\n", "0 or more"),
         ("wl,a\n300,1\n700,1\n", "two receptors"),
-        ("wl,a,b\n300,1,nan\n700,1,1\n", "is not a table of receptors"),
+        ("wl,a,b\n300,1,nan\n700,1,1\n", "line 2"),
         ("wl,a,b\n300,1,0\n700,1,0\n", "receptor b is 0"),
         ("wl,l,l\n300,1,1\n700,1,1\n", "'l' cannot name a receptor"),
         ("wl,a,\n300,1,1\n700,1,1\n", "cannot name a receptor"),

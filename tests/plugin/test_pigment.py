@@ -123,7 +123,7 @@ def _transmitted(angle, n):
         ("nothing\n", "is not a spectrum"),
         ("400,0.1\n400,0.2\n", "is not a spectrum"),
         ("300,-5\n800,3\n", "-5 to 3"),
-        ("300,1\n400,word\n800,3\n", "400,word"),
+        ("300,1\n400,word\n800,3\n", "word"),
         ("300,500\n800,3\n", "3 to 500"),
     ],
 )

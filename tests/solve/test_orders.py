@@ -103,20 +103,15 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
         polygon([(0, 0), (0.5, 0.1), (0.9, 0.3), (1.45, 0.02), (0.9, 0)], 1.0)
 
 
-def test_a_table_that_misses_its_tolerance_is_refined_or_accepted(monkeypatch):
+def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
     monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
-    with pytest.raises(DiffractionError, match=r"5 % of directions .tolerance 0.40%.*accept=True"):
-        solve_orders(PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3))
-    with pytest.warns(md.DiffractionWarning, match="on average"):
-        coarse = solve_orders(
-            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
-        )
+    strict = replace(SETTINGS, tolerance=1e-3)
+    with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
+        coarse = solve_orders(PROFILE, "none", settings=strict)
     monkeypatch.setattr(orders, "REFINEMENTS", 1)
     with pytest.warns(md.DiffractionWarning, match="on average"):
-        finer = solve_orders(
-            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
-        )
+        finer = solve_orders(PROFILE, "none", settings=strict)
     assert finer.header["error_mean"] < coarse.header["error_mean"]
 
 
@@ -134,7 +129,7 @@ def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_the_integral_metho
         ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
         ("x,z\n0,1\n0.3\n", "line 3"),
         ("0,1,2\n", "line 1"),
-        ("0,nan\n1,0\n", "finite"),
+        ("0,nan\n1,0\n", "line 1"),
         ("# nothing\n", "no points"),
         ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "read_orders"),
     ],

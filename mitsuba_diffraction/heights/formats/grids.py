@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 import re
 import tokenize
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import DiffractionError
+from ...columns import read_columns
+from ...errors import DiffractionError, quoted
 from ..field import MAX_PIXELS, check_pixel_count
 from ..lengths import micrometres_of
 from . import RawHeights, first_line
 
 _BLOCK = 1 << 22  # values that are copied at a time
 
-_MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
+# bytes of a text of so many points, x, y and height
+_LARGEST = 24 * 3 * MAX_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
 _SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
 _VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
@@ -77,93 +79,50 @@ def read_text(path: Path) -> RawHeights:
 
     Heights are in µm unless a header line says "Value units: nm"; "Width: 10 µm" and
     "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points without data.
-    Three columns are x, y (µm) and height, which have to form a regular grid. With semicolons or
-    tabs between numbers, a comma is a decimal comma.
+    Three columns are x, y and height, which have to form a regular grid; a line of names above
+    them may give their units, µm without. Separators and decimal commas are as in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.
     """
     shown = repr(str(path))
-    try:
-        with path.open(encoding="utf-8-sig") as stream:
-            rows, header = _parse(stream, shown)
-    except UnicodeDecodeError as error:
-        raise DiffractionError(f"{shown} is not text (UTF-8)") from error
-    except OSError as error:
-        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
-    if not rows:
-        raise DiffractionError(f"{shown} has no line of numbers")
-    values = np.array(rows)
-    pixel_size: tuple[float, float] | None
-    if np.isnan(values[:, -1]).all():
-        values = values[:, :-1]  # a separator at the end of every line, not a column
-    unit, stated, size = _read_header(header, shown)
+    table = read_columns(path, _LARGEST)
+    if not len(table.numbers):
+        raise DiffractionError(f"{shown} has no line of numbers; expected heights in µm")
+    values = table.with_gaps(range(table.numbers.shape[1]), "a grid of heights in µm")
     ny, nx = values.shape
+    check_pixel_count(ny, nx, shown) if values.size > 3 * MAX_PIXELS else None
+    unit, stated, size = _read_header(table.header.values(), shown)
+    points = nx == 3 and ny > 3 and size is None  # a header with sizes belongs to a grid
+    if not points:
+        _refuse_names(table.header, shown)
     if nx < 2 or ny < 2:
         raise DiffractionError(
             f"{shown} holds {nx} x {ny} numbers, a line scan; a height field needs a map (ny, nx)"
         )
-    if nx == 3 and ny > 3 and size is None:  # a header with sizes belongs to a grid
-        values, pixel_size = _from_points(values, shown)
+    pixel_size: tuple[float, float] | None
+    if points:
+        units = [_factor(u, shown) if u else 1.0 for u in table.units]
+        unit, stated = (units[2], table.units[2]) if table.units[2] else (unit, stated)
+        values, pixel_size = _from_points(values * [*units[:2], 1.0], shown)
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
     return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
 
 
-def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[str]]:
-    """Split text into rows of numbers and the header's lines."""
-    rows: list[list[float]] = []
-    header: list[str] = []
-    split: Callable[[str], list[str]] | None = None
-    count = 0
-    for number, line in enumerate(lines, start=1):
-        text = line.strip("\r\n")
-        if not text.strip():
-            continue
-        if text.lstrip()[0] in "#%" or (not rows and (_SIZE.match(text) or _VALUES.match(text))):
-            header.append(text)
-            continue
-        if split is None:
-            split = _splitter(text)
-        row = [_number(cell, number, shown) for cell in split(text)]
-        if rows and len(row) != len(rows[0]):
+def _refuse_names(header: dict[int, str], shown: str) -> None:
+    """Raise a DiffractionError for lines above a grid that are neither comment nor size."""
+    for place, line in header.items():
+        if line.lstrip()[0] not in "#%" and not (_SIZE.match(line) or _VALUES.match(line)):
             raise DiffractionError(
-                f"{shown}, line {number}: {len(row)} numbers where the first row has "
-                f"{len(rows[0])}; a grid has equally many in each"
+                f"{shown}, line {place}: {quoted(line)} is no row of numbers; expected a grid of "
+                "heights in µm (comments begin with '#')"
             )
-        rows.append(row)
-        count += len(row)
-        if count > 3 * MAX_PIXELS:
-            check_pixel_count(count, count, shown)
-    return rows, header
 
 
-def _splitter(line: str) -> Callable[[str], list[str]]:
-    """Return the function that splits lines with the separators of `line` into cells."""
-    if ";" in line:
-        return lambda text: text.replace(",", ".").split(";")
-    if "\t" in line.strip():
-        return lambda text: text.strip(" ").replace(",", ".").split("\t")
-    if "," in line:
-        return lambda text: text.split(",")
-    return str.split
-
-
-def _number(cell: str, line: int, shown: str) -> float:
-    """Convert a cell of line number `line` to a float; NaN where data is missing."""
-    word = cell.strip()
-    if word.lower() in _MISSING:
-        return math.nan
-    try:
-        return float(word)
-    except ValueError as error:
-        raise DiffractionError(
-            f"{shown}, line {line}: {word[:40]!r} is not a number; expected a grid of heights in "
-            "µm (comments begin with '#')"
-        ) from error
-
-
-def _read_header(header: list[str], shown: str) -> tuple[float, str, tuple[float, float] | None]:
+def _read_header(
+    header: Iterable[str], shown: str
+) -> tuple[float, str, tuple[float, float] | None]:
     """Return µm per unit of the heights, the unit's name, and the patch's size, µm, if stated."""
     unit, stated = 1.0, ""
     sizes: dict[str, float] = {}

@@ -42,7 +42,7 @@ _STEP = 1.0 / 30_000.0
 _MUELLER = " mueller"
 #: Attribute of tables of crossed gratings.
 _CROSSED = "crossed"
-_AGAIN = "solve it again with solve_orders"
+_AGAIN = "solve it again (the command 'solve', or solve_orders)"
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -179,7 +179,10 @@ def _advice(path: Path) -> str:
         )
     if kind_of(path) is FileKind.TABLE:
         return "tables of heights (EXR) belong to the BSDF 'diffraction'"
-    return "make one with solve_orders, or with read_orders from efficiencies of other programs"
+    return (
+        "make one with the command 'solve' (solve_orders), or of efficiencies of other programs "
+        "with 'solve --import' (read_orders)"
+    )
 
 
 def _table(file: Any) -> OrderTable:
