@@ -48,8 +48,7 @@ class Orders:
     """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
     wavelength_range : of the light, nm.
-    densest : largest index of the media that light travels in; order 0 of a dielectric is summed
-        apart from the others however wide its lobe is.
+    densest : largest index of the media that light travels in.
     finer : factor on the quadrature's resolution.
     """
 
@@ -70,7 +69,7 @@ class Orders:
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)
-        self.mixture = order_mixture(table, scale, reach, smoothing, apart=densest > 1.0)
+        self.mixture = order_mixture(table, scale, reach, smoothing)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.strong = len(self.mixture.frequency)
