@@ -21,9 +21,10 @@ and 0.005 for β up to 2.
 
 from __future__ import annotations
 
-from .arithmetic import Number, formula, of
+from .arithmetic import Number, formula, is_complex, of
 from .boundary import Geometry, Jones, facets
-from .fresnel import Index, amplitudes, reflectance
+from .fresnel import Filmed, Index, amplitudes, reflectance
+from .stack import Stacked
 
 #: X at which the slope is measured; the lobe of grazing light reaches about as far.
 SLOPE_AT = 1.25
@@ -61,11 +62,19 @@ def horizon_correction(cos_i: Number, cos_o: Number, sharpness: Number, slope: N
 
 @formula
 def grazing_slope(index: Index, sharpness: Number) -> Number:
-    """Return β, by which R falls as exp(−βX) from the horizon to the end of a grazing lobe."""
+    """Return β, by which R falls as exp(−βX) from the horizon to the end of a grazing lobe.
+
+    It is 0 where reflectances do not fall like that: of metals, of total reflection, and under
+    films and stacks, whose fringes go up and down.
+    """
     xp = of(sharpness)
+    if isinstance(index, Filmed | Stacked):
+        return 0.0 * sharpness
     cosine = xp.minimum(SLOPE_AT * xp.reciprocal(sharpness), 1.0)
     falls = xp.log2(xp.maximum(reflectance(cosine, index), 1e-6)) * (-_NEPER / SLOPE_AT)
-    return xp.clip(falls, 0.0, MOST_SLOPE)
+    epsilon = index * index
+    falling = (epsilon.real if is_complex(epsilon) else epsilon) > 1.0
+    return xp.where(falling, xp.clip(falls, 0.0, MOST_SLOPE), 0.0)
 
 
 def mirror(geometry: Geometry, index: Index) -> Jones:

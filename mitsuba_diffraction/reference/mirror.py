@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.fresnel import Index
+from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import wavenumber
 from .fresnel import reflectance
 
@@ -52,14 +52,15 @@ def correction(cosine: Real, sharpness: Real, slope: Real) -> Real:
 def horizon_correction(light: Any, sigma: float, index: Index | None, bare: bool = True) -> Real:
     """Return C(X_i) C(X_o) of a window's σ (µm) for `model.Light`.
 
-    index : of the mirror; None of a perfect reflector. R is 1 at the horizon, except under a coat
-        (bare=False), where β is 0.
+    index : of the mirror; None of a perfect reflector. β is that of a bare dielectric, and 0 of
+        metals, of total reflection, under films, and under a coat (bare=False).
     """
     sharpness = np.sqrt(wavenumber(light.wavelength) * sigma)
     slope = np.zeros_like(sharpness)
-    if bare and index is not None:
+    if bare and index is not None and not isinstance(index, Filmed):
         there = reflectance(np.minimum(SLOPE_AT / sharpness, 1.0), index)
-        slope = np.clip(-np.log(np.maximum(there, 1e-6)) / SLOPE_AT, 0.0, MOST_SLOPE)
+        falls = np.clip(-np.log(np.maximum(there, 1e-6)) / SLOPE_AT, 0.0, MOST_SLOPE)
+        slope = np.where(np.real(index**2) > 1.0, falls, 0.0)
     at_i, at_o = (correction(w[:, 2], sharpness, slope) for w in (light.wi, light.wo))
     return at_i * at_o
 
