@@ -21,7 +21,8 @@ from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.orders import CrossedTable, OrderTable
-from ..tables.store import cached_table, key_of
+from ..tables.source import cached_table
+from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 
 

@@ -47,7 +47,7 @@ class Measurement:
     def of_file(self, file: Path) -> list[Spectra]:
         """Measure the spectra of one file, or of its crops."""
         from ..tables.orders import load_any_orders
-        from ..tables.store import loaded_table
+        from ..tables.source import loaded_table
 
         kind = kind_of(file)
         if kind is FileKind.ORDERS:

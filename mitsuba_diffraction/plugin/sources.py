@@ -22,7 +22,8 @@ from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.build.checks import warnings_of
-from ..tables.store import cached_table, key_of, loaded_table
+from ..tables.source import cached_table, loaded_table
+from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
 

@@ -17,7 +17,9 @@ sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
 orders             solved efficiencies of a periodic profile's orders
-store              the cache of all of these
+fields             checks of single values that are read from files
+source             the table of any source of heights, built once
+store              the cache, of whatever packs itself into a record
 """
 
 from __future__ import annotations

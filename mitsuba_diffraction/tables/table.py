@@ -19,6 +19,7 @@ from ..optics.geometry import sigma_of, wavenumber
 from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid
+from .store import Record
 
 #: Raised whenever the meaning of the coefficients changes; tables of another version are refused.
 FORMAT_VERSION = 6
@@ -147,6 +148,21 @@ class DiffractionTable:
             return self
         settings = replace(self.settings, coherence="ensemble")
         return replace(self, grid=replace(self.grid, coherent=False), settings=settings)
+
+    def to_record(self) -> Record:
+        """Return the record of the table for the cache."""
+        from .document import document_of, plain
+
+        document = json.loads(json.dumps(document_of(self), default=plain))
+        return Record(document, [self.coefficients])
+
+    @classmethod
+    def from_record(cls, record: Record) -> DiffractionTable:
+        """Return the table of such a record; raises a ValueError for what does not fit."""
+        from .document import parse_document, with_coefficients
+
+        (coefficients,) = record.arrays
+        return with_coefficients(parse_document(record.document), coefficients)
 
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of names, statistics and measured errors."""

@@ -12,8 +12,8 @@ from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Material, Surface
+from ...tables.colour.table import cached_colours
 from ...tables.directional import FINE, DirectionalTable
-from ...tables.store import cached_colours
 from .lobes import colour_power, pack_lobes
 from .maps import evaluated
 from .packing import (

@@ -12,12 +12,11 @@ from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Surface
 from ...progress import Progress
-from ...tables.colour.table import colour_difference, power_colour_difference
+from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.orders import OrderTable, cells
 from ...tables.orders.grids import middles, rows, wavelength_of
 from ...tables.orders.table import Counts
 from ...tables.powers import power_series, powers_at
-from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting

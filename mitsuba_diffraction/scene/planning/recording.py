@@ -33,7 +33,7 @@ from ...plugin.types import (
     Vector2f,
 )
 from ...settings import TableSettings
-from ...tables.store import table_key
+from ...tables.source import table_key
 from ...tables.table import DiffractionTable
 from ..elements import own_id
 

@@ -12,16 +12,18 @@ directions of a blazed grating: s is a compromise then.
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 from functools import partial
 
 import numpy as np
 
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
+from ..fields import check_names, mapping
 from ..order_mixture import MOST_STRONG, STRONG
-from ..store import DirectionalTables, cached_directions
+from ..store import Record, cached, key_of
 from ..table import DiffractionTable
 from .conserved import Dielectric, Reflector
 from .gain import thick
@@ -58,6 +60,25 @@ class Conservation:
     def scales(self) -> list[DirectionalTable] | None:
         """Scales of the sides that the surface has light on, or None where all are 1."""
         return [side for side in (self.scale, self.scale_below) if side is not None] or None
+
+    def to_record(self) -> Record:
+        """Return the record of the functions for the cache."""
+        found = {name: table for name, table in vars(self).items() if table is not None}
+        wavelengths = {name: table.wavelengths.tolist() for name, table in found.items()}
+        return Record(wavelengths, [table.values for table in found.values()])
+
+    @classmethod
+    def from_record(cls, record: Record) -> Conservation:
+        """Return the functions of such a record; raises a ValueError for what does not fit."""
+        document = mapping(record.document, "energy")
+        check_names(document, (field.name for field in fields(cls)), ())
+        pairs = zip(document.items(), record.arrays, strict=True)
+        return cls(**{name: DirectionalTable.parse(lam, values) for (name, lam), values in pairs})
+
+
+_known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 class Surface:
@@ -231,16 +252,15 @@ class Energy:
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""
 
-        def make() -> DirectionalTables:
+        def make() -> Conservation:
             light = self.wavelength_range
-            surface = Surface(self.table, self.material, height_scale, light)
-            conservation = surface.conservation(light)
-            return {name: table for name, table in vars(conservation).items() if table is not None}
+            return Surface(self.table, self.material, height_scale, light).conservation(light)
 
         versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
-        return Conservation(**cached_directions("energy", self.table, made_of, make))
+        key, memory = key_of(self.table.digest(), made_of), _known.setdefault(self.table, {})
+        return cached("energy", key, memory, make, Conservation)
 
     @property
     def _lattice(self) -> tuple[int, float]:

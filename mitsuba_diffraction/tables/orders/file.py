@@ -30,6 +30,7 @@ from scipy.io import netcdf_file
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ..fields import mapping
 from .crossed import CrossedTable
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
@@ -188,8 +189,7 @@ def _advice(path: Path) -> str:
 def _table(file: Any) -> OrderTable:
     """Return the table of an open file."""
     outline = _outline(file)
-    if not isinstance(header := json.loads(outline["header"]), dict):
-        raise ValueError("its header is no JSON object")
+    header = mapping(json.loads(outline["header"]), "header")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     unpacked: dict[tuple[int, str], NDArray[np.float32]] = {}
     for name, variable in file.variables.items():
@@ -254,7 +254,8 @@ def _crossed(file: Any) -> CrossedTable:
         raise ValueError("its checksum is of another one")
     values = (variable[:] * variable.scale_factor).astype(np.float32)
     (d_x, d_y), (low, high) = map(float, file.periods), map(float, file.wavelengths)
-    return CrossedTable((d_x, d_y), (low, high), values, json.loads(file.header))
+    header = mapping(json.loads(file.header), "header")
+    return CrossedTable((d_x, d_y), (low, high), values, header)
 
 
 def _crossed_checksum(file: Any, numbers: NDArray[Any]) -> str:
