@@ -64,8 +64,8 @@ def horizon_correction(cos_i: Number, cos_o: Number, sharpness: Number, slope: N
 def grazing_slope(index: Index, sharpness: Number) -> Number:
     """Return β, by which R falls as exp(−βX) from the horizon to the end of a grazing lobe.
 
-    It is 0 where reflectances do not fall like that: of metals, of total reflection, and under
-    films and stacks, whose fringes go up and down.
+    It is 0 where reflectances do not fall like that: of total reflection, and under films and
+    stacks, whose fringes go up and down.
     """
     xp = of(sharpness)
     if isinstance(index, Filmed | Stacked):
@@ -73,8 +73,8 @@ def grazing_slope(index: Index, sharpness: Number) -> Number:
     cosine = xp.minimum(SLOPE_AT * xp.reciprocal(sharpness), 1.0)
     falls = xp.log2(xp.maximum(reflectance(cosine, index), 1e-6)) * (-_NEPER / SLOPE_AT)
     epsilon = index * index
-    falling = (epsilon.real if is_complex(epsilon) else epsilon) > 1.0
-    return xp.where(falling, xp.clip(falls, 0.0, MOST_SLOPE), 0.0)
+    total = xp.absolute((epsilon.real if is_complex(epsilon) else epsilon) - 0.5) < 0.5
+    return xp.where(total, 0.0, xp.clip(falls, 0.0, MOST_SLOPE))
 
 
 def mirror(geometry: Geometry, index: Index) -> Jones:

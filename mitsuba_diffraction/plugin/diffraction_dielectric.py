@@ -79,6 +79,7 @@ from .types import (
     Float,
     Interaction,
     Mask,
+    Powers,
     Properties,
     Spectrum,
     Vector2f,
@@ -228,8 +229,8 @@ class DiffractionDielectric(DiffractingSurface):
         power = self.power.power(point, site.scale, site.si)
         ends_factor = dr.safe_sqrt(returned[0] * returned[1])
         factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
-        both = (mi.depolarizer(each * factor) for each in power[:2])
-        return interfering(*both, power.cosine)
+        others, zeroth = (mi.depolarizer(each * factor) for each in power[:2])
+        return interfering(others, zeroth, power.cosine)
 
     # ------------------------------------------------------------------ transmission
 
@@ -240,6 +241,9 @@ class DiffractionDielectric(DiffractingSurface):
         """
         si, point = site.si, crossing.place
         power = self.power.power(point, site.scale, si)
+        if mi.is_rgb:  # a channel out of gamut stays finite where w → 0
+            zeroth = dr.minimum(power.zeroth, power.others + power.zeroth)
+            power = Powers(power.others + power.zeroth - zeroth, zeroth)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))

@@ -16,6 +16,7 @@ from ..optics.geometry import wavenumber
 from .fresnel import reflectance
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: X where the reflectance is compared with that at the horizon, and the largest β.
 SLOPE_AT, MOST_SLOPE = 1.25, 2.4
@@ -49,18 +50,20 @@ def correction(cosine: Real, sharpness: Real, slope: Real) -> Real:
     return np.asarray((1 - s) * below + s * above)
 
 
-def horizon_correction(light: Any, sigma: float, index: Index | None, bare: bool = True) -> Real:
+def horizon_correction(
+    light: Any, sigma: float, index: Index | None, bare: bool = True
+) -> Real:
     """Return C(X_i) C(X_o) of a window's σ (µm) for `model.Light`.
 
-    index : of the mirror; None of a perfect reflector. β is that of a bare dielectric, and 0 of
-        metals, of total reflection, under films, and under a coat (bare=False).
+    index : of the mirror; None of a perfect reflector. β is 0 of total
+        reflection, under films, and under a coat (bare=False).
     """
     sharpness = np.sqrt(wavenumber(light.wavelength) * sigma)
     slope = np.zeros_like(sharpness)
     if bare and index is not None and not isinstance(index, Filmed):
         there = reflectance(np.minimum(SLOPE_AT / sharpness, 1.0), index)
         falls = np.clip(-np.log(np.maximum(there, 1e-6)) / SLOPE_AT, 0.0, MOST_SLOPE)
-        slope = np.where(np.real(index**2) > 1.0, falls, 0.0)
+        slope = np.where(np.abs(np.real(np.asarray(index) ** 2) - 0.5) < 0.5, 0.0, falls)
     at_i, at_o = (correction(w[:, 2], sharpness, slope) for w in (light.wi, light.wo))
     return at_i * at_o
 

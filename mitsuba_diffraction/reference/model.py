@@ -91,7 +91,7 @@ def reflected(
 
 
 def mirrored(
-    light: Light, sigmas: Sigmas, power: Real, index: Complex, measure: Callable[[Complex], Real]
+    light: Light, sigmas: Sigmas, power: Real, index: Index, measure: Callable[[Complex], Real]
 ) -> Real:
     """f_0 of (10) from ⟨|P_0|²⟩."""
     visible = horizon_correction(light, sigmas.zeroth, index)
@@ -170,7 +170,7 @@ def kirchhoff(light: Light, index: Complex) -> Complex:
     return (one_plus_dot / (2 * light.wi[:, 2] * light.wo[:, 2]))[:, None, None] * jones
 
 
-def facets(light: Light, index: Complex) -> tuple[Complex, Real]:
+def facets(light: Light, index: Index) -> tuple[Complex, Real]:
     """U(ωo) diag(r_s, r_p) U(ωi) at the half vector, (n, 2, 2), and 1 + ωi·ωo."""
     wi, wo, _ = light
     s_in, s_out = polarisation_axes(wi, wo)

@@ -95,10 +95,10 @@ def brdf(
     u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
     others, zeroth, phase = window_sums(table, k * u, k * v, k * w * height_scale, place)
     factor = 4 * np.pi**2 * table.sigma**4 * kirchhoff_factor(wi, wo, wavelength, table.sigma)
-    cosines = (np.where(above, np.asarray(each)[..., 2], 1.0) for each in (wi, wo))
+    cos_i, cos_o = (np.where(above, np.asarray(each)[..., 2], 1.0) for each in (wi, wo))
     mirror = k**2 * table.sigma**2 / np.pi * np.where(above, zeroth, 0.0)
     others *= factor
-    mirror *= horizon_correction(*cosines, np.sqrt(k * table.sigma_0), np.zeros_like(k))
+    mirror *= horizon_correction(cos_i, cos_o, np.sqrt(k * table.sigma_0), np.zeros_like(k))
     return np.asarray(others + mirror + 2.0 * phase * np.sqrt(others * mirror))
 
 
