@@ -50,9 +50,7 @@ def correction(cosine: Real, sharpness: Real, slope: Real) -> Real:
     return np.asarray((1 - s) * below + s * above)
 
 
-def horizon_correction(
-    light: Any, sigma: float, index: Index | None, bare: bool = True
-) -> Real:
+def horizon_correction(light: Any, sigma: float, index: Index | None, bare: bool = True) -> Real:
     """Return C(X_i) C(X_o) of a window's σ (µm) for `model.Light`.
 
     index : of the mirror; None of a perfect reflector. β is 0 of total
