@@ -124,9 +124,12 @@ vec3 order_0(float radius, float z)
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
-    vec3 colour = tinted(other_orders(uv, r * r, z) * boundary(cos_half, r, z)
-                         + order_0(r, z) * mirror(cos_half, sigma_0));
-#ifdef COATED
+    vec3 colour = other_orders(uv, r * r, z) * boundary(cos_half, r, z);
+#ifdef ORDER_0
+    colour += order_0(r, z) * mirror(cos_half, sigma_0);
+#endif
+    colour = tinted(colour);
+#if defined(ORDER_0) && defined(COATED)
     colour += order_0(r, 0.0) * face(sigma_0);
 #endif
     return light_colour[light] * colour;

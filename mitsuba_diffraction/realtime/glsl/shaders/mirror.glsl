@@ -1,10 +1,8 @@
 // Order 0, a mirror's lobe: f₀ = R(θh) |a₀|² G(u) C(X_i) C(X_o). The formulas are of optics/mirror.py.
 // All is relative to the factor of `begin_diffraction`, which sets the values of a pair.
 
-#ifdef ORDER_0
-
-vec2 mirror_ends;     // cosθi and cosθo
-float mirror_share;   // of order 0
+vec2 mirror_ends = vec2(1.0);   // cosθi and cosθo
+float mirror_share = 1.0;       // of order 0
 #ifdef COATED
 vec3 mirror_wi, mirror_wo;   // directions within the coat
 float face_share;            // of the coat's face, times its reflectance
@@ -97,5 +95,4 @@ vec3 mirror(float cos_half, float sigma_0)
     return found * boundary_at_all(cos_half);
 }
 
-#endif
 #endif
