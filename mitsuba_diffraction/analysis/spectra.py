@@ -145,8 +145,8 @@ def spectrum(
         SPECTRA.check(described)
     if isinstance(described, Surface):
         sigma = described.sigma
-        if described.material is not None and described.material.known:
-            check_material(described.material.name, lam)
+        if described.material:
+            check_material(described.material, lam)
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
                 f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "

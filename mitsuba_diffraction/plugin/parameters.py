@@ -37,8 +37,8 @@ from .sources import (
     table_of_heights,
 )
 from .stack import UnderStack, read_layers
-from .textures import Orientation
 from .types import BSDF, Properties
+from .varying import Orientation
 from .window_positions import TILINGS, WindowPositions
 
 SOURCES = ("heightfield", "table", "data")

@@ -14,16 +14,13 @@ from .arithmetic import plain
 from .base import SurfaceBSDF
 from .boundary import Boundary, boundary_of
 from .conductors import tabulated_range
-from .description import Film, Surface
-from .description import Material as DescribedMaterial
+from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
-from .layers import UnderFilm
-from .materials import Material, Perfect, tinted
+from .materials import Material, tinted
 from .power import power_model
 from .properties import flag
-from .stack import UnderStack
 from .types import (
     BSDF,
     Colour,
@@ -96,8 +93,8 @@ class DiffractingSurface(SurfaceBSDF):
 
     def ready(self) -> None:
         """See `PluginBSDF.ready`."""
-        owners = self.height_scale, self.orientation, self.lateral_scale.factor, self.fresnel
-        self.parameters += [each for owner in owners if owner for each in owner.changeable]
+        owners = self.height_scale, self.orientation, self.lateral_scale, self.fresnel
+        self.parameters += [each for owner in owners for each in owner.changeable]
         super().ready()
 
     @property
@@ -188,8 +185,7 @@ class DiffractingSurface(SurfaceBSDF):
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
         yield self.height_scale.refusal()
-        if self.lateral_scale.factor is not None:
-            yield self.lateral_scale.factor.refusal()
+        yield self.lateral_scale.refusal()
         yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
@@ -215,8 +211,7 @@ class DiffractingSurface(SurfaceBSDF):
         height, lateral = self.height_scale, self.lateral_scale
         heights = height.range()[0], height.number
         varies = bool(height.texture or lateral.texture)
-        numbers = [each for each in (height, lateral.factor) if each is not None]
-        differentiable = any(each.differentiable for each in numbers)
+        differentiable = height.differentiable or lateral.differentiable
         return ScaleRange(heights, lateral.range_over_table(), varies, differentiable)
 
     def kernel_constants(self) -> tuple[object, ...]:
@@ -228,11 +223,8 @@ class DiffractingSurface(SurfaceBSDF):
 
     def describe(self) -> Surface:
         """Return the description of the surface (`description.describe`)."""
-        structure: Any = self.boundary.material
-        film = Film(*structure.numbers()) if isinstance(structure, UnderFilm) else None
-        stacked = isinstance(structure, UnderStack)
-        if film or stacked:
-            structure = structure.material
+        structure = self.boundary.material
+        material = structure.material or structure
         placed = self.window_positions is not None
         return Surface(
             table=self.table,
@@ -248,15 +240,11 @@ class DiffractingSurface(SurfaceBSDF):
             height_scale=self.height_scale.quantity,
             lateral_scale=self.lateral_scale.quantity,
             largest_scale=float(self.table.height_scale_max),
-            material=DescribedMaterial(
-                structure.kind,
-                None if isinstance(structure, Perfect) else structure.at,
-                tabulated_range(structure.name) if structure.name else None,
-                structure.name,
-            ),
-            film=film,
+            kind=material.kind,
+            index=None if material.kind is Feature.MIRROR else material.at,
+            material=material.name if tabulated_range(material.name) else "",
+            layer=structure.layer,
             model=str(self.boundary),
-            stacked=stacked,
             transmits=self.transmits,
         )
 

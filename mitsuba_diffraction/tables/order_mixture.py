@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from .powers import order_0_power
 from .table import DiffractionTable
@@ -186,12 +186,12 @@ class _Powers:
 
 def _splat(
     frequency: NDArray[np.floating], grid: NDArray[np.floating], deviation: float
-) -> sparse.csr_array:
+) -> scipy.sparse.csr_array:
     """Gaussian weights from frequencies to a grid, (grid, frequencies), of integral 1."""
     exponent = 0.5 * ((frequency - grid[:, None]) / deviation) ** 2
     weights = np.exp(-exponent) / (math.sqrt(2.0 * math.pi) * deviation)
     weights[exponent > _FADED] = 0.0
-    return sparse.csr_array(weights.astype(np.float32))
+    return scipy.sparse.csr_array(weights.astype(np.float32))
 
 
 def _choose(strongest: NDArray[np.float32]) -> NDArray[np.int64]:

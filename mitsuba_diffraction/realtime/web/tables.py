@@ -24,9 +24,6 @@ from ..glsl.solved import MOST_WITHIN, cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, converted, packed_array, packed_series
 
-#: Methods that a page supports.
-WEB_METHODS = ("fast", "exact")
-
 #: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
 DIGITS = 9
 #: Smallest rounding step relative to a table's largest number: more digits are not visible.

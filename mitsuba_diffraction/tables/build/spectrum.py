@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
 
 from ...heights.field import HeightField

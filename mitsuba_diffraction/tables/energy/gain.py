@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import map_coordinates
+import scipy
 
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Heights, model_of
@@ -56,7 +56,7 @@ class Gain:
             for c in (cos_i, cos_o)
         )
         at = np.broadcast_arrays(*rows, np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi))
-        ratio = map_coordinates(self._table, np.stack(at), order=1, mode="nearest")
+        ratio = scipy.ndimage.map_coordinates(self._table, np.stack(at), order=1, mode="nearest")
         reached = self.path.tangential(cos_i, cos_o, cos_turn) < FARTHEST
         return np.asarray(common * ratio * reached)
 

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import i0e
+import scipy
 
 from ...optics.geometry import wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
@@ -179,7 +179,7 @@ class Transport:
         step = (last - first) * np.where(cut, 2.0 * place, 1.0) / LOBE_NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
-        parts *= i0e(2.0 * sin_o * sine / width**2)
+        parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
         cos_in = np.broadcast_to(cos_i, cos_o.shape)
         parts *= self._gain.order_0(cos_in, cos_o, power, np.pi, width**-0.5)

@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import netcdf_file
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
@@ -99,7 +99,7 @@ def _written(
             f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
         )
     content = io.BytesIO()
-    with netcdf_file(content, "w") as file:
+    with scipy.io.netcdf_file(content, "w") as file:
         file.title, file.header = title, json.dumps(dict(table.header), sort_keys=True)
         setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
         file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
@@ -156,7 +156,7 @@ def load_any_orders(path: str | os.PathLike[str]) -> OrderTable | CrossedTable:
     if kind_of(path) is not FileKind.ORDERS:
         raise DiffractionError(f"'{path}' is not a table of orders; {_advice(Path(path))}")
     try:
-        with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
+        with scipy.io.netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
             version = int(getattr(file, ORDERS_ATTRIBUTE))
             if version != FORMAT_VERSION:
                 raise DiffractionError(
