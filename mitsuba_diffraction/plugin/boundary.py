@@ -4,7 +4,8 @@ The formulas are `optics.boundary.MODELS`. With J' = 2 cosθi cosθo J,
 
     f cosθo = N' / (λ² A w² cosθi) · ⟨|P|²⟩,   N' = ½ Σ|J'|²,
 
-and in polarised variants the Mueller matrix of J' takes the place of N'.
+and in polarised variants the Mueller matrix of J' takes the place of N'. Order 0 has the factor
+`Boundary.mirror` in place of N'/(w² cosθi cosθo).
 """
 
 from __future__ import annotations

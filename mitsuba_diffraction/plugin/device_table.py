@@ -69,7 +69,9 @@ class DeviceTable:
     def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
         others, zeroth, *cosine = self.window_sums(qx, qy, kappa)
-        return others + zeroth + sum(2.0 * each * dr.sqrt(others * zeroth) for each in cosine)
+        return (
+            others + zeroth + sum(2.0 * each * dr.sqrt(others) * dr.sqrt(zeroth) for each in cosine)
+        )
 
     def window_sums(
         self, qx: Float, qy: Float, kappa: Float, windows: Sequence[Window] = ()
@@ -103,7 +105,8 @@ class DeviceTable:
             rest = [part * self._inverse_scale for part in total]
             others, zeroth = (dr.square(x) + dr.square(y) for x, y in (rest, centre))
             both = rest[0] * centre[0] + rest[1] * centre[1]
-            cosine = [both * dr.rsqrt(maximum(others * zeroth, 1e-30))]
+            lengths = [dr.rsqrt(maximum(each, 1e-30)) for each in (others, zeroth)]
+            cosine = [both * lengths[0] * lengths[1]]
         else:
             if self.record.components == 2:
                 nothing = [mi.Float(0.0)]

@@ -285,5 +285,5 @@ def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Sp
     if cosine is None:
         return total
     a, b = (dr.maximum(mi.unpolarized_spectrum(f), 0.0) for f in (others, mirror))
-    beats = 2.0 * cosine * dr.sqrt(a * b) * dr.rcp(dr.maximum(a + b, 1e-30))
+    beats = 2.0 * cosine * dr.sqrt(a) * dr.sqrt(b) * dr.rcp(dr.maximum(a + b, 1e-30))
     return total * mi.Spectrum(1.0 + beats)

@@ -77,8 +77,8 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
     if "ORDER_0" in names and index is not None:
         program.add(grazing_slope, index, "float")
         if "COATED" in names:
-            coat = Coat("float", "float", "float")
-            program.add(coated_mirror, "vector", "vector", index, coat)
+            over = Coat("float", "float", "float")
+            program.add(coated_mirror, "vector", "vector", index, over)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(
