@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+TableSource        table of a file, recipe or height field, built once for all that ask
 OrderTable         solved efficiencies of a grating's orders
 CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
@@ -33,9 +34,13 @@ current variant of Mitsuba and in every variant that is set later.
 
 from __future__ import annotations
 
+import os
 import sys
 
 if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main__ comes last
+    # Python would import what follows from the current folder, which may be somebody else's
+    if not sys.flags.safe_path and sys.path[0] != os.path.dirname(os.path.dirname(__file__)):
+        del sys.path[0]
     from _mitsuba_diffraction import prepare
 
     prepare()
@@ -60,7 +65,7 @@ if TYPE_CHECKING:
     from .solve.crossed import solve_crossed
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
-    from .tables import DiffractionTable
+    from .tables import DiffractionTable, TableSource
     from .tables.orders import CrossedTable, OrderTable
     from .thesis import period_fit
 
@@ -73,6 +78,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "OrderTable",
+    "TableSource",
     "bsdf_dict",
     "cluster",
     "design",
@@ -115,6 +121,7 @@ _NAMES = {
     "DiffractionTable": "tables",
     "HeightField": "heights",
     "OrderTable": "tables.orders",
+    "TableSource": "tables",
     "bsdf_dict": "plugin.dictionary",
     "hologram": "scene.hologram",
     "preset": "plugin.presets",

@@ -16,7 +16,7 @@ from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import Figures, check_outputs, elapsed, save_figure
+from .report import Figures, check_outputs, elapsed, output_name, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -83,9 +83,12 @@ class _Experiment(NamedTuple):
 
 def run(args: argparse.Namespace) -> Figures:
     """Measure, fit, draw, and return the figures."""
-    output = args.output or Path(f"{args.source.stem}-evaluation.png")
-    written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
-    check_outputs(written, [args.source], "evaluation")
+
+    def files(output: Path) -> list[Path]:
+        return [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
+
+    written = files(output_name(args.output, Path(f"{args.source.stem}-evaluation.png"), files))
+    check_outputs(written)
     experiment = _prepared(args)
     result = _measured(args, experiment)
     report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines
@@ -191,16 +194,18 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
     from ..analysis.media import in_medium
-    from ..analysis.scans import Scan, bsdf_of, table_of
+    from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..scene.load import set_variant
+    from ..tables.source import TableSource
 
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
     set_variant("llvm_ad_spectral")
     asked = {name: value for name, value in settings.items() if name != "step"}
     asked["wavelength_range"] = table_range(steps)
-    table = table_of(in_medium(Scan([patch], TableSettings(**asked)), args.ext_ior), bar)
+    source = in_medium(TableSource.of(patch), args.ext_ior)
+    table = table_of(source, source.settings_for(asked), bar)
     return partial(brdf_values, bsdf_of(table, **surface)), table.sigma
 
 

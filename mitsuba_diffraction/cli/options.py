@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
-from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
 from .report import Figures
@@ -354,28 +353,11 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
-    from ..heights.load import load_heights
-    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
-    options = load_options(args)
-    source = args.source
-    if kind_of(source) is FileKind.TABLE:
-        raise DiffractionError(
-            f"'{source}' is a table; this needs the heights it was made of, or their recipe"
-        )
-    if kind_of(source) is FileKind.ORDERS:
-        raise DiffractionError(
-            f"'{source}' has solved orders, which leave where the grating equation says, and no "
-            "heights; 'mitsuba-diffraction orders', 'spectrum' and 'brdf-map' show it"
-        )
-    settings = table_options(args)
-    if kind_of(source) is FileKind.RECIPE:
-        recipe = Recipe.load(source)
-        settings = {**recipe.table, **settings}
-        patch = recipe.field(options)
-    else:
-        patch = load_heights(source, options)
-    return patch, {name: settings[name] for name in TABLE_NAMES if name in settings}
+    source = Source.of(args.source, load_options(args))
+    settings = {**source.settings, **table_options(args)}
+    return source.field(), {name: settings[name] for name in TABLE_NAMES if name in settings}
 
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:

@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import importlib.util
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,8 +80,19 @@ def film_of(
         client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
         preview=args.preview, threads=worker_threads(args),
     )  # fmt: skip
+    say_files(path for task in film.frames for path, _ in task.files.files)
     say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
     return film
+
+
+def say_files(files: Iterable[str | os.PathLike[str]]) -> None:
+    """Print the files that are sent to workers without them, before the first is sent."""
+    here = Path.cwd()
+    names = []
+    for file in sorted({Path(os.path.abspath(file)) for file in files}):
+        inside = file.is_relative_to(here)
+        names.append(str(file.relative_to(here) if inside else file))
+    say(f"files for workers that lack them: {', '.join(names)}")
 
 
 def say_report(film: Film) -> dict[str, Any]:

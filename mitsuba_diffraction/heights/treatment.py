@@ -9,8 +9,8 @@ import numpy as np
 
 from ..files import FileKind, kind_of
 from .field import HeightField
-from .load import load_heights
 from .read import LoadOptions
+from .source import Source
 
 #: Ratio of the steps between medians of neighbouring rows to those of columns, from which on scan
 #: lines jump. Isotropic surfaces stay within 1.5; ridges along x have correlated rows.
@@ -30,7 +30,7 @@ def treatment_warning(path: Path, options: LoadOptions, field: HeightField) -> s
         return ""
     if not any("periodic by" in line or "tapered" in line for line in field.history):
         return ""
-    raw = load_heights(path, replace(options, periodic="none"))
+    raw = Source.of(path, replace(options, periodic="none")).field()
     removed = float((raw.heights - field.heights).std())
     if removed < field.rms_height:
         return ""

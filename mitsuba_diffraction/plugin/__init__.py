@@ -18,6 +18,7 @@ parameter_changes  changeable parameters, their checks; what `dr.freeze` must kn
 sources         table of a scene's heights, recipe or file, built once
 presets         named looks: a patch with its material and layers, by name
 registration    registration of the plugins in every variant
+installed       Mitsuba's own plugins and tables, before files of the same names beside a scene
 dictionary      `bsdf_dict`: from arrays
 directions      pairs of directions in the patch's frame: above, in a coat, below, through
 boundary        reflected amplitude of the material, with its polarisation

@@ -21,6 +21,7 @@ from .energy_factors import ScaleRange
 from .materials import Material, tinted
 from .power import power_model
 from .properties import flag
+from .sources import read_patch
 from .types import (
     BSDF,
     Colour,
@@ -75,7 +76,7 @@ class DiffractingSurface(SurfaceBSDF):
         self.lateral_scale = LateralScale(props)
         # κ grows by the index, as if heights did
         stretch = self.lateral_scale.of_table
-        self.table, self.heights = read.read_patch(props, largest * optical, stretch)
+        self.table, self.heights = read_patch(props, largest * optical, stretch)
         most = largest if varies else self.table.height_scale_max / optical
         advice = ", the table's range; load the plugin anew with that height_scale"
         self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..plugin.description import Surface
-from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest, tables_by
+from ..plugin.sources import SHORTEST_WAVELENGTH
+from ..tables.source import TableRequest, providing
 from ..tables.table import DiffractionTable
 
 # Parameters of a film that its size and format follow from.
@@ -81,7 +82,7 @@ def wider_tables(first: float) -> Iterator[None]:
         wider = replace(request.settings, wavelength_range=(min(first, low), last))
         return request.cached(wider)
 
-    with tables_by(table):
+    with providing(table):
         yield
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import count_between, number_between
+from ..limits import MOST_LAYERS, check_count
 from .grating_index import Material, material_of
 from .profiles import Profile
 from .stations import Grating
@@ -19,8 +20,6 @@ Substance = str | float | complex | Material
 #: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
 #: thickness and parts, of a material and the x in µm at which it begins and ends.
 Layers = Sequence[tuple[Any, ...]]
-#: Layers at most, of a file.
-MOST_LAYERS = 1000
 
 
 def structure_of(
@@ -79,10 +78,11 @@ def read_layers(path: str | os.PathLike[str]) -> Layers:
         raise DiffractionError(f"{shown} is not TOML: {one_line(str(error))}") from error
     check_keys(shown, content, ("layers", "repeat"))
     repeat = count_between(content.get("repeat", 1), f"{shown}: repeat", 1, MOST_LAYERS)
-    layers = list(checked_layers(content.get("layers"), f"{shown}: layers")) * repeat
-    if not 0 < len(layers) <= MOST_LAYERS:
-        raise DiffractionError(f"{shown}: {len(layers)} layers; expected 1 to {MOST_LAYERS}")
-    return tuple(layers)
+    layers = checked_layers(content.get("layers"), f"{shown}: layers")
+    if not layers:
+        raise DiffractionError(f"{shown}: 0 layers; expected 1 to {MOST_LAYERS}")
+    check_count(len(layers) * repeat, MOST_LAYERS, shown, "layers")
+    return tuple(layers) * repeat
 
 
 def checked_layers(value: Any, shown: str) -> Layers:

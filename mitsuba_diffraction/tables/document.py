@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -21,6 +22,7 @@ from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .fields import check_names, list_of, mapping, number, numbers, pair, require, whole
 from .layout import Grid
+from .store import Record
 from .table import DiffractionTable
 
 #: Largest table, bytes: a larger one fits no renderer's memory.
@@ -53,6 +55,18 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "grid": _present(table.grid),
         "order_0": table.order_0.tolist(),
     }
+
+
+def to_record(table: DiffractionTable) -> Record:
+    """Return the record of a table for the cache."""
+    document = json.loads(json.dumps(document_of(table), default=plain))
+    return Record(document, [table.coefficients])
+
+
+def from_record(record: Record) -> DiffractionTable:
+    """Return the table of such a record; raises a ValueError for what does not fit."""
+    (coefficients,) = record.arrays
+    return with_coefficients(parse_document(record.document), coefficients)
 
 
 def plain(value: Any) -> Any:

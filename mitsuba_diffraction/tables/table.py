@@ -65,6 +65,8 @@ class DiffractionTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `exr.save_table`
     window_sum: ClassVar[Callable[..., NDArray[np.float64]]]  #: ⟨|P|²⟩: `lookup.window_sum`
     brdf: ClassVar[Callable[..., NDArray[np.float64]]]  #: the model for R = 1: `lookup.brdf`
+    to_record: ClassVar[Callable[..., Record]]  #: for the cache: `document.to_record`
+    from_record: ClassVar[Callable[[Record], DiffractionTable]]  #: `document.from_record`
 
     @property
     def coherence_width(self) -> float:
@@ -148,21 +150,6 @@ class DiffractionTable:
             return self
         settings = replace(self.settings, coherence="ensemble")
         return replace(self, grid=replace(self.grid, coherent=False), settings=settings)
-
-    def to_record(self) -> Record:
-        """Return the record of the table for the cache."""
-        from .document import document_of, plain
-
-        document = json.loads(json.dumps(document_of(self), default=plain))
-        return Record(document, [self.coefficients])
-
-    @classmethod
-    def from_record(cls, record: Record) -> DiffractionTable:
-        """Return the table of such a record; raises a ValueError for what does not fit."""
-        from .document import parse_document, with_coefficients
-
-        (coefficients,) = record.arrays
-        return with_coefficients(parse_document(record.document), coefficients)
 
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of names, statistics and measured errors."""

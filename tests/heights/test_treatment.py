@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.heights.load import load_heights
 from mitsuba_diffraction.heights.read import LoadOptions
+from mitsuba_diffraction.heights.source import Source
 from mitsuba_diffraction.heights.spectra import examine_periods, seen_slope
 from mitsuba_diffraction.heights.treatment import jumping_lines, treatment_warning
 from tests.support.directions import rough_patch
@@ -18,7 +18,7 @@ OPTIONS = LoadOptions.parse(pixel_size=0.05)
 def loaded(heights, path, **options):
     np.save(path, heights)
     how = OPTIONS.updated(LoadOptions.parse(**options))
-    return how, load_heights(path, how)
+    return how, Source.of(path, how).field()
 
 
 def test_a_bowl_that_is_made_periodic_is_warned_of(tmp_path):

@@ -8,12 +8,15 @@ to the light. Without `jacobian` and with an even `vndf` the tensors are f cosθ
 from __future__ import annotations
 
 import contextlib
+import errno
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...plugin.types import Float
@@ -62,8 +65,22 @@ def save_rgl(
         "vndf": np.ones((*shape[:2], 2, 2)), "luminance": density, "spectra": spectra,
     }  # fmt: skip
     numbers = {name: array.astype(np.float32) for name, array in tensors.items()}
-    # Mitsuba's writer prints the file's name
-    with atomic_path(path) as temporary, contextlib.redirect_stdout(None):
-        mi.tensor_io.write(
-            str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
-        )
+    # Mitsuba's writer prints the file's name, and loses the error of a full disk when it closes
+    with atomic_path(path) as temporary:
+        with contextlib.redirect_stdout(None):
+            mi.tensor_io.write(
+                str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
+            )
+        _check_written(temporary, numbers)
+
+
+def _check_written(file: Path, tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Raise an OSError if a file does not hold these tensors."""
+    try:
+        with contextlib.redirect_stdout(None):
+            found = mi.tensor_io.read(str(file))
+        whole = all(np.array_equal(found[name], array) for name, array in tensors.items())
+    except Exception:  # whatever Mitsuba's reader makes of a file that is cut short
+        whole = False
+    if not whole:
+        raise OSError(errno.ENOSPC, "the file is cut short; is the disk full?")
