@@ -6,7 +6,7 @@ diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/p
 diffraction_dielectric  the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
-depth_weights   its weights by the depth of solved gratings
+weights         its weights, given or by the depth of solved gratings
 base            `PluginBSDF`, answers, parameters and their changes; `SurfaceBSDF`, the one `sample`
 surface         `DiffractingSurface`, a table with factors, orientation and power
 description     record of a surface that shaders, OSL, maps and plans read

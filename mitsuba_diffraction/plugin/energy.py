@@ -115,13 +115,13 @@ class EnergyModel:
 
     def factor(self, site: Site, wo: Vector3f) -> Colour:
         """Return s(ωi) s(ωo) per channel, less at the horizon."""
-        product = mi.UnpolarizedSpectrum(1.0)
+        product, horizon = mi.UnpolarizedSpectrum(1.0), mi.Float(1.0)
         for direction in (site.si.wi, wo):
             if self._scale.present:
                 product *= mi.UnpolarizedSpectrum(self._scale.at(direction, site))
             cosine = mi.Frame3f.cos_theta(direction)
-            product *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
-        return product
+            horizon *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
+        return product * horizon
 
     def reflected(self, direction: Vector3f, site: Site) -> Colour:
         """Return a(ω) over the flat interface's reflectance, per channel; 1 without `beneath`."""
