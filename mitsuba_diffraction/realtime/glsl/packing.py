@@ -73,8 +73,11 @@ def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
             "glossy_steps": ((radii - 1) / table.radius_end, (zs - 1) / table.z_max),
             "glossy_size": (radii, zs),
             "area_factor": area_factor(table.sigma),
+            "sigma_0": table.sigma_0,
+            "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
         },
-        definitions={"COHERENT": ""} if table.expansion.kind == "amplitude" else {},
+        definitions={"ORDER_0": ""}
+        | ({"COHERENT": ""} if table.expansion.kind == "amplitude" else {}),
     )
 
 
@@ -121,7 +124,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "inverse_scale": 1.0 / scale,
             "area_factor": area_factor(table.sigma),
         },
-        definitions={"TEXELS": str(record.stored // 4)},
+        definitions={"TEXELS": str(record.stored // 4), "ORDER_0": ""},
     )
 
 
