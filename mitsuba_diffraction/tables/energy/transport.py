@@ -30,7 +30,7 @@ from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, Gain
+from .gain import LEAST_COSINE, PathGain
 from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between directions, at least.
@@ -112,7 +112,7 @@ class Transport:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
         above = float(wavenumber(wavelength))
-        self._gain = Gain(path, orders.roughness, above, orders.height_scale)
+        self._gain = PathGain(path, orders.roughness, above, orders.height_scale)
         self._k = above * path.left.index  # where the light goes to
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
