@@ -44,7 +44,7 @@ _WIDE = 0.08
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
-class Orders:
+class ScatteredOrders:
     """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
     wavelength_range : of the light, nm.
@@ -102,7 +102,7 @@ class Transport:
 
     def __init__(
         self,
-        orders: Orders,
+        orders: ScatteredOrders,
         path: Path,
         wavelength: float,
         theta: Real,
@@ -137,7 +137,7 @@ class Transport:
         return np.maximum(np.cos(theta), LEAST_COSINE), sine
 
     def _kappa(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return κ over the height scale and `Orders.densest`."""
+        """Return κ over the height scale and `ScatteredOrders.densest`."""
         return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
 
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
