@@ -36,7 +36,7 @@ def crops_of(
     """
     if kind_of(path) is FileKind.RECIPE:
         raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")
-    raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
+    raw = options.updated(LoadOptions.parse(level="none"))
     whole = load_heights(path, raw)
     treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)
     parts = _parts(whole, count) if side is None else _squares(whole, count, side)

@@ -133,13 +133,13 @@ def _draw(args: argparse.Namespace) -> None:
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
     from ..heights.load import load_heights
-    from ..heights.treatment import jumping_lines, treatment_warning
+    from ..heights.validity import jumping_lines
 
     how = options.load_options(args)
     field = load_heights(file, how)
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
-    suggested = (treatment_warning(file, how, field), jumping_lines(field))
+    suggested = (jumping_lines(field),)
     return {
         "kind": "height field",
         **field.summary(),

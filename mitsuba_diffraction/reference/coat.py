@@ -40,7 +40,7 @@ def reflected(
     """
     inside = refracted_light(light, coat)
     outside = transmitted(jones, light.wi, light.wo, coat, index)
-    sigma, sigma_0 = sigmas
+    sigma, sigma_0 = sigmas.orders, sigmas.zeroth
     structure = model.reflected(inside, sigma, power / coat**2, outside, measure)
     # The face is a mirror: ⟨|P|²⟩ of a flat patch
     tangential = (light.wi + light.wo)[:, :2]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.geometry import diffraction_coordinates, wavenumber
+from . import scan
 from .model import Sigmas, orders_near, window_sum
 
 
@@ -38,12 +39,32 @@ def window_power(
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     power = np.zeros(len(k))
     for n in np.flatnonzero(above):
-        screen = np.exp(1j * (k[n] * w[n]) * field.heights)
         centre = None if positions is None else (positions[n, 0], positions[n, 1])
-        power[n] = screen_power(
-            screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigmas, coherence, centre
-        )
+        q = (k[n] * u[n], k[n] * v[n])
+        power[n], _ = field_power(field, k[n] * w[n], q, sigmas, coherence, centre)
     return power
+
+
+def field_power(
+    field: HeightField,
+    kappa: float,
+    q: tuple[float, float],
+    sigmas: Sigmas,
+    coherence: str,
+    centre: tuple[float, float] | None = None,
+) -> tuple[float, float]:
+    """Return ⟨|P|²⟩ in µm⁴ and |a_0|² of a patch, or their means over the windows of a scan.
+
+    kappa, q : phase per height, and spatial frequency along x and y, rad/µm.
+    sigmas, coherence, centre : see `screen_power`.
+    """
+    tapers, powers, mirror = scan.tapers(field, sigmas.windows), [], []
+    for part in scan.parts(field, sigmas.windows):
+        screen = np.exp(1j * kappa * part)
+        mean = screen.mean() if tapers is None else scan.faded(screen, tapers)[1]
+        powers.append(screen_power(screen, field.pixel_size, *q, sigmas, coherence, centre, tapers))
+        mirror.append(abs(mean) ** 2)
+    return float(np.mean(powers)), float(np.mean(mirror))
 
 
 def screen_power(
@@ -54,14 +75,16 @@ def screen_power(
     sigmas: Sigmas,
     coherence: str,
     centre: tuple[float, float] | None = None,
+    tapers: scan.Tapers | None = None,
 ) -> float:
     """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm.
 
     sigmas : of the windows; for `patch` the orders' window.
     centre : of the window in µm, instead of the patch's centre.
+    tapers : of a window of a scan, of coherence `ensemble`.
     """
     sigma = sigmas.orders
-    orders = orders_near((alpha, beta), sigma, screen, pixel_size)
+    orders = orders_near((alpha, beta), sigma, screen, pixel_size, tapers)
     if coherence == "ensemble":
         return window_sum(orders, (alpha, beta), sigmas)
     ny, nx = screen.shape

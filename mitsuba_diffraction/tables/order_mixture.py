@@ -74,7 +74,7 @@ def order_mixture(
     kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
     lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
     all_smooth = lobe >= smoothing
-    apart = apart or table.order_0_ratio > 1.0
+    apart = apart or table.order_0_ratio != 1.0
     smoothing = max(smoothing, lobe)
     axes = [_Axis(table, axis) for axis in (0, 1)]
     pitch = 0.5 * smoothing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -35,7 +36,10 @@ class Spectrum:
     last : (jx, jy), the outermost bins wanted.
     double : compute in double precision instead of single.
     tapers : along y and x, of mean square 1, what f without its mean fades with: bin 0 is then the
-        mean, and all others are of the rest. None along an axis, or altogether, for no fading.
+        mean, weighted by the tapers, and all others are of the rest. None along an axis, or
+        altogether, for no fading.
+    tile : (ny, nx), number of points that screens are filled up to with zeros.
+    threaded : whether a transform may use several threads.
     """
 
     def __init__(
@@ -44,6 +48,8 @@ class Spectrum:
         last: tuple[int, int],
         double: bool = False,
         tapers: Tapers = (None, None),
+        tile: tuple[int, int] | None = None,
+        threaded: bool = True,
     ) -> None:
         self.real_type: Any = np.float64 if double else np.float32
         self.complex_type: Any = np.complex128 if double else np.complex64
@@ -53,9 +59,9 @@ class Spectrum:
         self.heights = np.empty(field.shape, self.real_type)
         middle = 0.5 * (highest + lowest)
         np.subtract(field.heights, middle, out=self.heights, dtype=np.float64, casting="same_kind")
-        self.last = last
-        self._columns = _Crop(self.heights.shape[1], last[0])
-        self._rows = _Crop(self.heights.shape[0], last[1])
+        self.last, self._tile, self._threaded = last, tile or field.shape, threaded
+        self._columns = _Crop(self._tile[1], last[0])
+        self._rows = _Crop(self._tile[0], last[1])
         self._tapers = None if tapers[0] is None and tapers[1] is None else self._filled(tapers)
 
     @property
@@ -64,7 +70,10 @@ class Spectrum:
         return 2 * self.last[1] + 1, 2 * self.last[0] + 1
 
     def of_phase(self, kappa: float, minus_one: bool = False) -> NDArray[np.complexfloating]:
-        """DFT of exp(iκh), or of exp(iκh) − 1, which keeps its precision as κ → 0."""
+        """DFT of exp(iκh), or of exp(iκh) − 1, which keeps its precision as κ → 0.
+
+        A tapered screen's orders are scaled so that all powers add up to 1.
+        """
 
         def screen(heights: NDArray[np.floating]) -> NDArray[np.complexfloating]:
             phase = heights * self.real_type(kappa)
@@ -79,62 +88,79 @@ class Spectrum:
                 np.cos(phase, out=out.real)
             return out
 
-        return self.of(screen)
+        def variance(mean: complex) -> float:
+            # without cancellation as κ → 0: 1 − |1 + m|²
+            less = mean if minus_one else mean - 1.0
+            return -2.0 * less.real - abs(less) ** 2
 
-    def of(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> NDArray[np.complexfloating]:
-        """DFT of function(h), which is applied to blocks of rows of the centred heights (µm)."""
+        return self.of(screen, variance)
+
+    def of(
+        self,
+        function: Callable[[NDArray[Any]], NDArray[Any]],
+        variance: Callable[[complex], float] | None = None,
+    ) -> NDArray[np.complexfloating]:
+        """DFT of function(h), which is applied to blocks of rows of the centred heights (µm).
+
+        variance : of the function, from its mean; all orders but 0 of a tapered function are scaled
+            so that their powers add up to it.
+        """
         ny = self.heights.shape[0]
         half = np.empty((ny, len(self._columns.bins)), self.complex_type)
-        sums = np.zeros(-(-ny // _ROWS), np.complex128)
         result = np.zeros(self.shape, self.complex_type)
+        faded, mean = (None, 0.0) if self._tapers is None else self._faded(function, variance)
 
         def along_x(start: int) -> None:
-            block = function(self.heights[start : start + _ROWS]).astype(
-                self.complex_type, copy=False
-            )
-            if self._tapers is not None:
-                sums[start // _ROWS] = block.sum(dtype=np.complex128)
-                block *= self._tapers[0][start : start + _ROWS, None]
-                block *= self._tapers[1]
-            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
-            half[start : start + _ROWS] = lines[:, self._columns.source]
+            rows = slice(start, start + _ROWS)
+            block = function(self.heights[rows]) if faded is None else faded[rows]
+            block = block.astype(self.complex_type, copy=False)
+            lines = scipy.fft.ifft(block, self._tile[1], axis=1, overwrite_x=True)
+            half[rows] = lines[:, self._columns.source]
 
         def along_y(start: int) -> None:
             block = np.ascontiguousarray(half[:, start : start + _ROWS].T)
-            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
+            lines = scipy.fft.ifft(block, self._tile[0], axis=1, overwrite_x=True)
             wanted = lines[:, self._rows.source].T
             columns = self._columns.target[start : start + _ROWS]
             result[self._rows.target[0] : self._rows.target[-1] + 1, columns] = wanted
 
         blocks = range(0, ny, _ROWS), range(0, half.shape[1], _ROWS)
-        small = self.heights.size < _SMALL  # threads would take longer to start
-        with nullcontext() if small else ThreadPoolExecutor(os.cpu_count()) as pool:
+        # threads would take longer to start
+        alone = not self._threaded or self.heights.size < _SMALL
+        with nullcontext() if alone else ThreadPoolExecutor(os.cpu_count()) as pool:
             for work, starts in zip((along_x, along_y), blocks, strict=True):
                 list((pool.map if pool else map)(work, starts))
-        return self._mean_apart(result, sums)
+        if faded is not None:
+            result[self.last[1], self.last[0]] = mean
+        return result
+
+    def _faded(
+        self,
+        function: Callable[[NDArray[Any]], NDArray[Any]],
+        variance: Callable[[complex], float] | None,
+    ) -> tuple[NDArray[np.complexfloating], complex]:
+        """Return c·w·(f − mean), and the mean, Σ w f / Σ w."""
+        assert self._tapers is not None
+        y, x = self._tapers
+        values = function(self.heights).astype(self.complex_type, copy=False)
+        # in double precision: orders are what is left of nearly 1 without it
+        wide_y, wide_x = y.astype(np.float64), x.astype(np.float64)
+        mean = complex(wide_y @ (values @ wide_x)) / float(y.sum() * x.sum())
+        values -= self.complex_type(mean)
+        values *= y[:, None]
+        values *= x
+        power = float(np.vdot(values, values).real) / math.prod(self._tile)
+        if variance is not None and power > 0.0:
+            values *= self.real_type(math.sqrt(max(variance(mean), 0.0) / power))
+        return values, mean
 
     def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:
+        # of mean square 1 over the tile, so that powers add up to the screen's (Parseval)
         y, x = (
-            np.ones(n) if taper is None else taper
-            for n, taper in zip(self.heights.shape, tapers, strict=True)
+            np.ones(n) if taper is None else taper * np.sqrt(tile / n)
+            for n, taper, tile in zip(self.heights.shape, tapers, self._tile, strict=True)
         )
         return y.astype(self.real_type), x.astype(self.real_type)
-
-    def _mean_apart(
-        self, result: NDArray[np.complexfloating], sums: NDArray[np.complex128]
-    ) -> NDArray[np.complexfloating]:
-        """From the transform of w·f, that of w·(f − mean), with the mean in bin 0."""
-        if self._tapers is None:
-            return result
-        mean = sums.sum() / self.heights.size
-        y, x = (
-            scipy.fft.ifft(taper.astype(np.float64))[crop.source]
-            for taper, crop in zip(self._tapers, (self._rows, self._columns), strict=True)
-        )
-        rows, columns = self._rows.target, self._columns.target
-        result[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] -= np.outer(mean * y, x)
-        result[self.last[1], self.last[0]] = mean
-        return result
 
 
 class _Crop:
