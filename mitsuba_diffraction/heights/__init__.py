@@ -7,7 +7,7 @@ load         a `HeightField` from any file
 read         `LoadOptions`; choice of reader, units and treatments
 formats      readers, by kind of file
 recipes      TOML files that name the source of heights and the settings of their table
-preprocess   treatments of heights: crop, fill, level, clip, make periodic
+preprocess   treatments of heights: crop, fill, level, clip
 gratings     height fields computed from formulas
 validity     warnings where a patch leaves the model or its own resolution
 spectra      spectrum of heights, and powers of their orders

@@ -2,12 +2,13 @@
 
 A scan is seen through windows of width W, half overlapping, over which powers are averaged (Welch,
 IEEE Transactions on Audio and Electroacoustics 15, 70, 1967). With t(r) = exp(−r²/2σ_t²) about the
-middle of a window and s = exp(iκh), order 0 is a_0 = Σ t s / Σ t. The other orders are those of
+middle of a window and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are those of
 
     f = c t (s − a_0)   in the window, 0 around it up to 2W,   Σ_j |a_j|² = 1 over all orders,
 
-which sets c, since Σ_(j≠0) |a_j|² = mean |f|² (Parseval). Their lobe exp(−σ_l²|q − q_j|²) has
-1/σ_l² + 1/σ_t² = 1/σ²: the transform of t² under σ_l is as wide as that of the light's window σ.
+which sets c: nearly √(1/mean t²), by Parseval, but for what f has at j = 0 in place of a_0. Their
+lobe exp(−σ_l²|q − q_j|²) has 1/σ_l² + 1/σ_t² = 1/σ²: the transform of t² under σ_l is as wide as
+that of the light's window σ.
 """
 
 from __future__ import annotations
@@ -65,14 +66,15 @@ def tapers(field: HeightField, windows: Windows | None) -> Tapers | None:
 
 
 def faded(screen: Complex, along: Tapers) -> tuple[Complex, complex]:
-    """Return f with the zeros around it, times √(its pixels / the window's), and a_0."""
+    """Return f with the zeros around it, and a_0."""
     t_y, t_x = (np.ones(n) if t is None else t for n, t in zip(screen.shape, along, strict=True))
     t = np.outer(t_y, t_x)
-    mean = complex(np.sum(t * screen) / np.sum(t))
-    shape = [n * (1 if t is None else 2) for n, t in zip(screen.shape, along, strict=True)]
+    mean = complex(np.sum(t**2 * screen) / np.sum(t**2))
+    pads = (1 if taper is None else 2 for taper in along)
+    shape = [n * pad for n, pad in zip(screen.shape, pads, strict=True)]
     rest = np.zeros(shape, np.complex128)
     rest[: screen.shape[0], : screen.shape[1]] = t * (screen - mean)
-    power = np.mean(np.abs(rest) ** 2)
+    power = np.mean(np.abs(rest) ** 2) - abs(np.mean(rest)) ** 2
     return rest * np.sqrt(max(1.0 - abs(mean) ** 2, 0.0) / max(power, 1e-300)), mean
 
 

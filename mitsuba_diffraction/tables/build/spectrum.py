@@ -70,10 +70,7 @@ class Spectrum:
         return 2 * self.last[1] + 1, 2 * self.last[0] + 1
 
     def of_phase(self, kappa: float, minus_one: bool = False) -> NDArray[np.complexfloating]:
-        """DFT of exp(iκh), or of exp(iκh) − 1, which keeps its precision as κ → 0.
-
-        A tapered screen's orders are scaled so that all powers add up to 1.
-        """
+        """DFT of exp(iκh), or of exp(iκh) − 1, which keeps its precision as κ → 0."""
 
         def screen(heights: NDArray[np.floating]) -> NDArray[np.complexfloating]:
             phase = heights * self.real_type(kappa)
@@ -88,27 +85,14 @@ class Spectrum:
                 np.cos(phase, out=out.real)
             return out
 
-        def variance(mean: complex) -> float:
-            # without cancellation as κ → 0: 1 − |1 + m|²
-            less = mean if minus_one else mean - 1.0
-            return -2.0 * less.real - abs(less) ** 2
+        return self.of(screen)
 
-        return self.of(screen, variance)
-
-    def of(
-        self,
-        function: Callable[[NDArray[Any]], NDArray[Any]],
-        variance: Callable[[complex], float] | None = None,
-    ) -> NDArray[np.complexfloating]:
-        """DFT of function(h), which is applied to blocks of rows of the centred heights (µm).
-
-        variance : of the function, from its mean; all orders but 0 of a tapered function are scaled
-            so that their powers add up to it.
-        """
+    def of(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> NDArray[np.complexfloating]:
+        """DFT of function(h), which is applied to blocks of rows of the centred heights (µm)."""
         ny = self.heights.shape[0]
         half = np.empty((ny, len(self._columns.bins)), self.complex_type)
         result = np.zeros(self.shape, self.complex_type)
-        faded, mean = (None, 0.0) if self._tapers is None else self._faded(function, variance)
+        faded, mean = (None, 0.0) if self._tapers is None else self._faded(function)
 
         def along_x(start: int) -> None:
             rows = slice(start, start + _ROWS)
@@ -135,23 +119,27 @@ class Spectrum:
         return result
 
     def _faded(
-        self,
-        function: Callable[[NDArray[Any]], NDArray[Any]],
-        variance: Callable[[complex], float] | None,
+        self, function: Callable[[NDArray[Any]], NDArray[Any]]
     ) -> tuple[NDArray[np.complexfloating], complex]:
-        """Return c·w·(f − mean), and the mean, Σ w f / Σ w."""
+        """Return c·w·(f − a), and a = Σ w² f / Σ w².
+
+        With this mean |a|² and the powers of w·(f − a) add up to the mean of |f|² under w². In bin 0
+        a replaces what is left, which c makes up for.
+        """
         assert self._tapers is not None
         y, x = self._tapers
         values = function(self.heights).astype(self.complex_type, copy=False)
         # in double precision: orders are what is left of nearly 1 without it
-        wide_y, wide_x = y.astype(np.float64), x.astype(np.float64)
-        mean = complex(wide_y @ (values @ wide_x)) / float(y.sum() * x.sum())
+        wide_y, wide_x = (np.square(taper, dtype=np.float64) for taper in (y, x))
+        mean = complex(wide_y @ (values @ wide_x)) / float(wide_y.sum() * wide_x.sum())
         values -= self.complex_type(mean)
         values *= y[:, None]
         values *= x
-        power = float(np.vdot(values, values).real) / math.prod(self._tile)
-        if variance is not None and power > 0.0:
-            values *= self.real_type(math.sqrt(max(variance(mean), 0.0) / power))
+        points = math.prod(self._tile)
+        power = float(np.vdot(values, values).real) / points
+        left = abs(complex(values.sum(dtype=np.complex128)) / points) ** 2
+        if power > left:
+            values *= self.real_type(math.sqrt(power / (power - left)))
         return values, mean
 
     def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -3,10 +3,10 @@
 A scan is part of a larger surface: its edges do not meet, so it must not tile the plane. Windows
 W = 4σ wide overlap by half (Welch 1967, IEEE Transactions on Audio and Electroacoustics 15, 70);
 `heights.coherence` has their width and their places. The mean of a window's phase screen exp(iκh),
-weighted with its taper, is order 0. The rest fades with a Gaussian taper and is filled up with
-zeros to 2 W, so that orders lie π/W apart and no edge meets another. The look-up's window is wider
-by as much as the taper is narrow, 1/σ² = 1/σ_t² + 1/σ_l²: an order's lobe is that of σ. Windows are
-cut out when they are asked for: memory does not grow with the scan.
+weighted with its taper's square, is order 0. The rest fades with a Gaussian taper and is filled up
+with zeros to 2 W, so that orders lie π/W apart and no edge meets another. The look-up's window is
+wider by as much as the taper is narrow, 1/σ² = 1/σ_t² + 1/σ_l²: an order's lobe is that of σ.
+Windows are cut out when they are asked for: memory does not grow with the scan.
 """
 
 from __future__ import annotations
