@@ -1,6 +1,6 @@
 """Entry point of the command: one line for Ctrl-C and for failing imports of the package.
 
-Outside of the package, since importing any of its modules imports Mitsuba first.
+Outside of the package: its commands import Mitsuba, which may fail or be interrupted.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+TableSource        table of a file, recipe or height field, built once for all that ask
 OrderTable         solved efficiencies of a grating's orders
 CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
@@ -27,8 +28,8 @@ bsdf_dict          a dictionary for `mi.load_dict` from arrays
 preset             a dictionary for `mi.load_dict` of a named look, e.g. preset("cd")
 DiffractionError   error of every bad input, in one line
 
-Importing the package registers the BSDF plugin `diffraction` in the current variant of Mitsuba and
-in every variant that is set later.
+Importing the package and Mitsuba, in either order, registers the BSDF plugin `diffraction` in the
+current variant of Mitsuba and in every variant that is set later.
 """
 
 from __future__ import annotations
@@ -41,25 +42,18 @@ if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main_
     prepare()
 
 import importlib
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from .errors import DiffractionError, DiffractionWarning
 from .llvm import select_llvm
-
-select_llvm()  # before Dr.Jit picks a library by itself: some would end the process
-
-from . import reference  # noqa: E402
-from .errors import DiffractionError, DiffractionWarning  # noqa: E402
-from .heights import HeightField, gratings  # noqa: E402
-from .plugin.dictionary import bsdf_dict  # noqa: E402
-from .plugin.registration import register_in_all  # noqa: E402
-from .tables import DiffractionTable  # noqa: E402
-from .tables.orders import CrossedTable, OrderTable  # noqa: E402
+from .when_imported import when_imported
 
 if TYPE_CHECKING:
-    from . import cluster, osl
+    from . import cluster, osl, reference
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
+    from .heights import HeightField, gratings
+    from .plugin.dictionary import bsdf_dict
     from .plugin.presets import preset
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
@@ -67,11 +61,12 @@ if TYPE_CHECKING:
     from .solve.crossed import solve_crossed
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
+    from .tables import DiffractionTable, TableSource
+    from .tables.orders import CrossedTable, OrderTable
     from .thesis import period_fit
 
-register_in_all()
+    __version__: str
 
-__version__ = version(__name__)
 __all__ = [
     "CrossedTable",
     "DiffractionError",
@@ -79,6 +74,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "OrderTable",
+    "TableSource",
     "bsdf_dict",
     "cluster",
     "design",
@@ -100,20 +96,29 @@ __all__ = [
     "web",
 ]
 
-# Imported when first asked for: renders need none, nor Matplotlib, which some load.
-_ON_DEMAND = {
+# Imported when first asked for: heights, tables and the reference need no Mitsuba, and renders
+# need no Matplotlib, which some load.
+_MODULES = {
     "cluster": "cluster",
     "design": "analysis.design",
     "glsl": "realtime.glsl",
+    "gratings": "heights.gratings",
     "maps": "analysis.maps",
     "osl": "osl",
     "period_fit": "thesis.period_fit",
     "profiles": "solve.profiles",
+    "reference": "reference",
     "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
-_FUNCTIONS = {
+_NAMES = {
+    "CrossedTable": "tables.orders",
+    "DiffractionTable": "tables",
+    "HeightField": "heights",
+    "OrderTable": "tables.orders",
+    "TableSource": "tables",
+    "bsdf_dict": "plugin.dictionary",
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
     "read_orders": "solve.measured",
@@ -124,8 +129,26 @@ _FUNCTIONS = {
 
 
 def __getattr__(name: str) -> Any:
-    if name in _ON_DEMAND:
-        return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
-    if name in _FUNCTIONS:
-        return getattr(importlib.import_module(f"{__name__}.{_FUNCTIONS[name]}"), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(__name__)
+    if name in _MODULES:
+        return importlib.import_module(f"{__name__}.{_MODULES[name]}")
+    if name in _NAMES:
+        return getattr(importlib.import_module(f"{__name__}.{_NAMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _register() -> None:
+    from .plugin.registration import register_in_all
+
+    register_in_all()
+
+
+select_llvm()  # before Dr.Jit picks a library by itself: some would end the process
+when_imported("mitsuba", _register)

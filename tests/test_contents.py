@@ -45,7 +45,7 @@ def test_every_name_is_a_module_or_exported(name):
     assert set(named) <= modules | exported
     # a list of modules is complete; one of names is of those that others use
     if len(set(named) & modules) > len(named) / 2 and name != "mitsuba_diffraction":
-        listed = set(named) | {n.module for n in tree.body if isinstance(n, ast.ImportFrom)}
+        listed = set(named) | {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
         assert modules - {"__init__", "__main__"} <= listed
 
 

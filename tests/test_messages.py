@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import unicodedata
@@ -82,3 +83,14 @@ def test_no_text_controls_the_terminal(text):
 @pytest.mark.parametrize("text", ["µm, κ and ×", "a\nb\tc", "10\u202f000 µm", "鱗"])
 def test_readable_text_stays_as_it_is(text):
     assert printable(text) == text
+
+
+def test_commands_that_messages_name_exist():
+    from mitsuba_diffraction.cli.main import build_parser
+
+    (commands,) = (a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
+    # adjacent strings are one
+    texts = [re.sub(r'"\n\s*f?"', "", f.read_text("utf-8")) for f in PACKAGE.rglob("*.py")]
+    named = {name for text in texts for name in re.findall(r"the command '([\w-]+)", text)}
+    assert "precompute" in named
+    assert named <= set(commands)

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DiffractionError
-from ..files import FileKind, kind_of
 from ..heights.field import HeightField
-from ..heights.load import load_heights
 from ..heights.read import LoadOptions, treated_by_default
+from ..heights.source import Source
 
 #: Fewest pixels of a crop along a side.
 FEWEST_PIXELS = 32
@@ -34,10 +33,11 @@ def crops_of(
     side : of square crops, µm, of which as many as fit are returned, spread over the scan; whole
         scans that are narrower. Without, `count` crops share the scan.
     """
-    if kind_of(path) is FileKind.RECIPE:
-        raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")
     raw = options.updated(LoadOptions.parse(level="none"))
-    whole = load_heights(path, raw)
+    source = Source.of(path, raw)
+    if source.recipe is not None:
+        raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")
+    whole = source.field()
     treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)
     parts = _parts(whole, count) if side is None else _squares(whole, count, side)
     return [treated_by_default(part, treatment) for part in parts]

@@ -15,7 +15,7 @@ import mitsuba as mi
 
 from ..errors import DiffractionError, quoted
 from ..optics.materials import SODIUM, TISSUES, index_at_sodium, material_named
-from .scans import Scan
+from ..tables.source import TableSource
 
 #: Largest index of a medium above a surface.
 MOST_MEDIUM = 2.0
@@ -36,8 +36,10 @@ def medium_index(ext_ior: str | float | None, wavelength: float = SODIUM) -> flo
     return index * _dispersion(ext_ior, wavelength)
 
 
-def in_medium(scan: Scan, ext_ior: str | float | None, wavelength: float = SODIUM) -> Scan:
-    """Return a scan for light within a medium, whose waves are shorter: lengths times its index.
+def in_medium(
+    source: TableSource, ext_ior: str | float | None, wavelength: float = SODIUM
+) -> TableSource:
+    """Return heights for light in a medium, whose waves are shorter: lengths times its index.
 
     Parameters
     ----------
@@ -48,10 +50,10 @@ def in_medium(scan: Scan, ext_ior: str | float | None, wavelength: float = SODIU
     """
     index = medium_index(ext_ior, wavelength)
     if index == 1.0:
-        return scan
+        return source
     line = f"lengths times {index:.5g}, the index of the medium above"
-    patches = [p.changed(index * p.heights, line).stretched(index) for p in scan.patches]
-    return scan._replace(patches=patches)
+    patches = source.fields()
+    return TableSource.of([p.changed(index * p.heights, line).stretched(index) for p in patches])
 
 
 def loaded_in_media(parameters: Mapping[str, Any]) -> dict[str, Any]:

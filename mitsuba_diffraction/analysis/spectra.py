@@ -143,13 +143,13 @@ def spectrum(
         SPECTRA.check(described)
     if isinstance(described, Surface):
         sigma = described.sigma
-        if described.material is not None and described.material.known:
-            check_material(described.material.name, lam)
+        if described.material:
+            check_material(described.material, lam)
         if lam.min() < (shortest := described.shortest_wavelength):
             raise DiffractionError(
                 f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
-                "longer ones, or build a wider table with "
-                "DiffractionTable.build"
+                "longer ones, or build a table of a wider wavelength_range "
+                "(the command 'precompute')"
             )
     signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":

@@ -23,12 +23,12 @@ from ..atomic import atomic_path
 from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..files import FileKind, kind_of, readable_file
+from ..files import readable_file
 from ..heights.coherence import REPEATS, widest_window
-from ..heights.recipes import Recipe
+from ..heights.source import Source
 from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
-from ..tables.build.checks import warnings_of
+from ..tables.source import TableSource
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .crops import crops_of
@@ -37,7 +37,7 @@ from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
 from .repeats import sample_of, scan_files, write_repeats
-from .scans import bsdf_of, read_scan, table_of
+from .scans import bsdf_of, table_of
 from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
@@ -112,13 +112,14 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
-    scan = read_scan(path, job.treatment.options, job.treatment.settings)
+    source = TableSource.of(path, job.treatment.options).read()
+    settings = source.settings_for(job.treatment.settings)
     if job.crop is not None:
         which, count = job.crop
         crops = crops_of(path, job.treatment.options, count, WINDOW)
-        scan = scan._replace(patches=[crops[which]])
+        source = TableSource.of(crops[which])
         row["crop"] = which + 1
-    patches = scan.patches
+    patches = source.fields()
     for name in ("range", "rms_height", "rms_slope"):
         row[f"{name}_um" if name != "rms_slope" else name] = getattr(patches[0], name)
     (ny, nx), (width, height) = patches[0].shape, patches[0].extent
@@ -131,8 +132,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if weak is not None:
         row |= {"weak_period_um": weak.period, "weak_direction_deg": weak.direction}
         row["weak_share"] = weak.share
-    scan = in_medium(scan, dict(job.surface).get("ext_ior"))
-    table = table_of(scan)
+    source = in_medium(source, dict(job.surface).get("ext_ior"))
+    table = table_of(source, settings)
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
     row |= {"coherence_width_um": table.coherence_width, "window_width_um": table.window_width}
@@ -141,7 +142,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         row["windows"] = table.source["windows"]["number"]
         if "standard_error" in table.source["windows"]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
-    row["warnings"] = "; ".join(warnings_of(*scan))
+    row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
     # without a material ideal reflection: the effect of the structure alone
     bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
@@ -289,16 +290,15 @@ def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def _files_of(file: Path) -> SceneFiles:
     """Return the scan's files, after a check of the recipe if it is one."""
     files = SceneFiles.from_scene(readable_file(file), {})
-    if kind_of(file) is FileKind.RECIPE:
-        Recipe.load(file)
+    Source.of(file)
     return files
 
 
 def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
     """Return a job for each crop of a scan; the job itself for recipes and narrow scans."""
-    if kind_of(file) is FileKind.RECIPE:
-        return [job]
     options = job.treatment.options
+    if Source.of(file, options).recipe is not None:
+        return [job]
     found = crops_of(file, options, count, WINDOW)
     if min(found[0].extent) < 0.99 * WINDOW:
         return [job]

@@ -31,7 +31,6 @@ scene_options          the scene, its parameters and materials; a mesh on a stag
 workers                options of commands that may run on many processes
 console                lines and bars on stderr, and Mitsuba's among them
 interrupt              Ctrl-C and SIGTERM
-wording                messages of the library with the options of the command
 report                 output files, checked before the work; figures as text, JSON and pictures
 """
 

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 from ..errors import DiffractionWarning, one_line, shortened
-from .wording import worded
 
 PROGRAM = "mitsuba-diffraction"
 
@@ -40,7 +39,7 @@ EVERY = 10.0
 
 def say(text: str) -> None:
     """Print one line on stderr, above a progress bar if there is one."""
-    line = f"{PROGRAM}: {shortened(one_line(worded(text)))}"
+    line = f"{PROGRAM}: {shortened(one_line(text))}"
     if "tqdm" in sys.modules:
         from tqdm import tqdm
 

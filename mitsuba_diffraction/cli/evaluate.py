@@ -191,16 +191,18 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
     from ..analysis.media import in_medium
-    from ..analysis.scans import Scan, bsdf_of, table_of
+    from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..scene.load import set_variant
+    from ..tables.source import TableSource
 
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
     set_variant("llvm_ad_spectral")
     asked = {name: value for name, value in settings.items() if name != "step"}
     asked["wavelength_range"] = table_range(steps)
-    table = table_of(in_medium(Scan([patch], TableSettings(**asked)), args.ext_ior), bar)
+    source = in_medium(TableSource.of(patch), args.ext_ior)
+    table = table_of(source, source.settings_for(asked), bar)
     return partial(brdf_values, bsdf_of(table, **surface)), table.sigma
 
 

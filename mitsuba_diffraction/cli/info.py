@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files import MESHES, FileKind, kind_of, readable_file
+from ..files import MESHES, FileKind
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
@@ -17,6 +17,8 @@ from .report import STDOUT, Figures, lines_of, plain, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
+    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
@@ -69,12 +71,13 @@ def run(args: argparse.Namespace) -> Figures:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..heights.source import Source
     from ..tables.orders import load_any_orders
 
-    readable_file(file)
-    kind = kind_of(file)
-    if kind is FileKind.RECIPE:
-        return _recipe(file, args)
+    source = Source.of(file, options.load_options(args))
+    kind = source.kind
+    if source.recipe is not None:
+        return _recipe(source, source.recipe, args)
     if kind is FileKind.MESH:
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
@@ -92,7 +95,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
         return {"kind": "table of orders", **load_any_orders(file).summary()}
-    return _heights(file, args)
+    return _heights(source, args)
 
 
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
@@ -119,24 +122,17 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
 def _draw(args: argparse.Namespace) -> None:
     from ..analysis.pictures import patches_figure
-    from ..heights.load import load_heights
-    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
-    how = options.load_options(args)
-    if kind_of(args.file) is FileKind.RECIPE:
-        fields = Recipe.load(args.file).fields(how)
-    else:
-        fields = [load_heights(args.file, how)]
+    fields = Source.of(args.file, options.load_options(args)).fields()
     save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
-def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.load import load_heights
     from ..heights.validity import jumping_lines
 
-    how = options.load_options(args)
-    field = load_heights(file, how)
+    field = source.field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
     suggested = (jumping_lines(field),)
@@ -161,21 +157,18 @@ def _periods(field: HeightField) -> dict[str, Any]:
     return described
 
 
-def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.recipes import Recipe
 
-    recipe = Recipe.load(file)
-    table = recipe.table
     with Bar(args) as bar:
         bar(0, 0, "making heights")
-        fields = recipe.fields(options.load_options(args))
-    settings = TableSettings(**{**table, **options.table_options(args)})
+        fields = source.fields()
+    settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
         "options": recipe.options.specified(),
-        "table": table,
+        "table": source.settings,
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],

@@ -45,7 +45,6 @@ from . import (
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
 from .report import STDOUT, check_writable, save_report
-from .wording import speak_for
 
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
@@ -84,7 +83,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
-    speak_for(args.parser)
     with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files import FileKind, kind_of
+from ..files import FileKind
 from ..settings import TableSettings
 from . import options
 from .brdf_map import surface_parameters
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
     from ..analysis.spectrometer import Geometry
     from ..analysis.treatments import Treatment
-    from ..heights.field import HeightField
     from ..tables.orders import OrderTable
+    from ..tables.source import TableSource
 
 
 @dataclass
@@ -44,23 +44,21 @@ class Measurement:
     def of_file(self, file: Path) -> list[Spectra]:
         """Measure the spectra of one file, or of its crops."""
         from ..tables.orders import load_any_orders
-        from ..tables.store import loaded_table
+        from ..tables.source import TableSource, loaded_table
 
-        kind = kind_of(file)
-        if kind is FileKind.ORDERS:
-            return [self._of_table(load_any_orders(file), file)]
-        if kind is FileKind.TABLE:
-            return [self._of_table(loaded_table(file), file)]
         how = self._treatment(file).options
+        source = TableSource.of(file, how)
+        if source.kind is FileKind.ORDERS:
+            return [self._of_table(load_any_orders(file), file)]
+        if source.kind is FileKind.TABLE:
+            return [self._of_table(loaded_table(file), file)]
         if self.args.crops is not None:
             from ..analysis.crops import crops_of
 
             crops = crops_of(file, how, self.args.crops)
-            return [self._of_heights([crop], file, how) for crop in crops]
-        from ..analysis.scans import read_scan
-
-        patches = read_scan(file, how, {}).patches
-        return [self._of_heights(patches, file, how)]
+            return [self._of_heights(TableSource.of(crop), file, how) for crop in crops]
+        source = source.read()
+        return [self._of_heights(source, file, how)]
 
     def say_notes(self) -> None:
         """Print the number of scans with notes, beside the notes of the first scan."""
@@ -77,6 +75,8 @@ class Measurement:
 
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
+        from ..tables import DiffractionTable
+
         args, lam = self.args, self.lam
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
         if refused := options.given(args, own):
@@ -89,36 +89,35 @@ class Measurement:
                 f"'{file}' is a table, without heights to find gratings in; give --azimuth in "
                 "degrees"
             )
-        if kind_of(file) is FileKind.ORDERS:
+        if not isinstance(table, DiffractionTable):
             lam = _within(table, lam, file)
         elif args.wavelength_range is None:
             lam = lam[lam >= table.wavelength_range[0]]
         return self._spectrum(table, self.geometry, lam, angular=args.iridescence)
 
-    def _of_heights(self, patches: Sequence[HeightField], file: Path, how: Any) -> Spectra:
+    def _of_heights(self, source: TableSource, file: Path, how: Any) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
         from ..analysis.media import in_medium, medium_index
-        from ..analysis.scans import Scan, read_scan, table_of
+        from ..analysis.scans import table_of
         from ..analysis.spectra import table_range
         from ..heights.coherence import blur
         from ..heights.load import notes_line
         from ..heights.spectra import dominant_periods
-        from ..tables.build.checks import warnings_of
 
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
         asked = {**self._treatment(file).settings, **options.table_options(args)}
         asked["wavelength_range"] = table_range(self.lam)
         self.bar(0, 0, f"tabulating {file.name}")
-        settings = read_scan(file, how, asked).settings
-        scan = in_medium(Scan(list(patches), settings), args.ext_ior, first)
-        table = table_of(scan, self.bar)
-        line = notes_line(warnings_of(*scan), file, how, TableSettings(**asked))
+        settings = source.settings_for(asked)
+        within = in_medium(source, args.ext_ior, first)
+        table = table_of(within, settings, self.bar)
+        line = notes_line(within.warnings(settings), file, how, TableSettings(**asked))
         if line and args.crops is None:
             self._say_first(line)
         if table.settings.window_width is not None:
             self._say_once(blur(table.window_width, medium_index(args.ext_ior, first)))
         if args.light_azimuth == "auto":
-            gratings = dominant_periods(patches[0])
+            gratings = dominant_periods(source.fields()[0])
             geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)
             found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
             say(f"{file.name}: azimuth {found}")

@@ -14,11 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
-from ..files import FileKind, kind_of
 from ..optics.display import VIEWS
 from ..settings import TableSettings, checked, described_setting
 from .report import Figures
-from .wording import worded
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -355,28 +353,11 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
-    from ..heights.load import load_heights
-    from ..heights.recipes import Recipe
+    from ..heights.source import Source
 
-    options = load_options(args)
-    source = args.source
-    if kind_of(source) is FileKind.TABLE:
-        raise DiffractionError(
-            f"'{source}' is a table; this needs the heights it was made of, or their recipe"
-        )
-    if kind_of(source) is FileKind.ORDERS:
-        raise DiffractionError(
-            f"'{source}' has solved orders, which leave where the grating equation says, and no "
-            "heights; 'mitsuba-diffraction orders', 'spectrum' and 'brdf-map' show it"
-        )
-    settings = table_options(args)
-    if kind_of(source) is FileKind.RECIPE:
-        recipe = Recipe.load(source)
-        settings = {**recipe.table, **settings}
-        patch = recipe.field(options)
-    else:
-        patch = load_heights(source, options)
-    return patch, {name: settings[name] for name in TABLE_NAMES if name in settings}
+    source = Source.of(args.source, load_options(args))
+    settings = {**source.settings, **table_options(args)}
+    return source.field(), {name: settings[name] for name in TABLE_NAMES if name in settings}
 
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
@@ -389,8 +370,8 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
         check_window(period_of(fields[0], how), how)
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
-        return [worded(line) for line in (*doubts, f"{fields[0].name}: {error}")]
-    return [worded(line) for line in warnings_of(fields, settings)]
+        return [*doubts, f"{fields[0].name}: {error}"]
+    return warnings_of(fields, settings)
 
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..settings import TableSettings
     from ..tables import DiffractionTable
+    from ..tables.source import TableSource
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -46,6 +46,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> Figures:
     """Build the table of each recipe, and return the figures."""
+    from ..tables.source import TableSource
+
+    how = options.load_options(args)
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
     if recipes and len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
@@ -53,52 +56,26 @@ def run(args: argparse.Namespace) -> Figures:
         args.parser.error("argument -o/--output: one name, but there are several recipes")
     if not recipes and len(args.sources) > 1 and args.output is None:
         args.parser.error("argument -o/--output: name the one table of these files")
-    if recipes:
-        summaries = [_of_recipe(recipe, args) for recipe in recipes]
-    else:
-        summaries = [_of_files(args.sources, args)]
+    tables = recipes or [args.sources]
+    summaries = [_precompute(args, TableSource.of(files, how)) for files in tables]
     return summaries[0] if len(summaries) == 1 else {"tables": summaries}
 
 
-def _of_recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    """Build the table of a recipe."""
-    from ..heights.recipes import Recipe
-
-    recipe, how = Recipe.load(file), options.load_options(args)
-    return _precompute(
-        args, [file], partial(recipe.fields, how), args.output or recipe.output, recipe.table,
-        recipe.sources, make_folder=args.output is None,
-    )  # fmt: skip
-
-
-def _of_files(files: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
-    """Build the table of patches."""
-    from ..heights.load import load_heights
-
-    how, output = options.load_options(args), args.output or Path(f"{files[0].stem}.exr")
-    return _precompute(args, files, lambda: [load_heights(file, how) for file in files], output)
-
-
-def _precompute(
-    args: argparse.Namespace, sources: Sequence[Path], read: Callable[[], list[HeightField]],
-    output: Path, of_recipe: Mapping[str, Any] = {}, more: Sequence[Path] = (), *,
-    make_folder: bool = False,
-) -> dict[str, Any]:  # fmt: skip
-    """Build one table and return its summary.
-
-    of_recipe : settings of the table that options override.
-    more : further files that are read.
-    make_folder : the folder of the table may be made.
-    """
-    from ..settings import TableSettings
+def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]:
+    """Build one table and return its summary; the folder of a recipe's output may be made."""
     from ..tables.build.checks import warnings_of
 
+    recipe, output = source.recipe, args.output
+    make_folder = recipe is not None and output is None
+    if output is None:
+        output = Path(f"{source.files[0].stem}.exr") if recipe is None else recipe.output
+    inputs = [*source.files, *(recipe.sources if recipe else ())]
     start = time.perf_counter()
-    settings = TableSettings(**{**of_recipe, **options.table_options(args)})
-    check_outputs([output], [*sources, *more], "table", make_folder=make_folder)
+    settings = source.settings_for(options.table_options(args))
+    check_outputs([output], inputs, "table", make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
-        fields = read()
+        fields = source.fields()
     for line in warnings_of(fields, settings):  # before the minutes that the table takes
         warn(line)
     with Bar(args) as bar:
@@ -106,7 +83,7 @@ def _precompute(
         if make_folder:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
-    print(f"{', '.join(map(str, sources))} -> {output}")
+    print(f"{', '.join(map(str, source.files))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
     if workers:

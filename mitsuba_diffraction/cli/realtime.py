@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..extras import optional
-from ..realtime.glsl.source import METHODS
-from ..realtime.web.tables import WEB_METHODS
+from ..realtime.glsl.source import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source

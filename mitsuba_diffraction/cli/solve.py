@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
-    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "accept", "theta", "phi",
+    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "theta", "phi",
     "step", "jobs", "workers", "scheduler",
 )  # fmt: skip
 #: Options that override fields of a recipe.
@@ -37,7 +37,7 @@ _OF_A_RECIPE = (
 #: Options that override settings of a recipe, and the names of these.
 _SETTINGS = {
     "wavelength_range": "wavelengths", "tolerance": "tolerance", "solver": "method",
-    "resolution": "resolution", "polarised": "polarised", "accept": "accept",
+    "resolution": "resolution", "polarised": "polarised",
 }  # fmt: skip
 
 
@@ -83,7 +83,6 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--wavelength-range A,B", "nm; default: 380,780", _pair),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
-        ("--accept", "write a table that misses the tolerance, too, with its error", bool),
         ("--solver", "Chandezon's method, for slopes; boundary integral (extra solve); coupled "
          "waves, for dielectrics; default: auto, the first that suits",
          ("auto", "chandezon", "integral", "coupled")),
@@ -102,6 +101,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
          {"dest": "imports"}),
     )  # fmt: skip
+    options.add_retired(parser, "accept", 0)
     options.add_option(parser, "--jobs N", "processes here; default: 1", whole_number(1))
     add_workers(parser)
     options.add_json(parser, "the table's summary")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Options that crossed gratings do not have.
 _GROOVES_ONLY = (
     "duty", "direction", "superstrate", "layers", "beneath", "substrate", "thin", "block",
-    "tolerance", "accept", "solver", "polarised", "theta", "phi", "imports",
+    "tolerance", "solver", "polarised", "theta", "phi", "imports",
 )  # fmt: skip
 
 

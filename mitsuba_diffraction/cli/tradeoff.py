@@ -75,13 +75,13 @@ def run(args: argparse.Namespace) -> Figures:
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
     from ..heights.coherence import resolved_width
-    from ..heights.load import load_heights
+    from ..heights.source import Source
 
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:
         field = gratings.elaphe_like(side * PIXEL, side)
     else:
-        field = load_heights(args.heights, options.load_options(args))
+        field = Source.of(args.heights, options.load_options(args)).field()
     width = resolved_width(options.table_options(args).get("coherence_width", "auto"), [field])
     set_variant("llvm_ad_spectral")
     with Bar(args) as bar, warnings.catch_warnings():

@@ -3,6 +3,7 @@
 Contents
 --------
 HeightField  heights in µm on a grid that tiles the plane (in `field`)
+Source       where heights come from: file, recipe, several files, array (in `source`)
 load         a `HeightField` from any file
 read         `LoadOptions`; choice of reader, units and treatments
 formats      readers, by kind of file
@@ -19,9 +20,10 @@ from __future__ import annotations
 
 from .field import HeightField
 from .load import load, treated
+from .source import Source
 from .validity import validity
 
-__all__ = ["HeightField"]
+__all__ = ["HeightField", "Source"]
 
 # Attached here: their modules import the class, so the class cannot import them.
 HeightField.load = staticmethod(load)

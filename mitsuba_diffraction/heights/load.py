@@ -7,12 +7,11 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..files import FileKind, kind_of, readable_file
 from ..settings import TableSettings
 from .field import HeightField
 from .lengths import Crop, Height, PixelSize
-from .read import LoadOptions, read_heights, treat
-from .recipes import Recipe
+from .read import LoadOptions, treat
+from .source import Source
 from .validity import UNRELIABLE
 
 
@@ -73,15 +72,7 @@ def load(
         pixel_size=pixel_size, max_height=max_height, height_unit=height_unit, channel=channel,
         crop=crop, fill=fill, level=level, clip=clip, periodic=periodic,
     )  # fmt: skip
-    return load_heights(path, options)
-
-
-def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
-    """Read and treat a height field; parameters and errors as in `load`."""
-    file = readable_file(path)
-    if kind_of(file) is FileKind.RECIPE:
-        return Recipe.load(file).field(options)
-    return read_heights(file, options)
+    return Source.of(path, options).field()
 
 
 def notes_line(

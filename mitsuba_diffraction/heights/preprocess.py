@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy
-from scipy import sparse
-from scipy.sparse import linalg
 
 from ..errors import DiffractionError
 from .field import FloatArray, HeightField, blocks
@@ -136,12 +134,14 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
         measured[inside[known]] += start[r[known], c[known]]
         links.append((inside[~known], index[r[~known], c[~known]]))
     point, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    adjacency = sparse.coo_array((np.ones(point.size), (point, neighbour)), shape=(count, count))
-    laplacian = (sparse.diags_array(degree) - adjacency).tocsr()
+    adjacency = scipy.sparse.coo_array(
+        (np.ones(point.size), (point, neighbour)), shape=(count, count)
+    )
+    laplacian = (scipy.sparse.diags_array(degree) - adjacency).tocsr()
     if not np.any(laplacian @ start[missing] - measured):
         return start  # conjugate gradients would divide by this residual of 0
     # rtol: heights are stored as float32 at best, 1e-7 of their size; 1e-9 is well below that
-    solution, failed = linalg.cg(
+    solution, failed = scipy.sparse.linalg.cg(
         laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * (ny + nx)
     )
     if failed:

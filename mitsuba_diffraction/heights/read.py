@@ -132,10 +132,15 @@ _PIXELS = f"{SHORTEST_PIXEL:g} to {LONGEST_PIXEL:g} µm"
 _SAME_SIZE = 1e-3
 
 
-def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
-    """Read and treat the heights of a file; parameters and errors as in `HeightField.load`."""
+def read_heights(
+    path: str | os.PathLike[str], options: LoadOptions, kind: FileKind | None = None
+) -> HeightField:
+    """Read and treat the heights of a file; parameters and errors as in `HeightField.load`.
+
+    kind : kind of the file, if it is known.
+    """
     file = readable_file(path)
-    raw, measured = _read(file, options.channel)
+    raw, measured = _read(file, kind or kind_of(file), options.channel)
     field = _to_field(raw, file, options)
     # `_to_field` crops before it fills gaps
     return treated_by_default(field, replace(options, crop=None), measured)
@@ -165,9 +170,8 @@ def _by_default(field: HeightField, option: str) -> HeightField:
     return replace(field, history=(*lines, line))
 
 
-def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
+def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHeights, bool]:
     """Read the heights of a file; also return whether an instrument wrote it."""
-    kind = kind_of(file)
     if kind is FileKind.JPEG:
         raise DiffractionError(
             f"{str(file)!r} is a JPEG, whose compression changes heights; export PNG or TIFF "

@@ -18,7 +18,7 @@ import json
 import os
 import shlex
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -29,17 +29,16 @@ from ..files import FileKind, kind_of, path_within, read_text
 from ..retired import retired
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
-from .field import HeightField
 from .formats import first_line
-from .read import LoadOptions, read_heights, treat
+from .read import LoadOptions
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
 #: `method` of recipes of solved orders, which the room `solve` reads.
 SOLVED = "solved"
-# Options of files, refused beside a generator.
-_SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
+#: Options of files, refused beside a generator.
+SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
 
 
 @dataclass(frozen=True)
@@ -86,11 +85,6 @@ class Recipe:
         output = _output(content, file, shown)
         return cls(file, sources, content.get("generator"), arguments, options, table, output)
 
-    @classmethod
-    def of_file(cls, path: Path, options: LoadOptions) -> Recipe:
-        """The recipe of one file of heights, which no file holds yet."""
-        return cls(path, (path,), None, (), options, {}, Path(f"{path.stem}.exr"))
-
     def describes_heights_of(self, other: Recipe) -> bool:
         """Whether both recipes name the same sources, or generator, and treatments."""
         return self._heights() == other._heights()
@@ -121,46 +115,6 @@ class Recipe:
             lines += [f"{name} = {_toml(value)}" for name, value in arguments[0].items()]
         with atomic_path(path) as temporary:
             temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-    def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
-        """Read or generate all patches; `options` take precedence over the recipe's options.
-
-        Raises a DiffractionError if a source cannot be read, or the generator refuses an argument.
-        """
-        overrides = options or LoadOptions()
-        merged = self.options.updated(overrides)
-        if self.generator is None:
-            return [read_heights(file, merged) for file in self.sources]
-        for key in _SOURCE_ONLY:
-            if getattr(overrides, key) is not None:
-                raise DiffractionError(
-                    f"{str(self.path)!r} makes its heights with {self.generator!r}; {key} "
-                    "contradicts it: change the recipe's [arguments] instead"
-                )
-        generator: Callable[..., HeightField] = getattr(gratings, self.generator)
-        return [treat(self._generate(generator, values), merged) for values in self.arguments]
-
-    def field(self, options: LoadOptions | None = None) -> HeightField:
-        """Read or generate the only patch of the recipe.
-
-        Raises a DiffractionError as `fields` does, and if the recipe has several patches.
-        """
-        count = len(self.sources) or len(self.arguments)
-        if count > 1:
-            raise DiffractionError(
-                f"{str(self.path)!r} describes {count} patches, where one is needed; precompute "
-                "its table and use that"
-            )
-        return self.fields(options)[0]
-
-    def _generate(
-        self, generator: Callable[..., HeightField], arguments: Mapping[str, Any]
-    ) -> HeightField:
-        """Call the generator; its errors name the recipe."""
-        try:
-            return generator(**arguments)
-        except DiffractionError as error:
-            raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
 
 
 def _toml(value: Any) -> str:
@@ -211,7 +165,7 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
 
 def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any], ...]:
     """Check the generator and return its keyword arguments, one mapping for each patch."""
-    for key in _SOURCE_ONLY:
+    for key in SOURCE_ONLY:
         if key in content:
             raise DiffractionError(
                 f"{shown}: {key} is for a source, and the heights come from a generator; use its "

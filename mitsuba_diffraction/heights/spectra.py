@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
+import scipy
 
 from .field import HeightField
 
@@ -195,7 +195,7 @@ class _Spectrum:
         self.extent = patch.extent
         self.repeats = np.hypot(self.fx * patch.extent[0], self.fy * patch.extent[1])
         # bins above their neighbours: the skirts of a peak are not
-        self.summits = self.power == maximum_filter(self.power, 3, mode="wrap")
+        self.summits = self.power == scipy.ndimage.maximum_filter(self.power, 3, mode="wrap")
         self.half = (self.fy > 0) | ((self.fy == 0) & (self.fx > 0))
 
     def peak(self, iy: int, ix: int, without: npt.NDArray[np.bool_] | None = None) -> _Peak:
@@ -347,12 +347,12 @@ def far_field(field: HeightField, wavelength: float, size: int = 201) -> FloatAr
     width, height = field.extent
     ny, nx = field.shape
     micrometres = wavelength / 1000
-    density = gaussian_filter(order_powers(field, wavelength), 1.5, mode="wrap")
+    density = scipy.ndimage.gaussian_filter(order_powers(field, wavelength), 1.5, mode="wrap")
     sines = np.linspace(-1, 1, size)
     # order j of fftshift's array lies at index j + n//2
     iu = sines[None, :] * (width / micrometres) + nx // 2
     iv = sines[:, None] * (height / micrometres) + ny // 2
-    light = map_coordinates(density, np.broadcast_arrays(iv, iu), order=1, cval=0.0)
+    light = scipy.ndimage.map_coordinates(density, np.broadcast_arrays(iv, iu), order=1, cval=0.0)
     light = np.maximum(light, 0) * (width * height / micrometres**2)
     light[sines[None, :] ** 2 + sines[:, None] ** 2 > 1] = np.nan
     return np.asarray(light)

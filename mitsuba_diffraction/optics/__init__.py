@@ -3,15 +3,11 @@
 Contents
 --------
 arithmetic  the arithmetic that formulas are written in: NumPy, plain numbers, registered kinds
-symbols    numbers that record a formula's expressions
-programs   formulas written as functions of a shading language
-printer    text of such a function
-dialects   words of GLSL and OSL
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor, shadowing
 fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   boundary models: K, B, their blend, and the registry `MODELS`
 blend      roughness of the heights by scale, and weights of K and B
-stack                flat stacks of layers: transfer matrices, and means over thickness
+stack      flat stacks of layers: transfer matrices, and means over thickness
 coat       a clear coat over a structure
 through    light that goes through a dielectric, or a thin sheet
 paths      paths of light by a boundary: sides, widths w, matrices, order 0

@@ -158,7 +158,7 @@ def modulus(z: Number) -> Number:
     return xp.sqrt(squared(z)) if is_complex(z) else xp.absolute(z)
 
 
-#: Writes a call of a formula while `programs.Program` writes another; None otherwise.
+#: Writes a call of a formula while `shading.programs.Program` writes another; None otherwise.
 emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
 
 

@@ -22,29 +22,14 @@ although the face returns all of it and some leaves in the end (docs/validation/
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from .arithmetic import Number, formula, modulus, of, squared
-from .boundary import Direction, Geometry, Heights, Jones, geometry, power
+from .boundary import Direction, Geometry, Jones
 from .fresnel import Index, amplitudes
 
 #: Powers of both polarisations, s and p.
 Powers = tuple[Number, Number]
-
-
-class Coat(NamedTuple):
-    """Coat over a structure, for a pair of directions.
-
-    Attributes
-    ----------
-    n : relative index.
-    cos_i, cos_o : cosines of ωi and ωo outside of the coat.
-    """
-
-    n: Number
-    cos_i: Number
-    cos_o: Number
 
 
 class Crossing(NamedTuple):
@@ -163,46 +148,3 @@ def coated_reflectance(face: Number, beneath: Number) -> Number:
     # Mirrors that reflect everything let nothing through
     less = of(face, beneath).maximum(1.0 - face * beneath, 1e-6)
     return 1.0 - (1.0 - face) * (1.0 - beneath) * of(less).reciprocal(less)
-
-
-def pair_power(
-    jones: Callable[[Geometry, Index, Heights], Jones] | None,
-    wi: Direction,
-    wo: Direction,
-    index: Index,
-    kappa: Number,
-    variance: Number,
-    coat: Coat | None = None,
-) -> Number:
-    """Return N' of a boundary model for a pair of directions, eq. 5 and 6.
-
-    Parameters
-    ----------
-    jones : of a `boundary.Model`; None of a perfect reflector.
-    wi, wo, index : of the structure, in the coat if it has one.
-    kappa, variance : see `boundary.Heights`.
-    coat : None without a coat.
-    """
-    pair = geometry(wi, wo)
-    if jones is None:
-        return pair.one_plus_dot * pair.one_plus_dot
-    matrix = jones(pair, index, Heights(kappa, variance))
-    if coat is not None:
-        came, left = crossing(coat.cos_i, coat.n), crossing(coat.cos_o, coat.n)
-        return coated_power(matrix, pair, index, came, left)
-    return power(matrix)
-
-
-def relative_power(
-    jones: Callable[[Geometry, Index, Heights], Jones],
-    wi: Direction,
-    wo: Direction,
-    index: Index,
-    kappa: Number,
-    variance: Number,
-    coat: Coat | None = None,
-) -> Number:
-    """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
-    # not 0 of opposite grazing directions
-    edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
-    return pair_power(jones, wi, wo, index, kappa, variance, coat) / (edge * edge)

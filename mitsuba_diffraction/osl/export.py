@@ -208,11 +208,9 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
 
 
 def _patch(described: Surface, placed: Mapping[str, Any]) -> Shader:
-    table, material = described.patch, described.material
+    table = described.patch
     textures = patch_textures(table)
-    index = None
-    if material is not None and material.index is not None:
-        index = material.index(drawn_spectrum().wavelengths)
+    index = None if described.index is None else described.index(drawn_spectrum().wavelengths)
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     model = None if index is None else MODELS[described.model]
     statistic = table.roughness

@@ -9,14 +9,11 @@ from typing import Any
 
 from ..optics.boundary import Model
 from ..optics.coat import (
-    Coat,
     coated_reflectance,
     cosine_within,
     face_transmittance,
-    pair_power,
     refracted,
 )
-from ..optics.dialects import OSL
 from ..optics.fresnel import reflectance
 from ..optics.orders import (
     cell_wavelengths,
@@ -25,7 +22,9 @@ from ..optics.orders import (
     smooth_coordinate,
     wavelength_coordinate,
 )
-from ..optics.programs import Program
+from ..shading.dialects import OSL
+from ..shading.pair_power import Coat, pair_power
+from ..shading.programs import Program
 
 
 @functools.cache

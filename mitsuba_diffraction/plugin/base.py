@@ -281,6 +281,9 @@ class SurfaceBSDF(PluginBSDF):
             delta = chosen & mi.has_flag(below.sampled_type, mi.BSDFFlags.Delta)
             sample1 = dr.select(chosen, sample1, sample1 / dr.select(chosen, 1.0, share))
         if diffracts:
+            if nested is not None:  # lanes of the nested BSDF all read the same memory
+                sample1 = dr.select(chosen, 0.0, sample1)
+                sample2 = dr.select(chosen, mi.Point2f(0.0), sample2)
             drawn = self.draw(ctx, site, sample1, sample2)
             result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
         smooth = dr.select(delta, False, active)

@@ -45,7 +45,7 @@ def _names() -> list[str]:
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of a material's table, if there is one."""
-    if material not in TISSUES and not _file(material, "eta").is_file():
+    if material not in TISSUES and not (material and _file(material, "eta").is_file()):
         return None
     nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
@@ -71,7 +71,8 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     if mi.is_monochromatic or not values.any():  # Mitsuba refuses spectra that are 0 everywhere
         value = float(np.interp(wavelength, nodes, values))
         return mi.load_dict({"type": "uniform", "value": value})
-    ends = np.union1d(nodes, [SHORTEST, LONGEST])  # Mitsuba has 0 beyond
+    # Mitsuba has 0 beyond
+    ends = np.union1d(nodes, [x for x in (SHORTEST, LONGEST) if not nodes[0] <= x <= nodes[-1]])
     extended = np.interp(ends, nodes, values)
     if mi.is_spectral:
         lists = (", ".join(map(str, numbers.tolist())) for numbers in (ends, extended))

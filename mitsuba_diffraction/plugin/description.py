@@ -81,32 +81,6 @@ class Quantity:
 Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
-@dataclass(frozen=True)
-class Material:
-    """Material of a structure.
-
-    Attributes
-    ----------
-    kind : MIRROR, DIELECTRIC, RARER or CONDUCTOR.
-    index : see `Index`; None of a mirror. In RGB variants it interpolates three values.
-    known : first and last wavelength of a tabulated index, nm, or None.
-    name : name of a conductor, for messages.
-    """
-
-    kind: Feature
-    index: Index | None = None
-    known: tuple[float, float] | None = None
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Film:
-    """Thin film on a structure: index relative to the medium above, and thickness in nm."""
-
-    index: complex
-    thickness: float
-
-
 def unscaled(height_scale: float) -> DirectionalTable | None:
     """Return None: all values are 1 at every height scale."""
     return None
@@ -132,7 +106,13 @@ class Surface:
     heights : function that reads the heights of the table; None for solved orders.
     height_scale, lateral_scale : factors on the heights and lengths of the table's patch.
     largest_scale : largest height scale of the table.
-    material, coat, film : material of the structure; index of a coat over the medium above it.
+    kind : of the structure's material: MIRROR, DIELECTRIC, RARER or CONDUCTOR; None for solved
+        orders.
+    index : of the material, see `Index`; None of a mirror and for solved orders. In RGB variants it
+        interpolates three values.
+    material : name of a material whose index is tabulated, else empty.
+    layer : FILM or STACK on the structure, or None.
+    coat : index of a coat over the medium above it, or None.
     model : name of the boundary model; empty for solved orders.
     energy_scale : scale s of directions and wavelengths as a function of the height scale, on
         `tables.directional.FINE`; None where all are 1. The BSDF is multiplied by s(ωi) s(ωo).
@@ -141,7 +121,6 @@ class Surface:
     nested : the BSDF beneath, or None.
     shadowing : whether grooves shadow each other (`vcavity`).
     transmits : whether light goes through.
-    stacked : whether a stack of layers lies on the structure.
     """
 
     table: DiffractionTable | OrderTable | CrossedTable
@@ -154,16 +133,17 @@ class Surface:
     height_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
     lateral_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
     largest_scale: float | None = None
-    material: Material | None = None
+    kind: Feature | None = None
+    index: Index | None = None
+    material: str = ""
+    layer: Feature | None = None
     coat: float | None = None
-    film: Film | None = None
     model: str = ""
     energy_scale: Callable[[float], DirectionalTable | None] = unscaled
     reflected: Callable[[float], DirectionalTable | None] = unscaled
     nested: BSDF | None = None
     shadowing: bool = False
     transmits: bool = False
-    stacked: bool = False
 
     @property
     def patch(self) -> DiffractionTable:
@@ -208,8 +188,6 @@ class Surface:
             Feature.LIMITED: not self.solved and self.patch.limited,
             Feature.TRANSMISSION: self.transmits,
             Feature.COAT: self.coat is not None,
-            Feature.FILM: self.film is not None,
-            Feature.STACK: self.stacked,
             Feature.ENERGY_SCALE: not tall.texture and self.energy_scale(tall.number) is not None,
             Feature.SHADOWING: self.shadowing,
             Feature.PATCH: self.coherence == "patch",
@@ -222,8 +200,7 @@ class Surface:
             Feature.VARYING_ORIENTATION: turned.texture is not None,
             Feature.NESTED: self.nested is not None,
         }
-        kind = None if self.material is None else self.material.kind
-        chosen = (kind, known.get(self.model, Feature.OWN_MODEL))
+        chosen = (self.kind, self.layer, known.get(self.model, Feature.OWN_MODEL))
         found = {feature for feature, has in present.items() if has}
         return found | {feature for feature in chosen if feature is not None}
 

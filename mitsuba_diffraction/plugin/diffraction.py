@@ -207,6 +207,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -218,7 +219,7 @@ from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
 from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
-from .energy import ReflectedEnergy
+from .energy import EnergyModel, reflector_of
 from .layers import UnderCoat
 from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
@@ -249,10 +250,13 @@ class Diffraction(DiffractingSurface):
         if self.coat is not None:
             self.fresnel = UnderCoat(self.boundary.material, self.coat)
             self.mirror = Boundary(KIRCHHOFF, self.coat)
-        self.energy: ReflectedEnergy = ReflectedEnergy(
-            self.mean_table, self.wavelength, self.boundary, self.coat, self.energy_conserving,
+        self.energy = EnergyModel(
+            self.mean_table,
+            self.wavelength,
+            partial(reflector_of, self.boundary, self.coat),
+            conserving=self.energy_conserving,
             beneath=nested is not None and self.coat is None,
-        )  # fmt: skip
+        )
         self.ready()
 
     # ------------------------------------------------------------------ the diffraction
@@ -341,7 +345,7 @@ class Diffraction(DiffractingSurface):
             getattr(material, "sums", None),
             material.tint is None,
         )
-        own = self.vcavity, self.coat is None, self.energy.scales
+        own = self.vcavity, self.coat is None, self.energy.kernel_constants()
         return *super().kernel_constants(), *own, *other_kernels
 
     # ------------------------------------------------------------------ for shaders and people

@@ -13,15 +13,13 @@ int_ior, ext_ior : float or string [1.5, 1.000277]
 thin : boolean [false]
     Light goes through a sheet, whose lower side is flat; both sides have ext_ior. Light that the
     lower side sends back is summed as between two mirrors. Light beyond the sheet's critical angle
-    is lost, unless energy_conserving puts it into order 0.
+    is lost, unless energy_conserving shares it among all other light.
 model : string [small_slope]
     `small_slope` or `kirchhoff`, as of `diffraction`.
 energy_conserving : boolean [true]
-    Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides. Where the other orders of a steep surface exceed 1 on their own, all
-    light is attenuated by s(ωi) s(ωo). It takes a few seconds the first time and is kept in the
-    cache, in steps of 0.01 of eta, finer near 1. `false` is the model as it is, for checks, and
-    needed for coherence `patch` of a rough surface, where other orders interfere with order 0.
+    Makes R + T 1, since a dielectric loses no light: all light is multiplied by s(ωi) s(ωo), s on
+    the directions of both sides. It takes a few seconds the first time and is kept in the cache, in
+    steps of 0.01 of eta, finer near 1. `false` is the model as it is, for checks.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that
@@ -56,6 +54,7 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -70,13 +69,12 @@ from .arithmetic import plain
 from .base import asked_sides
 from .boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
 from .directions import CoatedPair, Crossing, Pair, Sides, Site, TablePoint, Turned
-from .energy import DielectricEnergy
+from .energy import EnergyModel, dielectric_of
 from .materials import Dielectric, Inside
 from .properties import flag
 from .sampling import EVEN, direction_of, with_even_share
 from .surface import DiffractingSurface
 from .types import (
-    Colour,
     Context,
     Float,
     Interaction,
@@ -102,7 +100,6 @@ class DiffractionDielectric(DiffractingSurface):
 
     title = "DiffractionDielectric"
     transmits = True
-    energy: DielectricEnergy | None
 
     def __init__(self, props: Properties) -> None:
         nested, material = read.nested_of(props, read.TRANSMITTING), read.transmissive_of(props)
@@ -112,9 +109,12 @@ class DiffractionDielectric(DiffractingSurface):
         self.thin = flag(props, "thin", False)
         self.inner_boundary = self.boundary.of(Inside(material, self.thin))
         self.mirror = Boundary(KIRCHHOFF, material)
-        if self.energy_conserving:
-            model = self.boundary.model.name
-            self.energy = DielectricEnergy(self.table, self.wavelength, material, model, self.thin)
+        self.energy = EnergyModel(
+            self.table,
+            self.wavelength,
+            partial(dielectric_of, self.boundary, material, self.thin),
+            conserving=self.energy_conserving,
+        )
         self.ready()
 
     @property
@@ -138,27 +138,23 @@ class DiffractionDielectric(DiffractingSurface):
         reflects, transmits = asked_sides(ctx)
         share = self._staying_share(cos_i, ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
-        # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        change = None
-        if self.energy is not None and self.energy.scales_order_0:
-            change = self.energy.order_0_scale(site, wo)
         if reflects:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, site, wo, lit, change)
+                side, orders = reflected(ctx, site, wo, lit)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if transmits:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
-            passed = self._transmitted(ctx, site, crossing, change) * dr.abs(cos_o)
+            passed = self._transmitted(ctx, site, crossing) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, site.scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self.energy is not None:
-            # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self.energy.attenuation(site, wo))
+        if self.energy.scales:
+            # s(ωi) s(ωo), such that reflected and transmitted light add up to 1
+            value *= mi.Spectrum(self.energy.factor(site, wo))
         return value, density
 
     def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
@@ -192,38 +188,34 @@ class DiffractionDielectric(DiffractingSurface):
 
     # ------------------------------------------------------------------ reflection
 
-    def _above(
-        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, change: Colour | None
-    ) -> tuple[Spectrum, Float]:
+    def _above(self, ctx: Context, site: Site, wo: Vector3f, lit: Mask) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        pair = Pair(site.si, wo, site.frame, lit)
-        power = self.geometry(pair) * self._power(site, pair, change)
+        si = site.si
+        pair = Pair(si, wo, site.frame, lit)
+        power = self.geometry(pair) * self.power.power(pair, site.scale, si)
         value = self.lobe(ctx, site, pair, self.boundary, power, lit)
         if self.thin:
-            value += self._returned(site, pair, change)
-        return value, self.power.density(pair, site.scale, site.si)
+            value += self._returned(site, pair)
+        return value, self.power.density(pair, site.scale, si)
 
-    def _below(
-        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, change: Colour | None
-    ) -> tuple[Spectrum, Float]:
+    def _below(self, ctx: Context, site: Site, wo: Vector3f, lit: Mask) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
-        n = self.material.eta
+        n, si = self.material.eta, site.si
         if self.thin:
-            outer = Turned(site.si, wo, site.frame, lit, mi.Float(1.0))
+            outer = Turned(si, wo, site.frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            power = self.geometry(pair) * self._power(site, pair, change)
+            power = self.geometry(pair) * self.power.power(pair, site.scale, si)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
-            face = self.face(ctx, site, outer, self.mirror, lit)
-            value += face if change is None else mi.Spectrum(change) * face
-            return value, self.power.density(outer, site.scale * n, site.si)
-        inner = Turned(site.si, wo, site.frame, lit, n)
-        power = self.geometry(inner) * self._power(site, inner.place, change)
+            value += self.face(ctx, site, outer, self.mirror, lit)
+            return value, self.power.density(outer, site.scale * n, si)
+        inner = Turned(si, wo, site.frame, lit, n)
+        power = self.geometry(inner) * self.power.power(inner.place, site.scale, si)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
         value = self.lobe(ctx, site, inner, self.inner_boundary, power, lit) * dr.square(n)
-        return value, self.power.density(inner, site.scale * n, site.si) * dr.square(n)
+        return value, self.power.density(inner, site.scale * n, si) * dr.square(n)
 
-    def _returned(self, site: Site, pair: Pair, change: Colour | None) -> Spectrum:
+    def _returned(self, site: Site, pair: Pair) -> Spectrum:
         """f cosθo of light that the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, returned = [], []
@@ -233,38 +225,28 @@ class DiffractionDielectric(DiffractingSurface):
             # T² R / (1 − R²) of each polarisation
             returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
-        power = self._power(site, point, change)
+        power = self.power.power(point, site.scale, site.si)
         ends_factor = dr.safe_sqrt(returned[0] * returned[1])
         factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
         return mi.depolarizer(power * factor)
 
-    def _power(self, site: Site, point: Pair | TablePoint, change: Colour | None) -> Colour:
-        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
-        power = self.power.power(point, site.scale, site.si)
-        if change is None:
-            return power
-        # Speckle may be dark where the ensemble's order 0 is not
-        zeroth = dr.minimum(self.power.zeroth(point, site.scale, site.si), power)
-        return power + (change - 1.0) * zeroth
-
     # ------------------------------------------------------------------ transmission
 
-    def _transmitted(
-        self, ctx: Context, site: Site, crossing: Crossing, change: Colour | None
-    ) -> Spectrum:
+    def _transmitted(self, ctx: Context, site: Site, crossing: Crossing) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
         si, scale, point = site.si, site.scale, crossing.place
         power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
-        zeroth = dr.minimum(zeroth, power)  # speckle may be dark
+        # speckle may be dark where the ensemble's order 0 is not
+        zeroth = dr.minimum(zeroth, power)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
-        value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
+        value += mi.Spectrum(zeroth) * flat
         outside = mi.Float(self.area_factor * crossing.frame.area)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo
@@ -338,9 +320,7 @@ class DiffractionDielectric(DiffractingSurface):
 
     def kernel_constants(self) -> tuple[object, ...]:
         """See `PluginBSDF.kernel_constants`."""
-        energy = self.energy
-        scales = energy is not None and (energy.scales_order_0, energy.attenuates)
-        return *super().kernel_constants(), self.thin, scales
+        return *super().kernel_constants(), self.thin, self.energy.kernel_constants()
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""

@@ -169,7 +169,7 @@ class DiffractionMix(PluginBSDF):
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
         if self.depths:
-            return {**self.bsdfs, DEPTH: f"{self.depths.depth} µm"}
+            return {**self.bsdfs, DEPTH: self.depths.depth}
         rest = "the rest"
         weights = {_PREFIX + name: weight or rest for name, weight in self.weights.items()}
         return {**self.bsdfs, **weights}

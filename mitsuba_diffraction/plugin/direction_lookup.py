@@ -26,25 +26,29 @@ _DAYLIGHT = (360.0, 830.0, 2.0)
 
 
 class DirectionLookup:
-    """A function of direction and channel in the variant's memory, bilinear in (θ, φ)."""
+    """A function of direction and channel in the variant's memory, bilinear in (θ, φ).
+
+    It is of directions above the surface, or of both sides: rows of cells of the lower side follow
+    those of the upper one.
+    """
 
     def __init__(self) -> None:
         self.present = False
-        self._ones: DirectionalTable | None = None
+        self._ones: list[DirectionalTable] | None = None
         self._values: Buffer = None
         self._nodes: Buffer = None
-        self._last, self._varies = 0, False
+        self._last, self._varies, self._sides = 0, False, 1
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = self._record = 1
 
     def update(
         self,
-        tables: list[DirectionalTable] | None,
+        tables: Sequence[Sequence[DirectionalTable]] | None,
         nodes: list[float],
         scales: ScaleRange,
     ) -> None:
-        """Take the tables at evenly spaced height scales, or none, where all values are 1.
+        """Take the tables of one or two sides at evenly spaced height scales, or none, which is 1.
 
         While derivatives are taken, values of 1 stand for no tables after there were some: an
         optimisation compiles no other kernel.
@@ -55,10 +59,10 @@ class DirectionLookup:
         if tables is None:
             return
         if scales.differentiable:
-            self._ones = DirectionalTable(tables[0].wavelengths, np.ones_like(tables[0].values))
+            self._ones = _ones(tables[0])
         height_scale, varies = scales.height_scale, scales.varies
-        maps = np.stack([_cells(table, scales.centre) for table in tables])
-        self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
+        maps = np.stack([[_cells(side, scales.centre) for side in sides] for sides in tables])
+        self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
@@ -66,7 +70,7 @@ class DirectionLookup:
             self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
         # Where there is but one node nothing varies with the height scale
         self._nodes = upload(mi.Float, maps) if varies or width > 0.0 else None
-        wavelengths = tables[0].wavelengths
+        wavelengths = tables[0][0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
         self._first = mi.Float(math.log2(float(wavenumber(wavelengths[0]))))
@@ -74,17 +78,18 @@ class DirectionLookup:
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
 
-    def at(self, direction: Vector3f, cosine: Float, site: Site) -> list[Float]:
-        """Return the value of each channel for a direction in the shading frame.
-
-        cosine : of its angle to the normal, on the side that the function is of.
-        """
+    def at(self, direction: Vector3f, site: Site) -> list[Float]:
+        """Return the value of each channel for a direction in the shading frame."""
         frame, wavenumbers = site.frame, site.wavenumbers
+        cosine = mi.Frame3f.cos_theta(direction)
         tangential, share = frame.turned(direction), None
         height_scale = site.scale * dr.rcp(frame.stretch)
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
-        cell, s, t = self._cell(*self._place(tangential, cosine))
+        both = self._sides == 2
+        cell, s, t = self._cell(*self._place(tangential, dr.abs(cosine) if both else cosine))
+        if both:
+            cell = dr.select(cosine > 0.0, cell, cell + self._polar * self._azimuthal)
 
         def pages(n: Index) -> list[Float]:
             corners = self._corners(cell * self._pages + n, share)
@@ -124,7 +129,7 @@ class DirectionLookup:
         if share is None:
             return read_record(self._values, page, self._record)
         lower = index_between(dr.floor(share), 0.0, float(self._last))
-        size = self._pages * self._polar * self._azimuthal
+        size = self._pages * self._sides * self._polar * self._azimuthal
         page = page + index_of(lower) * size
         ends = (read_record(self._nodes, at, self._record) for at in (page, page + size))
         # no farther, where values might become negative; derivatives at the ends are as inside
@@ -143,17 +148,21 @@ def at_horizon(cosine: Float) -> Float:
     return near * dr.sqrt(near)
 
 
-def scales_of(tables: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:
-    """Scales at several height scales, 1 where there is none; None if there is none at all."""
-    some = next((table for table in tables if table is not None), None)
-    if some is None:
-        return None
-    ones = DirectionalTable(some.wavelengths, np.ones_like(some.values))
-    return [table or ones for table in tables]
+def scales_of(
+    tables: Sequence[Sequence[DirectionalTable] | None],
+) -> Sequence[Sequence[DirectionalTable]] | None:
+    """Scales of all sides at several height scales, 1 where there is none; None if all are 1."""
+    some = next((sides for sides in tables if sides is not None), None)
+    return None if some is None else [sides or _ones(some) for sides in tables]
+
+
+def _ones(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:
+    """Tables of 1 of the form of others."""
+    return [DirectionalTable(side.wavelengths, np.ones_like(side.values)) for side in sides]
 
 
 def between(
-    tables: list[DirectionalTable], nodes: tuple[float, float], height_scale: float
+    tables: Sequence[DirectionalTable], nodes: tuple[float, float], height_scale: float
 ) -> DirectionalTable:
     """Interpolate between two height scales."""
     low, high = tables

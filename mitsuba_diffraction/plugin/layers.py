@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ..optics.arithmetic import is_complex
 from ..optics.coat import coated_reflectance, cosine_within
@@ -20,6 +20,7 @@ from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
 from .arithmetic import plain
+from .description import Feature
 from .materials import INDEX_PARTS, Dielectric, Material
 from .parameter_changes import Bounded
 from .types import Colour, Float, Interaction, Mask, Number
@@ -29,7 +30,8 @@ class UnderCoat(Material):
     """Flat faces of a coat and of the material beneath it."""
 
     def __init__(self, material: Material, coat: Dielectric) -> None:
-        self.material, self.coat = material, coat
+        self.material: Material = material
+        self.coat = coat
         self.changeable = (*material.changeable, *coat.changeable)
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
@@ -75,7 +77,9 @@ class Channels:
         count = _LEAST_NODES + math.ceil(_PER_FRINGE * path * (first - last))
         nodes = np.linspace(last, first, count)
         dense = np.arange(*_ENDS, 1.0)
-        rows = linear_srgb(response(dense)).T @ CubicSpline(nodes, np.eye(count))(1.0 / dense)
+        rows = linear_srgb(response(dense)).T @ scipy.interpolate.CubicSpline(nodes, np.eye(count))(
+            1.0 / dense
+        )
         return cls((1.0 / nodes).tolist(), (rows / rows.sum(axis=1, keepdims=True)).tolist())
 
     def colours(self, values: list[Float]) -> list[Float]:
@@ -99,6 +103,8 @@ class UnderFilm(Material):
     shortest : shortest wavelength that the table serves, nm.
     """
 
+    layer = Feature.FILM
+
     def __init__(
         self,
         material: Material,
@@ -108,7 +114,8 @@ class UnderFilm(Material):
         wavelength: float,
         shortest: float,
     ) -> None:
-        self.material, self.film, self._fixed = material, film, mi.Float(wavelength)
+        self.material: Material = material
+        self.film, self._fixed = film, mi.Float(wavelength)
         dr.make_opaque(self._fixed)
         self._shortest = shortest
         self._k = Bounded("film_k", k, *INDEX_PARTS["k"], _k_refusal)

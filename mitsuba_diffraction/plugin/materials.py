@@ -47,6 +47,8 @@ class Material:
     name : of a tabulated material, else empty.
     absorbs : whether light that is not reflected is absorbed, and none goes beneath.
     tint : columns of `optics.colour.metal_tint` in RGB variants, of a tabulated metal.
+    layer : FILM or STACK, of layers over a material; else None.
+    material : the material beneath layers, else None.
     """
 
     changeable: tuple[Changeable, ...] = ()
@@ -54,6 +56,8 @@ class Material:
     name = ""
     absorbs = False
     tint: list[Colour] | None = None
+    layer: Feature | None = None
+    material: Material | None = None
 
     def indices(self, si: Interaction, active: Mask) -> list[Any]:
         """Return the index of each channel, relative to the medium above, or one for all."""

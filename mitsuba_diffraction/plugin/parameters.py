@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import NamedTuple
 
 import mitsuba as mi
 
 from ..errors import DiffractionError, warn
-from ..heights.field import HeightField
-from ..heights.lengths import is_auto, numbers_of
+from ..heights.lengths import numbers_of
 from ..heights.read import LoadOptions
 from ..llvm import require_loaded_llvm
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
 from ..retired import retired
-from ..settings import COHERENCES, SURFACE, checked
+from ..settings import COHERENCES, SURFACE
 from ..tables.table import DiffractionTable
 from .arithmetic import plain
 from .description import Feature
@@ -29,16 +27,9 @@ from .materials import INDEX_PARTS, Conductor, Dielectric, Material, Perfect
 from .parameter_changes import ObjectValues
 from .pigment import pigment_bsdf
 from .properties import choice, class_of, number
-from .sources import (
-    Factors,
-    heights_of_file,
-    heights_of_tensor,
-    table_of_file,
-    table_of_heights,
-)
 from .stack import UnderStack, read_layers
-from .textures import Orientation
 from .types import BSDF, Properties
+from .varying import Orientation
 from .window_positions import TILINGS, WindowPositions
 
 SOURCES = ("heightfield", "table", "data")
@@ -336,43 +327,6 @@ def read_index(props: Properties, name: str, default: float = 1.0) -> float | st
 
 
 # ------------------------------------------------------------------ table and surface
-
-
-class Patch(NamedTuple):
-    """Table of a scene, and function that reads the heights that the table is made of."""
-
-    table: DiffractionTable
-    heights: Callable[[], HeightField]
-
-
-def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
-    """Get the table that a scene asks for.
-
-    height_scale, stretch : factors on heights and lengths that the table has to serve.
-    """
-    sources = [name for name in SOURCES if name in props]
-    if len(sources) != 1:
-        raise DiffractionError(
-            f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(sources) or 'none'}"
-        )
-    (source,) = sources
-    options = LoadOptions.parse(**{name: props.get(name) for name in READING if name in props})
-    asked = {name: props.get(name) for name in TABLE if name in props}
-    if coherence_of(props) == SURFACE:
-        asked["coherence"] = "patch"  # each window has its own speckle
-    if is_auto(asked.get("coherence_width", 0.0)):
-        del asked["coherence_width"]
-    settings = {name: checked(name, value) for name, value in asked.items()}
-    value = props.get(source)
-    if source == "data":
-        heights = heights_of_tensor(value, options).stretched(stretch)
-        return Patch(table_of_heights(heights, settings, height_scale), lambda: heights)
-    if not isinstance(value, str):
-        raise DiffractionError(f"{source}={value!r} must be the name of a file")
-    path, must_be_table = resolved_path(value, source), source == "table"
-    factors = Factors(height_scale, stretch)
-    table = table_of_file(path, must_be_table, options, settings, factors)
-    return Patch(table, lambda: heights_of_file(path, must_be_table, options).stretched(stretch))
 
 
 def coherence_of(props: Properties) -> str:

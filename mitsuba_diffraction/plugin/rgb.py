@@ -16,8 +16,7 @@ import numpy as np
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.geometry import wavenumber
 from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
-from ..tables.colour.table import PACKET, TERMS, ColourTable
-from ..tables.store import cached_colours
+from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
 from .directions import Crossing, Pair, TablePoint

@@ -1,11 +1,8 @@
-"""Tables of the sources that a scene names: images, recipes, tables, arrays; each built once."""
+"""Heights and tables that a scene names: `tables.source` with the parameters of a BSDF."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,165 +10,80 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, warn
-from ..files import FileKind, kind_of, readable_file
-from ..heights import gratings
+from ..files import FileKind
 from ..heights.field import HeightField
-from ..heights.load import load_heights, notes_line
+from ..heights.lengths import is_auto
 from ..heights.read import LoadOptions, treat
-from ..heights.recipes import Recipe
-from ..settings import MAX_HEIGHT_SCALE, TableSettings
-from ..tables.build.build import build_with
-from ..tables.build.checks import warnings_of
-from ..tables.store import cached_table, key_of, loaded_table
+from ..settings import SURFACE, checked
+from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
+from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
+from .types import Properties
 
-#: A table serves heights scaled by up to this times max(1, height_scale).
-HEIGHT_SCALE_ROOM = 1.5
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.
 SHORTEST_WAVELENGTH = 360.0
 
 
-@dataclass(frozen=True)
-class TableRequest:
-    """The table of heights that a BSDF asks for.
+class Patch(NamedTuple):
+    """Table of a scene, and function that reads the heights that the table is made of."""
 
-    Attributes
-    ----------
-    digest : of the heights.
-    settings : of the table.
-    height_scale : the largest factor on the heights that the BSDF uses.
-    build : builds the table with any settings.
-    recipe : says where the heights come from; None for an array.
+    table: DiffractionTable
+    heights: Callable[[], HeightField]
+
+
+def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
+    """Get the table that a scene asks for.
+
+    height_scale, stretch : factors on heights and lengths that the table has to serve.
     """
-
-    digest: str
-    settings: TableSettings
-    height_scale: float
-    build: Callable[[TableSettings], DiffractionTable]
-    recipe: Recipe | None
-
-    def cached(self, settings: TableSettings) -> DiffractionTable:
-        """The table with these settings, from the cache or built."""
-        return cached_table(self.digest, settings, lambda: self.build(settings))
-
-
-class Factors(NamedTuple):
-    """Factors on the heights that a table is to serve.
-
-    height_scale : the largest factor on the heights.
-    stretch : factor on lengths in the patch's plane, at least 1.
-    """
-
-    height_scale: float
-    stretch: float
-
-
-#: Gets the table that is asked for.
-TableProvider = Callable[[TableRequest], DiffractionTable]
-#: Providers of the scenes that are being loaded, the current one last.
-_providers: list[TableProvider] = [lambda request: request.cached(request.settings)]
-
-
-@contextmanager
-def tables_by(provider: TableProvider) -> Iterator[None]:
-    """Let a provider choose the tables of all scenes that are loaded inside.
-
-    In all threads: Mitsuba's own, which make the BSDFs of a scene, inherit no context variables.
-    """
-    _providers.append(provider)
-    try:
-        yield
-    finally:
-        _providers.remove(provider)
-
-
-def table_of_file(
-    path: Path,
-    must_be_table: bool,
-    options: LoadOptions,
-    asked: Mapping[str, Any],
-    factors: Factors,
-) -> DiffractionTable:
-    """Return the table of a file: a table, a recipe, or a height field of any format.
-
-    Parameters
-    ----------
-    path : the file.
-    must_be_table : refuse anything but a table.
-    options : how to read heights.
-    asked : the fields of `TableSettings` that the scene sets, checked.
-    factors : the factors that are asked for.
-    """
-    kind = kind_of(path)
-    if kind is FileKind.ORDERS:
+    names = [name for name in SOURCES if name in props]
+    if len(names) != 1:
         raise DiffractionError(
-            f"'{path}' is a table of orders, which the BSDF 'diffraction_orders' has as its table; "
-            "change the type of the BSDF, or give heights"
+            f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(names) or 'none'}"
         )
-    if must_be_table or kind is FileKind.TABLE:
-        table = loaded_table(path)
-        _check_agreement(path, table, options, asked)
-        height_scale = factors.height_scale
-        if factors.stretch > 1.0:
-            raise DiffractionError(
-                f"lateral_scale={factors.stretch:g} is above 1, beyond the frequencies of the "
-                f"table '{path}'; give the height field instead of the table"
-            )
-        if height_scale > table.height_scale_max:
-            raise DiffractionError(
-                f"height_scale={height_scale:g} is beyond the table's "
-                f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
-                "the height field instead of the table, or build it with "
-                f"DiffractionTable.build(height_scale_max={height_scale:.4g}) or more"
-            )
-    elif kind is FileKind.RECIPE:
-        recipe = Recipe.load(path)
-        table = _providers[-1](
-            _request(
-                _recipe_digest(recipe, options),
-                lambda: recipe.fields(options),
-                {**recipe.table, **asked},
-                factors,
-                replace(recipe, options=recipe.options.updated(options)),
-            )
-        )
+    (name,) = names
+    options = LoadOptions.parse(**{name: props.get(name) for name in READING if name in props})
+    given = {name: props.get(name) for name in TABLE if name in props}
+    if coherence_of(props) == SURFACE:
+        given["coherence"] = "patch"  # each window has its own speckle
+    if is_auto(given.get("coherence_width", 0.0)):
+        del given["coherence_width"]
+    asked = {name: checked(name, value) for name, value in given.items()}
+    value = props.get(name)
+    if name == "data":
+        source = TableSource.of(_heights_of(value, options))
+    elif isinstance(value, str):
+        source = TableSource.of(resolved_path(value, name), options)
     else:
-        table = _providers[-1](
-            _request(
-                _file_digest(path, options),
-                lambda: [load_heights(path, options)],
-                asked,
-                factors,
-                Recipe.of_file(path, options),
-            )
+        raise DiffractionError(f"{name}={value!r} must be the name of a file")
+    if source.kind is FileKind.ORDERS:
+        raise DiffractionError(
+            f"'{source.path}' is a table of orders, which the BSDF 'diffraction_orders' has as its "
+            "table; change the type of the BSDF, or give heights"
         )
+    if name == "table" or source.kind is FileKind.TABLE:
+        table = _table_file(source, asked, height_scale, stretch)
+    else:
+        settings = source.settings_for(asked, height_scale)
+        table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
     if table.limited:
         x, y = table.frequency_limit
         warn(
-            f"{path.name}: the table ends at the frequencies {x:.4g} along x and {y:.4g} rad/µm "
-            "along y (frequency_limit): light that the surface sends beyond is missing"
+            f"{source.files[0].name}: the table ends at the frequencies {x:.4g} along x and "
+            f"{y:.4g} rad/µm along y (frequency_limit): light that the surface sends beyond is "
+            "missing"
         )
-    return table
+    return Patch(table, lambda: source.fields()[0].stretched(stretch))
 
 
-def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> HeightField:
-    """Return the heights that a scene names; the first of a recipe's several.
-
-    Raises a DiffractionError if it names a table, which does not hold them.
-    """
-    kind = kind_of(path)
-    if must_be_table or kind is FileKind.TABLE:
-        raise DiffractionError(
-            f"'{path}' is a table and does not hold the heights that it was made of; give the "
-            "scene the height field instead"
-        )
-    if kind is FileKind.RECIPE:
-        return Recipe.load(path).fields(options)[0]
-    return load_heights(path, options)
+def _logged(done: int, total: int, text: str) -> None:
+    """Log the begin of a table's building."""
+    if not done:
+        mi.Log(mi.LogLevel.Info, f"diffraction: {text}")
 
 
-def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
+def _heights_of(data: Any, options: LoadOptions) -> HeightField:
     """Return heights (ny, nx) in µm from an array, or from `bsdf_dict`'s HeightField.
 
     Raises a DiffractionError if pixel_size is missing, max_height is given, or the array holds no
@@ -192,64 +104,26 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     return treat(HeightField(values, options.pixel_size, name="data"), options)
 
 
-def table_of_heights(
-    heights: HeightField, asked: Mapping[str, Any], height_scale: float
+def _table_file(
+    source: TableSource, asked: Mapping[str, Any], height_scale: float, stretch: float
 ) -> DiffractionTable:
-    """Return the table of a height field."""
-    factors = Factors(height_scale, 1.0)
-    return _providers[-1](_request(heights.digest(), lambda: [heights], asked, factors, None))
-
-
-def _request(
-    digest: str,
-    load: Callable[[], list[HeightField]],
-    asked: Mapping[str, Any],
-    factors: Factors,
-    recipe: Recipe | None,
-) -> TableRequest:
-    height_scale, stretch = factors
-
-    def build(settings: TableSettings) -> DiffractionTable:
-        heights = [field.stretched(stretch) for field in load()]
-        mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
-        table = build_with(heights, settings)
-        lines = warnings_of(heights, settings)
-        if lines and recipe is not None:
-            lines = [notes_line(lines, recipe.path, recipe.options, settings)]
-        for line in lines:
-            warn(line)
-        return table
-
-    if stretch != 1.0:
-        digest = key_of(digest, stretch)
-    room = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
-    settings = TableSettings(**{"height_scale_max": room, **asked})
-    if height_scale > settings.height_scale_max:
+    """Load a table file; refuse parameters of the scene that contradict it."""
+    (path,) = source.files
+    table = loaded_table(path)
+    _check_agreement(path, table, source.options, asked)
+    if stretch > 1.0:
         raise DiffractionError(
-            f"height_scale={height_scale:g} is beyond height_scale_max="
-            f"{settings.height_scale_max:g} of the recipe (a coat counts as its index times the "
-            "heights); raise it there"
+            f"lateral_scale={stretch:g} is above 1, beyond the frequencies of the table "
+            f"'{path}'; give the height field instead of the table"
         )
-    return TableRequest(digest, settings, height_scale, build, recipe)
-
-
-def _file_digest(path: Path, options: LoadOptions) -> str:
-    return key_of(options.specified(), _sha256(path))
-
-
-def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
-    """Return a digest of the recipe's text, its sources and the generators."""
-    files = [readable_file(source) for source in recipe.sources]
-    if recipe.generator is not None:
-        files += sorted(Path(gratings.__file__).parent.glob("*.py"))
-    arguments = [dict(patch) for patch in recipe.arguments]
-    options_of_both = [recipe.options.specified(), options.specified()]
-    return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
-
-
-def _sha256(path: Path) -> str:
-    with open(readable_file(path), "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    if height_scale > table.height_scale_max:
+        raise DiffractionError(
+            f"height_scale={height_scale:g} is beyond the table's {table.height_scale_max:g} (a "
+            "coat counts as its index times the heights); give the height field instead of the "
+            f"table, or build the table with height_scale_max={height_scale:.4g} or more (the "
+            "command 'precompute')"
+        )
+    return table
 
 
 def _remedy(name: str) -> str:
@@ -275,7 +149,7 @@ def _check_agreement(
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has "
                 f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
-                f"DiffractionTable.build({name}={value})"
+                f"{name}={value} (the command 'precompute')"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
@@ -286,5 +160,5 @@ def _check_agreement(
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
-            "DiffractionTable.build(wavelength_range=(360, 830))"
+            "wavelength_range=(360, 830) (the command 'precompute')"
         )

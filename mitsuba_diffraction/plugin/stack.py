@@ -20,6 +20,7 @@ from ..optics.colour import linear_srgb, response
 from ..optics.materials import PERFECT, TISSUES, material_named
 from ..optics.stack import Stacked, mean_powers, nodes, packed, path_of
 from .conductors import tabulated_index
+from .description import Feature
 from .materials import Material
 from .memory import read_record, upload
 from .types import Float, Interaction, Mask, Number
@@ -134,6 +135,8 @@ class UnderStack(Material):
     wavelength : nm, of mono variants; wavelengths : that the table serves.
     """
 
+    layer = Feature.STACK
+
     def __init__(
         self,
         material: Material,
@@ -142,8 +145,8 @@ class UnderStack(Material):
         wavelength: float,
         wavelengths: tuple[float, float],
     ) -> None:
-        self.material, self.layers = material, layers
-        self._medium = medium
+        self.material: Material = material
+        self.layers, self._medium = layers, medium
         rows, self._columns = nodes(layers.path, wavelengths)
         if mi.is_rgb:
             table = packed(_of_channels(self._powers(_VISIBLE)))

@@ -15,16 +15,14 @@ from .arithmetic import plain
 from .base import SurfaceBSDF
 from .boundary import Boundary, boundary_of
 from .conductors import tabulated_range
-from .description import Film, Surface
-from .description import Material as DescribedMaterial
+from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
-from .layers import UnderFilm
-from .materials import Material, Perfect, tinted
+from .materials import Material, tinted
 from .power import power_model
 from .properties import flag
-from .stack import UnderStack
+from .sources import read_patch
 from .types import BSDF, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 from .varying import LEAST_SCALE, MOST_SCALE, LateralScale, Varying, largest_of
 
@@ -45,10 +43,11 @@ class DiffractingSurface(SurfaceBSDF):
     orientation, lateral_scale, height_scale : the patch as it lies on the surface.
     boundary : model of the structure's material; fresnel : flat surface with all layers.
     power : `power.PowerModel` of the variant.
+    energy : scale by which energy is conserved, made after all layers are known.
     wavelength : nm, of mono variants.
     """
 
-    energy: EnergyModel | None = None
+    energy: EnergyModel
     fresnel: Material
 
     def __init__(
@@ -68,7 +67,7 @@ class DiffractingSurface(SurfaceBSDF):
         self.lateral_scale = LateralScale(props)
         # κ grows by the index, as if heights did
         stretch = self.lateral_scale.of_table
-        self.table, self.heights = read.read_patch(props, largest * optical, stretch)
+        self.table, self.heights = read_patch(props, largest * optical, stretch)
         most = largest if varies else self.table.height_scale_max / optical
         advice = ", the table's range; load the plugin anew with that height_scale"
         self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)
@@ -86,8 +85,8 @@ class DiffractingSurface(SurfaceBSDF):
 
     def ready(self) -> None:
         """See `PluginBSDF.ready`."""
-        owners = self.height_scale, self.orientation, self.lateral_scale.factor, self.fresnel
-        self.parameters += [each for owner in owners if owner for each in owner.changeable]
+        owners = self.height_scale, self.orientation, self.lateral_scale, self.fresnel
+        self.parameters += [each for owner in owners for each in owner.changeable]
         super().ready()
 
     @property
@@ -157,8 +156,7 @@ class DiffractingSurface(SurfaceBSDF):
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
         yield self.height_scale.refusal()
-        if self.lateral_scale.factor is not None:
-            yield self.lateral_scale.factor.refusal()
+        yield self.lateral_scale.refusal()
         yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
@@ -177,16 +175,14 @@ class DiffractingSurface(SurfaceBSDF):
     def derive(self) -> None:
         """Compute what depends on the parameters: indices and scales of energy."""
         self.fresnel.derive()
-        if self.energy is not None:
-            self.energy.update(self.scale_range())
+        self.energy.update(self.scale_range())
 
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""
         height, lateral = self.height_scale, self.lateral_scale
         heights = height.range()[0], height.number
         varies = bool(height.texture or lateral.texture)
-        numbers = [each for each in (height, lateral.factor) if each is not None]
-        differentiable = any(each.differentiable for each in numbers)
+        differentiable = height.differentiable or lateral.differentiable
         return ScaleRange(heights, lateral.range_over_table(), varies, differentiable)
 
     def kernel_constants(self) -> tuple[object, ...]:
@@ -198,11 +194,8 @@ class DiffractingSurface(SurfaceBSDF):
 
     def describe(self) -> Surface:
         """Return the description of the surface (`description.describe`)."""
-        structure: Any = self.boundary.material
-        film = Film(*structure.numbers()) if isinstance(structure, UnderFilm) else None
-        stacked = isinstance(structure, UnderStack)
-        if film or stacked:
-            structure = structure.material
+        structure = self.boundary.material
+        material = structure.material or structure
         placed = self.window_positions is not None
         return Surface(
             table=self.table,
@@ -218,15 +211,11 @@ class DiffractingSurface(SurfaceBSDF):
             height_scale=self.height_scale.quantity,
             lateral_scale=self.lateral_scale.quantity,
             largest_scale=float(self.table.height_scale_max),
-            material=DescribedMaterial(
-                structure.kind,
-                None if isinstance(structure, Perfect) else structure.at,
-                tabulated_range(structure.name) if structure.name else None,
-                structure.name,
-            ),
-            film=film,
+            kind=material.kind,
+            index=None if material.kind is Feature.MIRROR else material.at,
+            material=material.name if tabulated_range(material.name) else "",
+            layer=structure.layer,
             model=str(self.boundary),
-            stacked=stacked,
             transmits=self.transmits,
         )
 

@@ -1,6 +1,6 @@
 """Numbers over a surface: one number between bounds, or a texture or mesh attribute (Dr.Jit).
 
-Heights, lengths, weights and depths are of this kind; `textures.Orientation` is an angle.
+Heights, lengths, weights, depths and the orientation of the patch are of this kind.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .memory import index_between
 from .parameter_changes import Bounded, Changeable, ObjectValues
 from .properties import number
 from .textures import is_bitmap, range_of, require_raw
-from .types import Float, Interaction, Mask, Properties, Texture
+from .types import Float, Interaction, Mask, Properties, Rotation, Texture
 
 #: Least number that stands for one above 0: less would be lost in single precision.
 LEAST_SCALE = 1e-30
@@ -118,7 +118,9 @@ class Varying:
         return f"{self.name}={value:g}{self._unit} must be {bounds}"
 
     def __str__(self) -> str:
-        return f"{self.number:g}" if self.texture is None else " ".join(str(self.texture).split())
+        if self.texture is None:
+            return f"{self.number:g}{self._unit}"
+        return " ".join(str(self.texture).split())
 
 
 #: Largest factor on heights.
@@ -157,12 +159,11 @@ def largest_of(props: Properties, name: str, least: float, most: float) -> tuple
     return value, found
 
 
-class LateralScale:
-    """Factor by which the patch is stretched in its plane.
+class LateralScale(Varying):
+    """Factor by which the patch is stretched in its plane; 1 where a scene gives none.
 
     Attributes
     ----------
-    factor : the factor; None without lateral_scale, where kernels have no operation for it.
     of_table : factor by which the table's heights are stretched: the largest, or 1 where none is
         above 1, so that no look-up goes beyond the table's frequencies.
     """
@@ -180,30 +181,80 @@ class LateralScale:
                     f"{MOST_STRETCH:g}"
                 )
         self.of_table = max(1.0, largest)
-        self.factor: Varying | None = None
-        if name in props:
-            high = largest if isinstance(value, mi.Texture) else self.of_table
-            advice = ", the table's range; load the plugin anew with that lateral_scale_max"
-            self.factor = Varying(name, value, LEAST_STRETCH, high, advice=advice)
+        high = largest if isinstance(value, mi.Texture) else self.of_table
+        advice = ", the table's range; load the plugin anew with that lateral_scale_max"
+        super().__init__(name, value, LEAST_STRETCH, high, advice=advice)
+        if name not in props:
+            self.changeable = ()
 
     def over_table(self, si: Interaction, active: Mask) -> Float:
-        """Return the factor relative to the table's; the plain number 1 without lateral_scale."""
-        return 1.0 if self.factor is None else self.factor.at(si, active) * (1.0 / self.of_table)
+        """Return the factor relative to the table's.
+
+        The plain number 1 without lateral_scale: kernels have no operation for it.
+        """
+        return self.at(si, active) * (1.0 / self.of_table) if self.changeable else 1.0
 
     def range_over_table(self) -> tuple[float, float]:
         """Return the least and the largest factor relative to the table's, as far as known."""
-        low, high = (1.0, 1.0) if self.factor is None else self.factor.range()
+        low, high = self.range()
         return low / self.of_table, high / self.of_table
-
-    @property
-    def texture(self) -> Texture | None:
-        """The texture of factors, or None."""
-        return self.factor and self.factor.texture
 
     @property
     def quantity(self) -> Quantity:
         """The factor relative to the table's, for descriptions."""
         return Quantity(self.range_over_table()[1], self.texture)
 
-    def __str__(self) -> str:
-        return "1" if self.factor is None else str(self.factor)
+
+#: Degrees; much larger ones leave no digits of the angle in single precision.
+MOST_DEGREES = 36_000.0
+
+
+class Orientation(Varying):
+    """Angle from the first tangent to the patch's x axis: degrees, or a texture of (cos, sin).
+
+    A raw texture or mesh attribute has (cos, sin) in its first two channels instead of an angle, so
+    that interpolation has no seam at 360°. They need not be of unit length; where both are 0 the
+    patch is not turned.
+
+    Raises a DiffractionError if a bitmap has one channel, is taken for colours, or cannot hold
+    negative numbers.
+    """
+
+    def __init__(self, value: float | Texture) -> None:
+        super().__init__("orientation", value, -MOST_DEGREES, MOST_DEGREES, unit="°")
+
+    def rotation(self, si: Interaction, active: Mask) -> Rotation:
+        """Return (cos, sin) of the angle at points of the surface."""
+        if self.texture is None:
+            sin, cos = dr.sincos(dr.deg2rad(self.at(si, active)))
+            return cos, sin
+        value = self.texture.eval_3(si, active)
+        length = dr.sqrt(dr.square(value.x) + dr.square(value.y))
+        turned = length > 1e-6
+        scale = dr.rcp(dr.select(turned, length, 1.0))
+        return dr.select(turned, value.x * scale, 1.0), dr.select(turned, value.y * scale, 0.0)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The angle in degrees, or the texture, for descriptions."""
+        return Quantity(self.number if self.texture is None else 0.0, self.texture)
+
+    def refusal(self) -> str | None:
+        """Reason why a texture's values are not directions, or None."""
+        if self.texture is None or not is_bitmap(self.texture):
+            return None  # attributes of meshes are checked where there is a mesh
+        data = np.array(mi.traverse(self.texture)["data"], np.float32)  # half would overflow
+        if data.shape[-1] < 3:
+            return (
+                f"orientation: the bitmap has {data.shape[-1]} channel; an orientation has "
+                "three: cosine, sine and an unused one"
+            )
+        levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
+        within = levels.min() >= 0.0 and levels.max() <= 65535.5
+        from_integers = within and np.all(np.abs(levels - np.rint(levels)) < 0.02)
+        if from_integers and np.any((lengths > 0.0) & (np.abs(lengths - 1.0) > 0.02)):
+            return (
+                "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
+                "negative numbers; save (cos, sin) in a float format, as EXR"
+            )
+        return None

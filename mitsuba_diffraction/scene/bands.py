@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..plugin.description import Surface
-from ..plugin.sources import SHORTEST_WAVELENGTH, TableRequest, tables_by
+from ..plugin.sources import SHORTEST_WAVELENGTH
+from ..tables.source import TableRequest, providing
 from ..tables.table import DiffractionTable
 
 # Parameters of a film that its size and format follow from.
@@ -81,7 +82,7 @@ def wider_tables(first: float) -> Iterator[None]:
         wider = replace(request.settings, wavelength_range=(min(first, low), last))
         return request.cached(wider)
 
-    with tables_by(table):
+    with providing(table):
         yield
 
 
@@ -96,7 +97,8 @@ def check_bands(bands: Bands, surfaces: Mapping[str, Sequence[Surface]]) -> None
         if shortest > first:
             raise DiffractionError(
                 f"{name}: the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; "
-                f"give heights, or DiffractionTable.build(wavelength_range=({first:g}, 830))"
+                f"give heights, or a table with wavelength_range=({first:g}, 830) (the command "
+                "'precompute')"
             )
 
 
@@ -120,7 +122,7 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[S
         for solved, (low, high) in dict.fromkeys((s.solved, s.wavelengths) for s in described):
             least, most = min(first, low), max(last, high)
             if least < low - _MARGIN or most > high + _MARGIN:
-                wider = f"DiffractionTable.build(wavelength_range=({least:.4g}, {most:.4g}))"
+                wider = f"wavelength_range=({least:.4g}, {most:.4g}) (the command 'precompute')"
                 warn(
                     f"{name} is black outside {low:.4g} to {high:.4g} nm, the range of its table, "
                     f"and the camera records {first:.4g} to {last:.4g} nm; make the table with "

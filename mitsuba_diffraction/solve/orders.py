@@ -76,7 +76,6 @@ class Settings:
     method : one of `jobs.METHODS`, or "auto": Chandezon's for slopes, else the integral method.
     resolution : points on the boundary, or harmonics; None chooses by convergence.
     polarised : whether the table has Mueller matrices.
-    accept : whether a table that misses the tolerance is returned, with a warning.
     """
 
     wavelengths: tuple[float, float] = WAVELENGTHS
@@ -84,7 +83,6 @@ class Settings:
     method: str = AUTO
     resolution: int | None = None
     polarised: bool = False
-    accept: bool = False
 
     def __post_init__(self) -> None:
         number_between(self.tolerance, "tolerance", 1e-4, 0.2)
@@ -107,9 +105,10 @@ def solve_orders(
 ) -> OrderTable:
     """Solve the orders of a grating for all directions and wavelengths.
 
-    Raises a DiffractionError if an argument is out of its range, the solver is not installed or
-    does not converge, or the measured error of the table is above the tolerance after two
-    refinements.
+    Warns if the measured error of the table is above the tolerance after two refinements.
+
+    Raises a DiffractionError if an argument is out of its range, or the solver is not installed or
+    does not converge.
 
     Parameters
     ----------
@@ -186,7 +185,7 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
 
 
 def conclude(header: dict[str, Any], error: Measured, how: Settings, jobs: Jobs) -> None:
-    """Add a table's error to its header; refuse it above the tolerance, or warn if accepted."""
+    """Add a table's error to its header; warn if it is above the tolerance."""
     header |= {"error_mean": error.mean, "error_worst": error.most}
     header["processor_seconds"] = round(jobs.processor_seconds, 1)
     if error.polarised is not None:
@@ -194,17 +193,11 @@ def conclude(header: dict[str, Any], error: Measured, how: Settings, jobs: Jobs)
     if error.within(how.tolerance):
         return
     mean = max(error.mean, error.polarised or 0.0)
-    text = (
+    warn(
         f"the table misses {mean:.2%} of the light in its orders on average (tolerance "
         f"{how.tolerance:.2%}) and {error.most:.2%} in 5 % of directions (tolerance "
-        f"{WORST * how.tolerance:.2%})"
+        f"{WORST * how.tolerance:.2%}); fewer wavelengths need fewer nodes"
     )
-    if not how.accept:
-        raise DiffractionError(
-            f"{text}; accept=True writes it as it is, without solving again; or use a larger "
-            "tolerance, or fewer wavelengths"
-        )
-    warn(text)
 
 
 def _solved_at_nodes(

@@ -178,7 +178,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
             f"'{path}' ({kind}): profiles are one-dimensional, one period of a line, CSV of x, z "
             "in µm; crossed gratings: one period of heights, by solve_crossed"
         )
-    what = "two columns x, z in µm (read_orders reads efficiencies)"
+    what = "two columns x, z in µm ('solve --import', or read_orders, reads efficiencies)"
     table = read_columns(path)
     if not len(table.numbers):
         raise DiffractionError(f"'{path}' has no points; expected {what}")

@@ -86,7 +86,7 @@ class SolvedRecipe:
         if content.get("method") != SOLVED:
             raise DiffractionError(
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '
-                "DiffractionTable.build"
+                "the command 'precompute'"
             )
         check_keys(shown, content, _KEYS)
         output, arguments = content.get("output", f"{file.stem}.nc"), content.get("arguments", {})

@@ -17,21 +17,27 @@ sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
 orders             solved efficiencies of a periodic profile's orders
-store              the cache of all of these
+fields             checks of single values that are read from files
+TableSource        the table of any source of heights, built once; `providing` (in `source`)
+store              the cache, of whatever packs itself into a record
 """
 
 from __future__ import annotations
 
 from .build.build import build_table
+from .document import from_record, to_record
 from .exr import load_table, save_table
 from .lookup import brdf, window_sum
+from .source import TableSource
 from .table import DiffractionTable
 
-__all__ = ["DiffractionTable"]
+__all__ = ["DiffractionTable", "TableSource"]
 
 # Modules that build on the class; it shall not import them
 DiffractionTable.build = staticmethod(build_table)
 DiffractionTable.load = staticmethod(load_table)
 DiffractionTable.save = save_table
+DiffractionTable.to_record = to_record
+DiffractionTable.from_record = staticmethod(from_record)
 DiffractionTable.window_sum = window_sum
 DiffractionTable.brdf = brdf

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
+
+from .fields import numbers, require
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -80,7 +82,7 @@ class DirectionGrid:
         shares = [u * v for u in (1.0 - s, s) for v in (1.0 - t, t)]
         indices, data = (np.stack(part, axis=-1).ravel() for part in (columns, shares))
         starts, nodes = np.arange(0, len(data) + 1, 4), (self.polar + 1) * self.azimuthal
-        corners = sparse.csr_array((data, indices, starts), shape=(row.size, nodes))
+        corners = scipy.sparse.csr_array((data, indices, starts), shape=(row.size, nodes))
         return LinearMap(corners, row.shape)
 
 
@@ -88,7 +90,7 @@ class DirectionGrid:
 class LinearMap:
     """Map from values on a grid to values of another shape: `matrix` (values, nodes)."""
 
-    matrix: sparse.csr_array
+    matrix: scipy.sparse.csr_array
     shape: tuple[int, ...]
 
     def __call__(self, values: NDArray[np.floating]) -> Array:
@@ -99,7 +101,7 @@ class LinearMap:
         corners = self.matrix
         data = corners.data * np.repeat(shares.ravel(), 4)
         starts = corners.indptr[:: shares.shape[-1]]
-        rows = sparse.csr_array(
+        rows = scipy.sparse.csr_array(
             (data, corners.indices, starts), shape=(len(starts) - 1, corners.shape[1])
         )
         return LinearMap(rows, shares.shape[:-1])
@@ -117,6 +119,14 @@ class DirectionalTable:
 
     wavelengths: Real
     values: Array
+
+    @classmethod
+    def parse(cls, wavelengths: Any, values: NDArray[Any]) -> DirectionalTable:
+        """Return the table of a file's numbers; raises a ValueError for what does not fit."""
+        count = len(values) if values.ndim == 3 else None
+        require(count is not None, f"function of direction of shape {values.shape}")
+        require(bool(np.isfinite(values).all()), "function of direction that is not finite")
+        return cls(numbers(wavelengths, "wavelengths", (count,)), values)
 
     @property
     def grid(self) -> DirectionGrid:

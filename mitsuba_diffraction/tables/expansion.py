@@ -31,9 +31,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg
-from scipy.special import gammaln
 
 from ..settings import BASES as BASES
 
@@ -105,7 +104,7 @@ class Expansion:
             n = np.arange(1, self.terms + 1)
             x = kappa[..., None] * self.half_range
             with np.errstate(divide="ignore"):
-                return np.exp(n * np.log(x) - gammaln(n + 1))
+                return np.exp(n * np.log(x) - scipy.special.gammaln(n + 1))
         index = self.interval(kappa)
         t = np.clip(2.0 * (kappa / self.length - index) - 1.0, -1.0, 1.0)
         polynomials = np.cos(np.arange(self.series_terms) * np.arccos(t)[..., None])
@@ -193,7 +192,7 @@ def principal_functions(
     vectors = np.linalg.eigh(covariance)[1][:, ::-1][:, :terms]
     # Of all functions that span this space, those that are 1 at one node and 0 at the others: then
     # a coefficient is a power, and what rounding adds to it is in proportion where it is dark too
-    chosen = np.sort(linalg.qr(vectors.T, mode="r", pivoting=True)[1][:terms])
+    chosen = np.sort(scipy.linalg.qr(vectors.T, mode="r", pivoting=True)[1][:terms])
     change = np.linalg.inv(vectors[chosen])
     projection = (vectors / size[:, None]) @ vectors[chosen].T
     return projection, expansion.fit(interval).T @ (size[:, None] * (vectors @ change))

@@ -28,6 +28,8 @@ from .document import document_of, parse_document, plain, shape_of, with_coeffic
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
+#: Remedy for a file that is of another version, or damaged.
+BUILT_AGAIN = "build it again with the command 'precompute' (DiffractionTable.build)"
 #: SHA-256 of that string and of all channels, in the order of `_channels`.
 CHECKSUM = "mitsuba_diffraction_sha256"
 
@@ -90,19 +92,19 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         document = json.loads(text) if isinstance(text, str) else None
     except (ValueError, RecursionError) as error:
         raise DiffractionError(
-            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); build it "
-            "again with DiffractionTable.build"
+            f"'{path}' is a damaged table (its attribute '{TABLE_ATTRIBUTE}' is no JSON); "
+            f"{BUILT_AGAIN}"
         ) from error
     if not isinstance(document, dict):
         raise DiffractionError(
-            f"'{path}' is an EXR image but no table; make one of it with "
-            "DiffractionTable.build, or give it as heightfield"
+            f"'{path}' is an EXR image but no table; make one of it with the command "
+            "'precompute' (DiffractionTable.build), or give it as heightfield"
         )
     version = document.pop("version", None)
     if version != FORMAT_VERSION:
         raise DiffractionError(
             f"'{path}' is a table of format version {quoted(version)}, this program reads version "
-            f"{FORMAT_VERSION}; build it again with DiffractionTable.build"
+            f"{FORMAT_VERSION}; {BUILT_AGAIN}"
         )
     try:
         table = parse_document(document)
@@ -120,8 +122,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         return with_coefficients(table, coefficients)
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
-            f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
-            "DiffractionTable.build"
+            f"'{path}' is a damaged table ({one_line(str(error))[:200]}); {BUILT_AGAIN}"
         ) from error
 
 
@@ -171,5 +172,5 @@ def _read(path: str | os.PathLike[str], header_only: bool = False) -> Any:
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "
-            "give an .exr written by DiffractionTable.save"
+            "give an .exr that the command 'precompute' wrote"
         ) from error

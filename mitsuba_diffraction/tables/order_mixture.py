@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from .powers import order_0_power
 from .table import DiffractionTable
@@ -22,6 +22,11 @@ FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 _FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
 #: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
 _JOINED = 1.0
+#: Distances between samples of a window's power, in 1/σ: in full, and where its lobes are so wide
+#: that smoothing of the samples would widen them.
+_SAMPLED, _FINE = 0.8, 0.15
+#: Least deviation that smooths samples, in their distance.
+_BRIDGED = 0.7
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,12 @@ class OrderMixture:
 
 
 def order_mixture(
-    table: DiffractionTable, height_scale: float, smoothing: float, *, apart: bool = False
+    table: DiffractionTable,
+    height_scale: float,
+    reach: float,
+    smoothing: float,
+    *,
+    apart: bool = False,
 ) -> OrderMixture:
     """Sort a table's orders.
 
@@ -64,21 +74,26 @@ def order_mixture(
     ----------
     table : the diffraction table.
     height_scale : factor on its heights.
+    reach : largest frequency that the light probes, rad/µm, at most `DiffractionTable.q_limit`.
     smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
     apart : whether order 0 is apart from the density even if its lobe is as wide.
     """
     expansion = table.expansion
-    kappa_max = table.q_limit * height_scale
+    kappa_max = reach * height_scale
     periods = kappa_max * expansion.half_range / math.pi
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
     kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
     lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
     all_smooth = lobe >= smoothing
     apart = apart or table.order_0_ratio != 1.0
-    smoothing = max(smoothing, lobe)
-    axes = [_Axis(table, axis) for axis in (0, 1)]
+    axes = [_Axis(table, axis, fine=2.0 * lobe > smoothing) for axis in (0, 1)]
+    if table.grid.coherent:  # powers between the bins have the lobes in them
+        apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)
+        smoothing = math.sqrt(max(smoothing**2 - lobe**2, (_BRIDGED * apart_by) ** 2))
+    else:
+        smoothing = max(smoothing, lobe)
     pitch = 0.5 * smoothing
-    half = math.ceil(table.q_limit / pitch) + 1
+    half = math.ceil(reach / pitch) + 1
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
     density = np.empty((count, 2 * half, 2 * half), np.float32)
@@ -114,13 +129,13 @@ def order_mixture(
 class _Axis:
     """Where the powers along one axis are: at the bins, at bins joined, or between them."""
 
-    def __init__(self, table: DiffractionTable, axis: int) -> None:
+    def __init__(self, table: DiffractionTable, axis: int, *, fine: bool) -> None:
         last, spacing = table.grid.last[axis], table.spacing[axis]
         step = table.grid.steps[axis]
         bins = np.arange(-last, last + 1)
         if table.grid.coherent:
             # The window's power is as smooth as a lobe: sampled densely, its sum is its integral
-            density = max(1, math.ceil(step / 0.8))
+            density = max(1, math.ceil(step / (_FINE if fine else _SAMPLED)))
             positions = np.arange(-last * density, last * density + 1) / density
             self.frequency = positions * spacing
             self.lobe = np.exp(-2.0 * table.grid.exponents[axis] * positions**2)
@@ -180,12 +195,12 @@ class _Powers:
 
 def _splat(
     frequency: NDArray[np.floating], grid: NDArray[np.floating], deviation: float
-) -> sparse.csr_array:
+) -> scipy.sparse.csr_array:
     """Gaussian weights from frequencies to a grid, (grid, frequencies), of integral 1."""
     exponent = 0.5 * ((frequency - grid[:, None]) / deviation) ** 2
     weights = np.exp(-exponent) / (math.sqrt(2.0 * math.pi) * deviation)
     weights[exponent > _FADED] = 0.0
-    return sparse.csr_array(weights.astype(np.float32))
+    return scipy.sparse.csr_array(weights.astype(np.float32))
 
 
 def _choose(strongest: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse, special
 
 from .powers import order_0_power
 from .table import DiffractionTable
@@ -133,7 +133,7 @@ def _order_0(table: DiffractionTable) -> NDArray[np.float32]:
 
 
 def _cell_power(
-    table: DiffractionTable, matrices: list[sparse.csr_array], centre: float
+    table: DiffractionTable, matrices: list[scipy.sparse.csr_array], centre: float
 ) -> NDArray[np.float64]:
     """Mean window sum in each cell (ny, nx) around a share of κ_max, without order 0."""
     expansion = table.expansion
@@ -161,7 +161,7 @@ def _cell_power(
 
 def _cell_matrix(
     table: DiffractionTable, axis: int, origin: float, cell: float, count: int
-) -> sparse.csr_array:
+) -> scipy.sparse.csr_array:
     """Sparse (cells, bins): the window around a bin, integrated over a cell.
 
     Amplitudes are taken at the cell's centre instead: as their square is tabulated.
@@ -173,11 +173,11 @@ def _cell_matrix(
         distance = lower[:, None] + 0.5 * cell - frequency
         weights = np.exp(-0.5 * (table.sigma * distance) ** 2)
     else:
-        low = special.erf(table.sigma * (lower[:, None] - frequency))
-        high = special.erf(table.sigma * (lower[:, None] + cell - frequency))
+        low = scipy.special.erf(table.sigma * (lower[:, None] - frequency))
+        high = scipy.special.erf(table.sigma * (lower[:, None] + cell - frequency))
         weights = high - low
     weights[weights < 1e-7] = 0.0
-    return sparse.csr_array(weights.astype(np.float32))
+    return scipy.sparse.csr_array(weights.astype(np.float32))
 
 
 def _cumulative(power: NDArray[np.float64]) -> NDArray[np.float32]:

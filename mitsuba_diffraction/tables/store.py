@@ -1,8 +1,8 @@
-"""Cache of tables and all that is computed from them, in files named by a digest of their inputs.
+"""Cache of what takes long to compute, in files named by a digest of their inputs.
 
 A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
-lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables,
-their colours, and functions of direction, such as the scales that conserve energy.
+lie in memory. A damaged file, or one under another's name, is rebuilt. What is stored packs itself:
+this module knows no class (`Recorded`).
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ import json
 import math
 import os
 import threading
-import weakref
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import platformdirs
@@ -26,13 +25,6 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
 from ..errors import DiffractionError, one_line, warn
-from ..settings import TableSettings
-from .colour.build import PolarGrid
-from .colour.table import COLOUR_VERSION, ColourTable
-from .directional import DirectionalTable
-from .document import document_of, parse_document, plain, shape_of, with_coefficients
-from .expansion import Expansion
-from .table import FORMAT_VERSION, DiffractionTable
 
 #: Environment variable that moves the cache, e.g. to a larger disk.
 VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
@@ -46,6 +38,7 @@ _MAGIC = "mitsuba_diffraction cache"
 _HEAD, _ALIGNMENT = 256, 64
 
 T = TypeVar("T")
+R = TypeVar("R", bound="Recorded")
 _making: dict[tuple[str, str], threading.Lock] = {}
 
 
@@ -75,19 +68,25 @@ class Record:
     arrays: Sequence[NDArray[Any]]
 
 
+class Recorded(Protocol):
+    """What the cache stores."""
+
+    def to_record(self) -> Record:
+        """Return the record of this object."""
+
+    @classmethod
+    def from_record(cls, record: Record) -> Self:
+        """Return the object of a record; raises a ValueError for what does not fit."""
+
+
 def key_of(*parts: Any) -> str:
     """Return a key: the SHA-256 of its parts as JSON."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def cached(
-    kind: str,
-    key: str,
-    memory: MutableMapping[str, T],
-    make: Callable[[], T],
-    pack: Callable[[T], Record],
-    unpack: Callable[[Record], T],
-) -> T:
+    kind: str, key: str, memory: MutableMapping[str, R], make: Callable[[], R], stored: type[R]
+) -> R:
     """Return the value under a key, from memory or from disk; otherwise make and store it.
 
     Of several threads and processes that want one thing at a time, one makes it and the others
@@ -99,35 +98,29 @@ def cached(
     key : of all that it is made of, see `key_of`.
     memory : where this process keeps it.
     make : makes it.
-    pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
+    stored : its class.
     """
     value = memory.get(key)
     if value is None:
         with _making.setdefault((kind, key), threading.Lock()):
             value = memory.get(key)
             if value is None:
-                value = memory[key] = _from_disk(kind, key, make, pack, unpack)
+                value = memory[key] = _from_disk(kind, key, make, stored)
     return value
 
 
-def _from_disk(
-    kind: str,
-    key: str,
-    make: Callable[[], T],
-    pack: Callable[[T], Record],
-    unpack: Callable[[Record], T],
-) -> T:
+def _from_disk(kind: str, key: str, make: Callable[[], R], stored: type[R]) -> R:
     folder = cache_folder()
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    value = _found(path, title, unpack)
+    value = _found(path, title, stored)
     if value is None:
         with _locked(path):
-            value = _found(path, title, unpack)  # made by whoever was waited for
+            value = _found(path, title, stored)  # made by whoever was waited for
             if value is None:
                 value = make()
-                _keep(path, title, pack(value))
+                _keep(path, title, value.to_record())
     return value
 
 
@@ -148,10 +141,10 @@ def _locked(path: Path) -> Iterator[None]:
             lock.release()
 
 
-def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
+def _found(path: Path, title: str, stored: type[R]) -> R | None:
     """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
-        value = unpack(read_record(path, title))
+        value = stored.from_record(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
         return value
     except OSError:
@@ -239,49 +232,6 @@ def _prune(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-_tables: weakref.WeakValueDictionary[str, DiffractionTable] = weakref.WeakValueDictionary()
-_colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = (
-    weakref.WeakKeyDictionary()
-)
-#: Functions of direction by name.
-DirectionalTables = dict[str, DirectionalTable]
-_directions: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DirectionalTables]] = (
-    weakref.WeakKeyDictionary()
-)
-_COLOUR_NUMBERS = ("scale", "radius_end", "sigma", "sigma_0")
-
-
-def table_key(digest: str, settings: TableSettings) -> str:
-    """Return the key of the table of heights with this digest, built with these settings."""
-    return key_of(FORMAT_VERSION, digest, asdict(settings))
-
-
-def cached_table(
-    digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
-) -> DiffractionTable:
-    """Return the table of heights with this digest, from memory, from disk, or built and stored."""
-    key = table_key(digest, settings)
-    return cached("table", key, _tables, build, _table_record, _table_of)
-
-
-def _table_record(table: DiffractionTable) -> Record:
-    document = json.loads(json.dumps(document_of(table), default=plain))
-    return Record(document, [table.coefficients])
-
-
-def _table_of(record: Record) -> DiffractionTable:
-    table = parse_document(record.document)
-    (coefficients,) = record.arrays
-    if coefficients.shape != (shape := shape_of(table)):
-        raise ValueError(f"coefficients have shape {coefficients.shape}; expected {shape}")
-    return with_coefficients(table, coefficients)
-
-
-def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
-    """Load a table file once for all that use it at the same time."""
-    return loaded_once(path, DiffractionTable.load, _tables)
-
-
 def loaded_once(
     path: str | os.PathLike[str],
     load: Callable[[str | os.PathLike[str]], T],
@@ -295,69 +245,3 @@ def loaded_once(
     key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
     value = in_use.get(key)
     return in_use.setdefault(key, load(path)) if value is None else value
-
-
-def cached_colours(table: DiffractionTable) -> ColourTable:
-    """Return the colours of a table, from memory, from disk, or summed and stored."""
-    key = key_of(COLOUR_VERSION, table.digest())
-    memory = _colours.setdefault(table, {})
-    return cached(
-        "colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of
-    )
-
-
-def colour_record(colours: ColourTable) -> Record:
-    """Return the record of colours for the cache."""
-    document = {
-        "grid": asdict(colours.grid),
-        "expansion": asdict(colours.expansion),
-        **{name: getattr(colours, name) for name in _COLOUR_NUMBERS},
-    }
-    return Record(document, [colours.coefficients, colours.order_0])
-
-
-def colours_of(record: Record) -> ColourTable:
-    """Return the colours of such a record."""
-    document = record.document
-    grid = document["grid"]
-    coefficients, order_0 = record.arrays
-    return ColourTable(
-        grid=PolarGrid(grid["smallest"], grid["step"], tuple(grid["counts"])),
-        expansion=Expansion(**document["expansion"]),
-        coefficients=coefficients,
-        order_0=order_0,
-        **{name: document[name] for name in _COLOUR_NUMBERS},
-    )
-
-
-def cached_directions(
-    kind: str,
-    table: DiffractionTable,
-    made_of: Sequence[Any],
-    make: Callable[[], DirectionalTables],
-) -> DirectionalTables:
-    """Return functions of direction of a table, from memory, from disk, or computed and stored.
-
-    made_of : versions, settings and all else that they depend on beside the table.
-    """
-    key, memory = key_of(kind, table.digest(), made_of), _directions.setdefault(table, {})
-    return cached(kind, key, memory, make, directions_record, directions_of)
-
-
-def directions_record(functions: DirectionalTables) -> Record:
-    """Return the record of functions of direction for the cache."""
-    wavelengths = {name: function.wavelengths.tolist() for name, function in functions.items()}
-    return Record(wavelengths, [function.values for function in functions.values()])
-
-
-def directions_of(record: Record) -> DirectionalTables:
-    """Return the functions of direction of such a record, checked."""
-    functions = {}
-    for (name, wavelengths), values in zip(record.document.items(), record.arrays, strict=True):
-        if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
-            raise ValueError(
-                f"directional table of shape {values.shape}; expected (wavelengths, polar, "
-                "azimuthal), finite"
-            )
-        functions[name] = DirectionalTable(np.array(wavelengths, float), values)
-    return functions

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse, special
 
 #: exp(−4.6²) = 6e-10: as good as all of the window.
 FULL_REACH = 4.6
@@ -46,7 +46,7 @@ def taps_at(
 
 def missing_power(step: float, taps: int) -> float:
     """Share of ∫exp(−s²Δ²) beyond `taps` bins in all, s = `step` = σ·dq."""
-    return float(special.erfc(0.5 * step * taps))
+    return float(scipy.special.erfc(0.5 * step * taps))
 
 
 def reach_error(steps: tuple[float, float], taps: tuple[int, int], coherent: bool) -> float:
@@ -64,7 +64,7 @@ def taps_for(steps: tuple[float, float], error: float, coherent: bool) -> tuple[
 
     def fewest(step: float) -> int:
         missing = (0.5 * error) ** 2 / 2 if coherent else error / 2
-        reach = float(special.erfcinv(min(missing, 1.0)))
+        reach = float(scipy.special.erfcinv(min(missing, 1.0)))
         return max(1, int(np.ceil(2.0 * reach / step)))
 
     return fewest(steps[0]), fewest(steps[1])
@@ -107,7 +107,7 @@ def trims_for(
 def _tap_shares(step: float, taps: int) -> NDArray[np.float64]:
     """Each tap's share of ∫exp(−s²Δ²) along one direction, the mean over positions."""
     edges = step * (np.arange(taps + 1) - 0.5 * taps)
-    return 0.5 * np.diff(special.erf(edges))
+    return 0.5 * np.diff(scipy.special.erf(edges))
 
 
 def tap_matrix(
@@ -117,7 +117,7 @@ def tap_matrix(
     exponent: float,
     taps: int | None,
     chosen: Sequence[int] | None = None,
-) -> sparse.csr_array:
+) -> scipy.sparse.csr_array:
     """Weights exp(−exponent·Δ²) from bins to positions, as a sparse (positions, bins) matrix.
 
     Parameters
@@ -137,12 +137,12 @@ def tap_matrix(
     columns = columns.astype(int) - first_bin
     rows = np.broadcast_to(np.arange(len(positions))[:, None], columns.shape)
     inside = (columns >= 0) & (columns < bins)
-    return sparse.csr_array(
+    return scipy.sparse.csr_array(
         (weights[inside], (rows[inside], columns[inside])), shape=(len(positions), bins)
     )
 
 
-def apply_window(matrices: Sequence[sparse.csr_array], bins: NDArray[Any]) -> NDArray[Any]:
+def apply_window(matrices: Sequence[scipy.sparse.csr_array], bins: NDArray[Any]) -> NDArray[Any]:
     """Sum over the bins (ny, nx) with the weights of a matrix along x and one along y."""
     along_y = matrices[1] @ bins
     return (matrices[0] @ np.ascontiguousarray(along_y.T)).T

@@ -14,7 +14,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.analysis.media import follow, in_medium, loaded_in_media
-from mitsuba_diffraction.analysis.scans import Scan, bsdf_of, table_of
+from mitsuba_diffraction.analysis.scans import bsdf_of, table_of
 from mitsuba_diffraction.analysis.spectra import spectrum, table_range
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.optics.materials import TISSUES
@@ -65,8 +65,8 @@ def collected(theta, angle, lam, material, coat, above):
 def measured(parameters, lam, angles):
     """Reflectance factor of each angle, as the command measures it."""
     settings = TableSettings(wavelength_range=table_range(LAM))
-    scan = in_medium(Scan([sinusoid()], settings), parameters.get("ext_ior"), LAM[0])
-    bsdf = bsdf_of(table_of(scan), **loaded_in_media(parameters))
+    source = in_medium(md.TableSource.of(sinusoid()), parameters.get("ext_ior"), LAM[0])
+    bsdf = bsdf_of(table_of(source, settings), **loaded_in_media(parameters))
     before = follow(bsdf, parameters, LAM[0])
     return spectrum(bsdf, LIGHT, angles, acceptance=ACCEPTANCE, wavelengths=[lam],
                     before=before).value[0]  # fmt: skip

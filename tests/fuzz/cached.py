@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables import store
+from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.directional import DirectionalTable
-from mitsuba_diffraction.tables.store import VARIABLE, Record, cached
+from mitsuba_diffraction.tables.energy.conservation import Conservation
+from mitsuba_diffraction.tables.store import VARIABLE, Record, Recorded, cached
 from tests.fuzz.damage import damaged
 from tests.support.directions import rough_patch
 
@@ -25,11 +26,10 @@ _KEY = "5" * 64
 
 @dataclass(frozen=True)
 class Kind:
-    """What is kept: how it is made, and how it becomes a record and is made of one."""
+    """What is kept: how it is made, and its class."""
 
     make: Callable[[], Any]
-    pack: Callable[[Any], Record]
-    unpack: Callable[[Record], Any]
+    stored: type[Recorded]
 
 
 def _table() -> md.DiffractionTable:
@@ -38,18 +38,18 @@ def _table() -> md.DiffractionTable:
 
 @functools.cache
 def _colours() -> Any:
-    return store.ColourTable.build(_table())
+    return ColourTable.build(_table())
 
 
-def _conservation() -> dict[str, DirectionalTable]:
+def _conservation() -> Conservation:
     values = np.random.default_rng(3).random((2, 5, 4)).astype(np.float32)
-    return {"albedo": DirectionalTable(np.array([400.0, 700.0]), values)}
+    return Conservation(DirectionalTable(np.array([400.0, 700.0]), values))
 
 
 KINDS = {
-    "table": Kind(_table, store._table_record, store._table_of),
-    "colours": Kind(_colours, store.colour_record, store.colours_of),
-    "energy": Kind(_conservation, store.directions_record, store.directions_of),
+    "table": Kind(_table, md.DiffractionTable),
+    "colours": Kind(_colours, ColourTable),
+    "energy": Kind(_conservation, Conservation),
 }
 
 
@@ -67,7 +67,7 @@ def originals() -> dict[str, tuple[str, bytes]]:
 
 @functools.cache
 def _expected(name: str) -> Record:
-    return KINDS[name].pack(KINDS[name].make())
+    return KINDS[name].make().to_record()
 
 
 def _get(name: str, folder: str) -> tuple[Record, int]:
@@ -81,7 +81,7 @@ def _get(name: str, folder: str) -> tuple[Record, int]:
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = folder
     try:
-        return kind.pack(cached(name, _KEY, {}, make, kind.pack, kind.unpack)), len(made)
+        return cached(name, _KEY, {}, make, kind.stored).to_record(), len(made)
     finally:
         if before is None:
             del os.environ[VARIABLE]

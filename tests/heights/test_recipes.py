@@ -14,6 +14,7 @@ from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.recipes import LOAD_KEYS, Recipe
+from mitsuba_diffraction.heights.source import Source
 from mitsuba_diffraction.settings import RECIPE_SETTINGS
 
 PRECOMPUTE = Path(__file__).resolve().parent.parent.parent / "precompute"
@@ -50,7 +51,7 @@ def test_recipes_of_the_project_are_valid(path):
 
 def test_source_is_relative_to_the_recipe(folder):
     path = write(folder, 'source = "a.npy"\npixel_size = [0.1, 0.2]\nlevel = "plane"\n')
-    field = Recipe.load(path).field()
+    field = Source.of(path).field()
     assert field.pixel_size == (0.1, 0.2)
     assert "plane removed" in field.history[0]
     assert HeightField.load(path).digest() == field.digest()
@@ -104,15 +105,15 @@ output = "out/x.exr"
 
 
 def test_several_sources_are_several_patches(folder):
-    recipe = Recipe.load(write(folder, 'source = ["a.npy", "b.npy"]\npixel_size = 0.1\n'))
-    assert [field.name for field in recipe.fields()] == ["a.npy", "b.npy"]
+    source = Source.of(write(folder, 'source = ["a.npy", "b.npy"]\npixel_size = 0.1\n'))
+    assert [field.name for field in source.fields()] == ["a.npy", "b.npy"]
     with pytest.raises(DiffractionError, match="2 patches"):
-        recipe.field()
+        source.field()
 
 
 def test_seeds_are_several_patches(folder):
     text = 'generator = "elaphe_like"\nseeds = [3, 4]\n[arguments]\nextent = 8.0\npixels = 64\n'
-    first, second = Recipe.load(write(folder, text)).fields()
+    first, second = Source.of(write(folder, text)).fields()
     assert first.shape == second.shape == (64, 64)
     assert first.digest() != second.digest()
 
@@ -202,7 +203,6 @@ keys = st.sampled_from(["source", "generator", "arguments", "seeds", "output", "
 def test_random_recipes_load_or_are_one_clear_line(folder, content):
     path = write(folder, "\n".join(f"{key} = {value}" for key, value in content.items()))
     try:
-        recipe = Recipe.load(path)
-        recipe.fields()
+        Source.of(path).fields()
     except DiffractionError as error:
         assert "\n" not in str(error)

@@ -81,6 +81,7 @@ def test_file_that_is_no_library_is_one_line(tmp_path: Path):
     (tmp_path / "libLLVM.so").write_bytes(b"not a library")
     code = """
 import mitsuba_diffraction.llvm as llvm
+import drjit  # which loads its library
 try:
     llvm.require_llvm()
 except ValueError as error:
@@ -105,7 +106,7 @@ def test_machine_without_a_usable_llvm_is_one_line(tmp_path: Path, monkeypatch: 
 
 def test_import_of_the_package_makes_drjit_load_what_it_chose():
     installed(19)
-    code = "import mitsuba_diffraction.llvm as llvm; print(*llvm.loaded_llvm_version())"
+    code = "import mitsuba_diffraction.llvm as llvm, mitsuba; print(*llvm.loaded_llvm_version())"
     assert python(code).stdout.startswith("19 ")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import mitsuba as mi
@@ -17,8 +17,6 @@ from mitsuba_diffraction.analysis.spectra import SPECTRA
 from mitsuba_diffraction.osl.export import OSL, shader_of
 from mitsuba_diffraction.plugin.description import (
     Feature,
-    Film,
-    Material,
     Quantity,
     Surface,
     describe,
@@ -46,23 +44,25 @@ def half(height_scale: float) -> DirectionalTable:
     return DirectionalTable(np.array([400.0, 700.0]), np.stack([0.5 * FINE.ones] * 2))
 
 
+def constant(index: float) -> Callable:
+    return lambda lam: np.full(lam.shape, index + 0j)
+
+
 def base() -> Surface:
-    glass = Material(Feature.DIELECTRIC, lambda lam: np.full(lam.shape, 1.5 + 0j))
     return Surface(
-        TABLE, "dielectric", DEFAULTS["coherence_width"], Quantity(0.0), material=glass,
-        model="small_slope", largest_scale=1.5,
+        TABLE, "dielectric", DEFAULTS["coherence_width"], Quantity(0.0), kind=Feature.DIELECTRIC,
+        index=constant(1.5), model="small_slope", largest_scale=1.5,
     )  # fmt: skip
 
 
-CONDUCTOR = Material(Feature.CONDUCTOR, lambda lam: 0.01 * lam / 5 + 6j)
 #: Change of the description that gives a surface the feature.
 CHANGES: Mapping[Feature, dict] = {
     Feature.TRANSMISSION: {"transmits": True},
-    Feature.MIRROR: {"material": Material(Feature.MIRROR), "model": "kirchhoff"},
-    Feature.RARER: {"material": Material(Feature.RARER, lambda lam: np.full(lam.shape, 0.8 + 0j))},
-    Feature.CONDUCTOR: {"material": CONDUCTOR},
+    Feature.MIRROR: {"kind": Feature.MIRROR, "index": None, "model": "kirchhoff"},
+    Feature.RARER: {"kind": Feature.RARER, "index": constant(0.8)},
+    Feature.CONDUCTOR: {"kind": Feature.CONDUCTOR, "index": lambda lam: 0.01 * lam / 5 + 6j},
     Feature.COAT: {"coat": 1.4},
-    Feature.FILM: {"film": Film(1.3 + 0j, 100.0)},
+    Feature.FILM: {"layer": Feature.FILM},
     Feature.KIRCHHOFF: {"model": "kirchhoff"},
     Feature.OWN_MODEL: {"model": "level"},
     Feature.ENERGY_SCALE: {"energy_scale": half},

@@ -47,4 +47,4 @@ def test_directions_that_integers_could_hold_are_taken(some_variant, degrees):
 
 @pytest.mark.parametrize("degrees", [1e30, -40_000.0])
 def test_angles_without_digits_are_refused(every_variant, degrees):
-    assert "must be between -36000 and 36000 degrees" in refusal(lambda: load(orientation=degrees))
+    assert "at least -36000° and at most 36000°" in refusal(lambda: load(orientation=degrees))

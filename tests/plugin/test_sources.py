@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import mitsuba as mi
+import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.sources import tables_by
+from mitsuba_diffraction.heights.read import LoadOptions
+from mitsuba_diffraction.tables.source import providing
+from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.patches import DEFAULTS, PATCH
 
 
@@ -25,7 +28,7 @@ def test_a_provider_serves_all_bsdfs_of_a_scene(some_variant, parallel):
         f"sphere_{n}": {"type": "sphere", "bsdf": md.bsdf_dict(PATCH, **DEFAULTS, orientation=n)}
         for n in range(4)
     }
-    with tables_by(wider):
+    with providing(wider):
         scene = mi.load_dict({"type": "scene", **surfaces}, parallel=parallel)
     outside = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
     assert len(requests) == len(surfaces)
@@ -37,6 +40,20 @@ def test_a_provider_serves_no_longer_after_an_error(some_variant):
     def broken(request):
         raise md.DiffractionError("no table")
 
-    with pytest.raises(Exception, match="no table"), tables_by(broken):
+    with pytest.raises(Exception, match="no table"), providing(broken):
         mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
     mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
+
+
+def test_a_bsdf_and_a_measurement_of_one_scan_share_a_table(some_variant, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
+    scan = tmp_path / "scan.npy"
+    np.save(scan, PATCH.heights)
+    bsdf = mi.load_dict({"type": "diffraction", "heightfield": str(scan), "pixel_size": 0.1})
+    source = md.TableSource.of(scan, LoadOptions.parse(pixel_size="0.1"))
+    assert source.table(source.settings_for({})) is bsdf.table
+    array = md.TableSource.of(source.field())
+    given = mi.load_dict(md.bsdf_dict(source.field()))
+    assert array.table(array.settings_for({})) is given.table
+    # one of the file's bytes, one of the array's numbers
+    assert len(list((tmp_path / "cache").glob("table-*"))) == 2

@@ -240,4 +240,4 @@ def test_a_table_of_powers_has_no_places(some_variant, tmp_path):
         )
     )
     assert "coherence=ensemble" in said
-    assert "DiffractionTable.build(coherence=patch)" in said
+    assert "build another table with coherence=patch" in said

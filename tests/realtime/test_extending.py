@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.boundary import MODELS, Model
-from mitsuba_diffraction.optics.coat import Coat, pair_power, refracted
+from mitsuba_diffraction.optics.coat import refracted
 from mitsuba_diffraction.realtime.glsl.formulas import formulas
 from mitsuba_diffraction.realtime.web.export import make_page
+from mitsuba_diffraction.shading.pair_power import Coat, pair_power
 from tests.support.formulas import COAT, INDICES, check, pairs
 from tests.support.languages import emitted, shaded
 from tests.support.pages import blocks

@@ -103,20 +103,15 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
         polygon([(0, 0), (0.5, 0.1), (0.9, 0.3), (1.45, 0.02), (0.9, 0)], 1.0)
 
 
-def test_a_table_that_misses_its_tolerance_is_refined_or_accepted(monkeypatch):
+def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
     monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
-    with pytest.raises(DiffractionError, match=r"5 % of directions .tolerance 0.40%.*accept=True"):
-        solve_orders(PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3))
-    with pytest.warns(md.DiffractionWarning, match="on average"):
-        coarse = solve_orders(
-            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
-        )
+    strict = replace(SETTINGS, tolerance=1e-3)
+    with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
+        coarse = solve_orders(PROFILE, "none", settings=strict)
     monkeypatch.setattr(orders, "REFINEMENTS", 1)
     with pytest.warns(md.DiffractionWarning, match="on average"):
-        finer = solve_orders(
-            PROFILE, "none", settings=replace(SETTINGS, tolerance=1e-3, accept=True)
-        )
+        finer = solve_orders(PROFILE, "none", settings=strict)
     assert finer.header["error_mean"] < coarse.header["error_mean"]
 
 

@@ -9,9 +9,7 @@ import numpy as np
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.analysis.media import in_medium, medium_index
-from mitsuba_diffraction.analysis.scans import Scan
 from mitsuba_diffraction.optics.materials import SODIUM, TISSUES
-from mitsuba_diffraction.settings import TableSettings
 from tests.support.directions import Array, rough_patch
 
 ANGLES, LIGHT, AZIMUTH, ACCEPTANCE = (0.0, 35.0), 20.0, 30.0, 5.0
@@ -49,7 +47,7 @@ def spectra_and_reference(name: str, wavelengths: Array) -> tuple[Array, Array]:
     parameters, index = MATERIALS[name]
     medium = parameters.get("ext_ior")
     above = medium_index(medium)
-    within = in_medium(Scan([patch], TableSettings()), medium).patches[0]
+    within = in_medium(md.TableSource.of(patch), medium).field()
     found = md.spectrum(
         mi.load_dict(md.bsdf_dict(within, **parameters)), LIGHT, ANGLES, light_azimuth=AZIMUTH,
         acceptance=ACCEPTANCE, wavelengths=wavelengths,

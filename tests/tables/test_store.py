@@ -28,21 +28,25 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+class Stored(tuple):
+    """A text and arrays."""
+
+    def to_record(self):
+        return Record({"text": self[0]}, self[1:])
+
+    @classmethod
+    def from_record(cls, record):
+        return cls((record.document["text"], *record.arrays))
+
+
 def get(made, memory=None, key=KEY):
     """VALUES with a text, counted in `made` where they are made."""
 
     def make():
         made.append(key)
-        return "a text", VALUES, VALUES[0].astype(np.float16)
+        return Stored(("a text", VALUES, VALUES[0].astype(np.float16)))
 
-    return cached(
-        "values",
-        key,
-        {} if memory is None else memory,
-        make,
-        lambda found: Record({"text": found[0]}, found[1:]),
-        lambda record: (record.document["text"], *record.arrays),
-    )
+    return cached("values", key, {} if memory is None else memory, make, Stored)
 
 
 def test_a_later_process_reads_the_same_numbers(folder):
@@ -126,7 +130,16 @@ def make():
     with open(sys.argv[1], "a") as file:
         file.write("made ")
     time.sleep(0.3)
-    return np.arange(5)
+    return Stored()
+
+class Stored:
+    def to_record(self):
+        return Record(None, [np.arange(5)])
+
+    @classmethod
+    def from_record(cls, record):
+        assert record.arrays[0].sum() == 10
+        return cls()
 
 children = []
 while len(children) < 7:
@@ -135,10 +148,10 @@ while len(children) < 7:
         children.clear()
         break
     children.append(child)
-found = cached("values", "k", {}, make, lambda v: Record(None, [v]), lambda r: r.arrays[0])
+found = cached("values", "k", {}, make, Stored)
 for child in children:
     assert os.waitpid(child, 0)[1] == 0
-os._exit(0 if found.sum() == 10 else 1)
+os._exit(0 if isinstance(found, Stored) else 1)
 """
 KILLED = """
 import os, pathlib, signal, sys

@@ -16,7 +16,7 @@ from mitsuba_diffraction import (
     HeightField,
 )
 from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables import store
+from mitsuba_diffraction.tables import source, store
 from tests.support.directions import rough_patch
 
 PATCH = rough_patch((20, 20), (0.08, 0.08), 0.1)
@@ -27,7 +27,7 @@ ARGUMENTS = {"coherence_width": 1.6}
 def folder(tmp_path, monkeypatch):
     """An empty cache, on disk and in memory."""
     monkeypatch.setenv(store.VARIABLE, str(tmp_path / "cache"))
-    store._tables.clear()
+    source._tables.clear()
     return tmp_path / "cache"
 
 
@@ -43,7 +43,7 @@ class Builder:
 
     def table(self):
         settings = TableSettings(**self.arguments)
-        return store.cached_table(self.heights.digest(), settings, self)
+        return source.cached_table(self.heights.digest(), settings, self)
 
 
 def test_a_table_is_built_once_and_shared_while_in_use():
@@ -58,7 +58,7 @@ def test_a_later_process_reads_it_from_disk(folder):
     first = build.table()
     (file,) = folder.iterdir()
     assert file.suffix == ".cache"
-    store._tables.clear()  # as in a process of its own
+    source._tables.clear()  # as in a process of its own
     second = build.table()
     assert build.built == 1
     assert second is not first
@@ -95,8 +95,8 @@ def test_any_other_content_is_another_table(folder, other):
 def test_tables_of_another_format_are_built_anew(monkeypatch):
     build = Builder()
     build.table()
-    store._tables.clear()
-    monkeypatch.setattr(store, "FORMAT_VERSION", 99)
+    source._tables.clear()
+    monkeypatch.setattr(source, "FORMAT_VERSION", 99)
     build.table()
     assert build.built == 2
 
@@ -107,11 +107,11 @@ def test_a_damaged_file_is_replaced(folder, content):
     build.table()
     (file,) = folder.iterdir()
     file.write_bytes(content)
-    store._tables.clear()
+    source._tables.clear()
     with pytest.warns(DiffractionWarning, match="is damaged"):
         build.table()
     assert build.built == 2
-    store._tables.clear()
+    source._tables.clear()
     build.table()
     assert build.built == 2
 
@@ -122,7 +122,7 @@ def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(tmp_path, monkeypat
     build = Builder()
     first = build.table()
     assert build.table() is first  # kept in memory all the same
-    store._tables.clear()
+    source._tables.clear()
     build.table()
     assert build.built == 2
 
@@ -141,7 +141,7 @@ def test_the_oldest_tables_go_when_the_folder_is_full(folder, monkeypatch):
         (new,) = set(folder.iterdir()) - set(files)
         files.append(new)
         os.utime(new, (1000 + age, 1000 + age))
-    store._tables.clear()
+    source._tables.clear()
     builders[0].table()  # found, which makes it the youngest
     assert builders[0].built == 1
     monkeypatch.setattr(store, "MAX_BYTES", int(3.5 * files[0].stat().st_size))
@@ -184,12 +184,12 @@ def test_threads_that_need_the_same_table_build_it_once():
 def test_a_table_s_file_is_read_once_while_in_use(tmp_path):
     file = tmp_path / "table.exr"
     DiffractionTable.build(PATCH, **ARGUMENTS).save(file)
-    first = store.loaded_table(file)
-    assert store.loaded_table(str(file)) is first
+    first = source.loaded_table(file)
+    assert source.loaded_table(str(file)) is first
     DiffractionTable.build(PATCH, coherence_width=1.7).save(file)
-    assert store.loaded_table(file).coherence_width == 1.7
+    assert source.loaded_table(file).coherence_width == 1.7
     with pytest.raises(DiffractionError, match="does not exist"):
-        store.loaded_table(tmp_path / "no.exr")
+        source.loaded_table(tmp_path / "no.exr")
 
 
 def test_a_digest_is_of_what_is_looked_up_alone():

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import DiffractionTable, gratings, reference
+from mitsuba_diffraction import DiffractionTable, TableSource, gratings, reference
 from mitsuba_diffraction.analysis.energy import sides_summary
-from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
 
@@ -133,8 +132,8 @@ def sums_of_surfaces(names: Sequence[str] = tuple(SURFACES)) -> Iterator[Sums]:
 
 def sums_of_recipes(recipes: Sequence[Path] = tuple(PRECOMPUTE)) -> Iterator[Sums]:
     """R + T of recipes with their own coherence widths."""
-    for recipe in map(Recipe.load, recipes):
-        yield from _sums(recipe.path.stem, DiffractionTable.build(recipe.fields(), **recipe.table))
+    for source in map(TableSource.of, recipes):
+        yield from _sums(source.files[0].stem, source.table(source.settings_for({})))
 
 
 def _sums(name: str, table: DiffractionTable) -> Iterator[Sums]:

@@ -85,8 +85,8 @@ def brdf_map(
     surface = described if isinstance(described, Surface) else None
     if surface is not None and bands.low < (shortest := surface.shortest_wavelength):
         raise DiffractionError(
-            f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a wider table "
-            "with DiffractionTable.build"
+            f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a table of a "
+            "wider wavelength_range (the command 'precompute')"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
     sigma = None if surface is None else surface.sigma

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 import scipy
-from scipy.interpolate import CubicSpline
 
 FloatArray = npt.NDArray[np.float64]
 Rng = np.random.Generator
@@ -55,7 +54,9 @@ def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
     for axis, count in enumerate((ny, nx)):
         nodes = field.shape[axis]
         closed = np.take(field, np.arange(nodes + 1) % nodes, axis)
-        spline = CubicSpline(np.arange(nodes + 1), closed, axis=axis, bc_type="periodic")
+        spline = scipy.interpolate.CubicSpline(
+            np.arange(nodes + 1), closed, axis=axis, bc_type="periodic"
+        )
         field = spline(np.arange(count) * (nodes / count))
     return field
 

@@ -13,8 +13,8 @@ from ...tables.store import loaded_once
 from ..dictionary import ORDERS, OrderData
 from ..parameters import mono_wavelength, nested_of, orientation_of, resolved_path
 from ..properties import class_of
-from ..textures import Orientation
 from ..types import BSDF, Properties
+from ..varying import Orientation
 
 #: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
 LEAST_PERIODS = 2.0

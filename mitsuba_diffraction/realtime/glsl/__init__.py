@@ -30,7 +30,18 @@ viewer         a window on a scene with a panel (extra `view`)
 
 from __future__ import annotations
 
-from .export import export_shader
-from .renderer import Renderer
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .export import export_shader
+    from .renderer import Renderer
 
 __all__ = ["Renderer", "export_shader"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:  # whose modules --help does without
+        module = {"Renderer": "renderer", "export_shader": "export"}[name]
+        return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,15 +8,12 @@ from typing import Any
 
 from ...optics.boundary import MODELS, Model
 from ...optics.coat import (
-    Coat,
     coated_reflectance,
     cosine_within,
     face_transmittance,
     refracted,
-    relative_power,
 )
 from ...optics.colour import encoded_colour
-from ...optics.dialects import GLSL
 from ...optics.display import shown_colour
 from ...optics.fresnel import reflectance
 from ...optics.geometry import vcavity
@@ -31,7 +28,9 @@ from ...optics.orders import (
     wavelength_coordinate,
     wavenumber_step,
 )
-from ...optics.programs import Program
+from ...shading.dialects import GLSL
+from ...shading.pair_power import Coat, relative_power
+from ...shading.programs import Program
 from .rewriting import declared_names
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.

@@ -13,7 +13,7 @@ from ...optics.geometry import sigma_of
 from ...plugin.description import Consumer, Feature
 from ...settings import TableSettings
 from ...tables.build.build import build_with
-from ...tables.store import cached_table
+from ...tables.source import cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
-from ...plugin.description import Feature, Material, Surface
+from ...plugin.description import Feature, Surface
+from ...tables.colour.table import cached_colours
 from ...tables.directional import FINE, DirectionalTable
-from ...tables.store import cached_colours
 from .lobes import colour_power, pack_lobes
 from .maps import evaluated
 from .packing import (
@@ -62,7 +62,7 @@ class Modelled:
         packed = Packed((), uniforms, definitions)
         if described.model != "kirchhoff" or described.coat is not None:
             packed |= pack_boundary(MODELS[described.model], described.patch.roughness)
-        return packed | _reflectance(described.material)
+        return packed | _reflectance(described)
 
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
@@ -95,12 +95,12 @@ def luminous_mean(table: DirectionalTable) -> NDArray[np.float32]:
     return np.average(table.values, axis=0, weights=weights).astype(np.float32)
 
 
-def _reflectance(material: Material | None) -> Packed:
+def _reflectance(described: Surface) -> Packed:
     """Pack the Fresnel reflectance of a dielectric or conductor."""
-    if material is None or material.index is None:
+    if described.index is None:
         return Packed()
-    index = material.index(_INDEX_WAVELENGTHS)
-    if material.kind is Feature.DIELECTRIC:
+    index = described.index(_INDEX_WAVELENGTHS)
+    if described.kind is Feature.DIELECTRIC:
         return Packed(uniforms={"eta": float(index[0].real)}, definitions={"SURFACE_KIND": "1"})
     # total reflection has phases like a conductor
     return pack_conductor(_INDEX_WAVELENGTHS, index.real, index.imag)

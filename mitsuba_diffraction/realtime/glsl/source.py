@@ -26,6 +26,8 @@ _FILES = {
 }
 #: Methods of the fragment stage.
 METHODS = tuple(_FILES)
+#: Methods that a page in a browser supports.
+WEB_METHODS = METHODS[:2]
 #: Methods of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
 THESIS_METHODS = METHODS[2:]
 

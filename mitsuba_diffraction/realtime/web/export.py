@@ -32,12 +32,18 @@ from ..glsl.shader_materials import (
     pack_emission,
     pack_surface,
 )
-from ..glsl.source import display_definitions, fragment_parts, plain_source, vertex_source
+from ..glsl.source import (
+    WEB_METHODS,
+    display_definitions,
+    fragment_parts,
+    plain_source,
+    vertex_source,
+)
 from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
 from .material_choices import INDEXED, changeable, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
-from .tables import WEB_METHODS, fitting_tables, strongest_orders
+from .tables import fitting_tables, strongest_orders
 
 #: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000

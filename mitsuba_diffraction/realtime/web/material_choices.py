@@ -24,8 +24,7 @@ INDEXED = {"SURFACE_KIND": "2"}
 
 def changeable(surface: Diffracting | None) -> bool:
     """Return whether a surface can show another material: solved orders and mirrors cannot."""
-    material = surface.described.material if surface else None
-    return material is not None and material.index is not None
+    return surface is not None and surface.described.index is not None
 
 
 def packed_materials(coats: Sequence[float], sections: Sections) -> list[dict[str, Any]]:

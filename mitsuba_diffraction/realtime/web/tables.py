@@ -12,21 +12,17 @@ from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Surface
 from ...progress import Progress
-from ...tables.colour.table import colour_difference, power_colour_difference
+from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.orders import OrderTable, cells
 from ...tables.orders.grids import middles, rows, wavelength_of
 from ...tables.orders.table import Counts
 from ...tables.powers import power_series, powers_at
-from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import MOST_WITHIN, cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, converted, packed_array, packed_series
-
-#: Methods that a page supports.
-WEB_METHODS = ("fast", "exact")
 
 #: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
 DIGITS = 9

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
-from ...plugin.sources import TableRequest
 from ...settings import RECIPE_SETTINGS, TableSettings
+from ...tables.source import TableRequest
 from ...tables.table import DiffractionTable
 from .lookups import Lookups
 from .paths import TracedPaths, trace
@@ -160,7 +160,7 @@ def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
     Raises a DiffractionError if the heights come from no file.
     """
     recorded, settings = planned.recorded, planned.settings
-    recipe = recorded.request.recipe
+    recipe = recorded.request.source.as_recipe()
     surfaces = ", ".join(recorded.surfaces)
     if recipe is None or settings is None:
         raise DiffractionError(
@@ -206,8 +206,9 @@ def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
     used = set()
 
     def settings_of(request: TableRequest) -> TableSettings:
+        named = request.source.as_recipe()
         for file, recipe in recipes.items():
-            if request.recipe is not None and recipe.describes_heights_of(request.recipe):
+            if named is not None and recipe.describes_heights_of(named):
                 used.add(file)
                 return _limited(request, recipe)
         return request.settings

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair, Site
-from ...plugin.sources import TableRequest, tables_by
 from ...plugin.types import (
     BSDF,
     Colour,
@@ -32,7 +31,7 @@ from ...plugin.types import (
     Vector2f,
 )
 from ...settings import TableSettings
-from ...tables.store import table_key
+from ...tables.source import TableRequest, providing, table_key
 from ...tables.table import DiffractionTable
 from ..elements import own_id
 
@@ -90,7 +89,7 @@ class Session:
             self.close()
 
     def _make(self, props: Properties) -> BSDF:
-        with tables_by(self.table):
+        with providing(self.table):
             bsdf = _kind(self)(props)
         heights = described_table(bsdf).source.get("name") or "heights without a name"
         name = own_id(props.id()) or f"a diffraction BSDF without id (of {heights})"

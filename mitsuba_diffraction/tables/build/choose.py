@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
@@ -123,7 +123,12 @@ def taylor_truncation(heights: HeightField, kappa_max: float, terms: int) -> flo
     root mean square δ over the patch, and the power, by Cauchy and Schwarz, by at most 2δ.
     """
     log_x, log_moment = _log_moments(heights, kappa_max, terms + 1)
-    return _exp(math.log(2.0) + (terms + 1) * log_x - gammaln(terms + 2) + 0.5 * log_moment[-1])
+    return _exp(
+        math.log(2.0)
+        + (terms + 1) * log_x
+        - scipy.special.gammaln(terms + 2)
+        + 0.5 * log_moment[-1]
+    )
 
 
 def taylor_rounding(heights: HeightField, kappa_max: float, terms: int) -> float:
@@ -132,7 +137,7 @@ def taylor_rounding(heights: HeightField, kappa_max: float, terms: int) -> float
         return 0.0
     log_x, log_moment = _log_moments(heights, kappa_max, terms)
     n = np.arange(1, terms + 1)
-    log_squares = 2.0 * (n * log_x - gammaln(n + 1)) + log_moment
+    log_squares = 2.0 * (n * log_x - scipy.special.gammaln(n + 1)) + log_moment
     log_sum = float(np.logaddexp.reduce(log_squares))
     return _exp(math.log(2.0 * _SINGLE_ROUNDING) + 0.5 * log_sum)
 

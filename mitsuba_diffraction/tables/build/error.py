@@ -19,8 +19,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..expansion import Expansion
 from ..layout import Grid
@@ -53,8 +53,8 @@ class ErrorMeter:
         rng = np.random.default_rng(_SEED)
         axes = []
         self._lobe: list[NDArray[Any]] = []
-        self._wide: list[sparse.csr_array] = []
-        tapped: list[list[sparse.csr_array]] = []
+        self._wide: list[scipy.sparse.csr_array] = []
+        tapped: list[list[scipy.sparse.csr_array]] = []
         rows = rows_by_trim(grid.taps, grid.trims)
         for axis in (0, 1):
             outer = min(int(grid.radius[axis]), spectrum.last[axis])

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
 
 from ...heights.field import HeightField
@@ -123,8 +123,8 @@ class Spectrum:
     ) -> tuple[NDArray[np.complexfloating], complex]:
         """Return c·w·(f − a), and a = Σ w² f / Σ w².
 
-        With this mean |a|² and the powers of w·(f − a) add up to the mean of |f|² under w². In bin 0
-        a replaces what is left, which c makes up for.
+        With this mean |a|² and the powers of w·(f − a) add up to the mean of |f|² under w². In bin
+        0 a replaces what is left, which c makes up for.
         """
         assert self._tapers is not None
         y, x = self._tapers

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion
@@ -215,7 +214,7 @@ class OtherOrders:
         shape = (len(azimuth), len(frequency), self._expansion.intervals, self._expansion.terms)
         return np.ascontiguousarray(sums.reshape(shape).transpose(0, 2, 1, 3))
 
-    def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> sparse.csr_array:
+    def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> scipy.sparse.csr_array:
         """Weights from bins to points, a sparse (points, ny·nx) matrix."""
         grid, spacing = self._table.grid, self._table.spacing
         columns, weights_x = self._axis(qx / spacing[0], grid.last[0], grid.taps[0], 0)
@@ -223,7 +222,7 @@ class OtherOrders:
         index = rows[:, :, None] * np.int32(self._shape[1]) + columns[:, None, :]
         weights = weights_y[:, :, None] * weights_x[:, None, :]
         each = index.shape[1] * index.shape[2]
-        return sparse.csr_array(
+        return scipy.sparse.csr_array(
             (weights.ravel(), index.ravel(), np.arange(0, index.size + 1, each, dtype=np.int32)),
             shape=(len(qx), self._shape[0] * self._shape[1]),
         )

@@ -16,7 +16,8 @@ Chebyshev series in z, in half floats.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import weakref
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +26,9 @@ from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
 from ..expansion import Expansion
+from ..fields import mapping, number, require, whole
 from ..powers import series_kind
+from ..store import Record, cached, key_of
 from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 
@@ -43,6 +46,7 @@ STEP, SHARE = 0.02, 0.75
 _SERIES = 8e-3  # relative error of the series in z, at the worst z
 _COARSE = 1.6  # beyond this distance of azimuths, peaks are a quarter too low
 _RADII = 256  # of order 0
+_NUMBERS = ("scale", "radius_end", "sigma", "sigma_0")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,6 +110,34 @@ class ColourTable:
             sigma=table.sigma,
             sigma_0=table.sigma_0,
         )
+
+    def to_record(self) -> Record:
+        """Return the record of the table for the cache."""
+        document = {name: asdict(getattr(self, name)) for name in ("grid", "expansion")}
+        document |= {name: getattr(self, name) for name in _NUMBERS}
+        return Record(document, [self.coefficients, self.order_0])
+
+    @classmethod
+    def from_record(cls, record: Record) -> ColourTable:
+        """Return the table of such a record; raises a ValueError for what does not fit."""
+        document, (coefficients, order_0) = mapping(record.document, "colours"), record.arrays
+        grid = mapping(document["grid"], "grid")
+        counts = tuple(whole(n, "counts", 1, 1 << 24) for n in grid["counts"])
+        table = cls(
+            grid=PolarGrid(
+                number(grid["smallest"], "smallest", 0.0, 1e9),
+                number(grid["step"], "step", 0.0, 1e9),
+                counts,
+            ),
+            expansion=Expansion(**mapping(document["expansion"], "expansion")),
+            coefficients=coefficients,
+            order_0=order_0,
+            **{name: number(document[name], name, 1e-30, 1e30) for name in _NUMBERS},
+        )
+        shape = table.expansion.intervals, table.grid.bins, PACKET
+        require(coefficients.shape == shape, f"coefficients of shape {coefficients.shape}")
+        require(order_0.ndim == 3, f"order_0 of shape {order_0.shape}")
+        return table
 
     @property
     def nbytes(self) -> int:
@@ -268,3 +300,14 @@ def _loss(
 ) -> NDArray[np.float64]:
     difference = delta_e(exact * factor[:, None], other * factor[:, None])
     return difference[np.isfinite(difference)]
+
+
+_colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def cached_colours(table: DiffractionTable) -> ColourTable:
+    """Return the colours of a table, from memory, from disk, or summed and stored."""
+    key, memory = key_of(COLOUR_VERSION, table.digest()), _colours.setdefault(table, {})
+    return cached("colours", key, memory, lambda: ColourTable.build(table), ColourTable)

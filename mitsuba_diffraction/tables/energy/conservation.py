@@ -1,35 +1,36 @@
 """Energy conservation: scales of directions by which no more light is sent on than comes in.
 
-docs/energy.md has the equations: s of all light, and c of order 0 where a
-dielectric lets light through. Between the grid's directions and wavelengths an order may appear or
-vanish (a Rayleigh anomaly), so s and c are lowered where light between them exceeds 1. No scale
+docs/energy.md has the equations. All light from ωi to ωo is multiplied by s(ωi) s(ωo): such that
+R + T is 1 on both sides of a dielectric that lets light through, and of a reflector where its
+albedo exceeds 1. Between the grid's directions and wavelengths an order may appear or vanish (a
+Rayleigh anomaly), so s is lowered last where light between them exceeds 1: there the sum over all
+light is at most `EnergySettings.ceiling`, whatever surface and material it belongs to. No scale
 exists where a direction's partners all gain and it does not, as between the two groups of
-directions of a blazed grating: s ends up between.
+directions of a blazed grating: s is a compromise then.
 """
 
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
+from ..fields import check_names, mapping
 from ..order_mixture import MOST_STRONG, STRONG
-from ..store import DirectionalTables, cached_directions
+from ..store import Record, cached, key_of
 from ..table import DiffractionTable
 from .conserved import Dielectric, Reflector
 from .gain import thick
-from .scaling import lowered, parallel, scaled, weighted
+from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
 from .transport import Orders, ScatteredLight, Transport
 
-#: Minimum share of order 0 in the light; a weaker order 0 is not scaled.
-MIN_ORDER_0 = 1e-4
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
 GRAZING = np.radians([89.8, 89.9])
@@ -47,38 +48,64 @@ class Conservation:
 
     Attributes
     ----------
-    albedo : of a reflector as it is, a.
-    scale, scale_below : of all light, s, of directions above and below the surface.
-    order_0, order_0_below : of order 0 of a dielectric, c, likewise.
+    albedo : albedo a of a reflector, without a scale.
+    scale, scale_below : s of directions above the surface, and below one that lets light through.
     """
 
     albedo: DirectionalTable | None = None
     scale: DirectionalTable | None = None
     scale_below: DirectionalTable | None = None
-    order_0: DirectionalTable | None = None
-    order_0_below: DirectionalTable | None = None
+
+    @property
+    def scales(self) -> list[DirectionalTable] | None:
+        """Scales of the sides that the surface has light on, or None where all are 1."""
+        return [side for side in (self.scale, self.scale_below) if side is not None] or None
+
+    def to_record(self) -> Record:
+        """Return the record of the functions for the cache."""
+        found = {name: table for name, table in vars(self).items() if table is not None}
+        wavelengths = {name: table.wavelengths.tolist() for name, table in found.items()}
+        return Record(wavelengths, [table.values for table in found.values()])
+
+    @classmethod
+    def from_record(cls, record: Record) -> Conservation:
+        """Return the functions of such a record; raises a ValueError for what does not fit."""
+        document = mapping(record.document, "energy")
+        check_names(document, (field.name for field in fields(cls)), ())
+        pairs = zip(document.items(), record.arrays, strict=True)
+        return cls(**{name: DirectionalTable.parse(lam, values) for (name, lam), values in pairs})
+
+
+_known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 class Surface:
-    """A table's surface of a material at one height scale."""
+    """A table's surface of a material at one height scale.
+
+    Parameters
+    ----------
+    wavelength_range : of the light, nm; that of the table by default.
+    """
 
     def __init__(
         self,
         table: DiffractionTable,
         material: Reflector | Dielectric,
         height_scale: float = 1.0,
+        wavelength_range: tuple[float, float] | None = None,
     ) -> None:
         self.material, finer = material, 1
         self._settings = settings = energy_settings()
         self._both_sides = isinstance(material, Dielectric)
         if isinstance(material, Reflector):
             finer += thick(material.index(np.array(table.wavelength_range[:1])))
-        self.orders = Orders(table, height_scale, material.densest, finer)
+        light = wavelength_range or table.wavelength_range
+        self.orders = Orders(table, light, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
-        #: Light that is nowhere above needs no s.
-        self._limit = settings.tolerated if self._both_sides else settings.threshold
 
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
@@ -86,30 +113,23 @@ class Surface:
         albedo, largest = None, math.inf
         if not self._both_sides:
             albedo, largest = self._albedo(wavelength_range)
-        if largest <= self._limit:
+        if largest <= settings.threshold:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
         fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
         nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
-        solve = self._balanced if self._both_sides else self._limited
-        solved = parallel(lambda light: solve(light()), lights)
-        c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
-        if self._both_sides and np.all(c == 1.0):
-            return Conservation()
+        s = np.stack(parallel(lambda light: self._solved(light()), lights))
         few = 0 < self.orders.strong <= settings.few_orders
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
         # waves are closer than orders need where a film has fringes
         places = settings.between[few and fringes <= count and not self._both_sides]
         for place in places if len(nodes) > 1 else (0.0,):
-            self._lower_between(nodes, place, parts, c, s)
+            self._lower_between(nodes, place, parts, s)
 
-        def table(scale: Array, side: int) -> DirectionalTable | None:
-            unscaled = (self._both_sides or scale is c) and np.all(scale == 1.0)
-            missing = unscaled or side >= scale.shape[1]
-            return None if missing else DirectionalTable(nodes, scale[:, side])
-
-        return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
+        if np.all(s == 1.0):
+            return Conservation(albedo)
+        return Conservation(albedo, *(DirectionalTable(nodes, s[:, n]) for n in range(s.shape[1])))
 
     def albedos(
         self, conservation: Conservation, theta: Real, phi: Real, wavelength: float
@@ -122,13 +142,10 @@ class Surface:
         (make_light,) = self._lights(np.array([wavelength]), theta, phi)
         light = make_light()
 
-        def page(*sides: DirectionalTable | None) -> Array:
-            pages = [self._grid.ones if t is None else t.page(wavelength) for t in sides]
-            return np.stack(pages[: len(self._ones)])
-
-        c = page(conservation.order_0, conservation.order_0_below)
-        s = page(conservation.scale, conservation.scale_below)
-        return light.sent(self._ones, self._ones), light.sent(c, s)
+        scales, before = conservation.scales, light.sent(self._ones)
+        if scales is None:
+            return before, before
+        return before, light.sent(np.stack([side.page(wavelength) for side in scales]))
 
     def _lights(
         self, wavelengths: Real, theta: Real, phi: Real
@@ -156,66 +173,36 @@ class Surface:
         wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
         theta = np.concatenate([coarse.theta, GRAZING])
         lights = self._lights(wavelengths, theta, coarse.phi)
-        albedos = np.stack(parallel(lambda light: light().sent(self._ones, self._ones)[0], lights))
+        albedos = np.stack(parallel(lambda light: light().sent(self._ones)[0], lights))
         table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
         return table, float(albedos.max())
 
-    def _limited(self, light: ScatteredLight) -> tuple[Array, Array]:
-        """Find c, which is 1, and s of a reflector at the grid's directions."""
+    def _solved(self, light: ScatteredLight) -> Array:
+        """Find s at the grid's directions."""
         settings = self._settings
-        # part of a lobe is below the horizon there, and would ask for any s
-        largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, 1.0))
-        kernel = partial(light.balanced, self._ones)
-        aim = np.minimum(kernel(self._ones), np.float32(settings.target))
-        return self._ones, scaled(kernel, aim, largest[:, None], settings.sweeps)
+        albedo = light.sent(self._ones)
+        aim = self._ones if self._both_sides else np.minimum(albedo, np.float32(settings.target))
+        if np.abs(albedo - aim).max() < settings.close:
+            return self._ones
+        # Beyond 80° part of a lobe is below the horizon. A reflector keeps that deficit: light that
+        # is scaled up would reach across directions of very different s. A dielectric loses none
+        end = settings.largest if self._both_sides else 1.0
+        largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, end))
+        return scaled(light.sums, aim, largest[:, None], settings.sweeps)
 
-    def _balanced(self, light: ScatteredLight) -> tuple[Array, Array]:
-        """Find c at the grid's directions, such that R + T is 1, and s, which is 1."""
-        settings, most = self._settings, self._settings.largest**2
-        others, zeroth = light.others(self._ones), light.order_0(self._ones)
-        if np.abs(others + zeroth - 1.0).max() < settings.close:
-            return self._ones, self._ones
-        aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
-        c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
-        c = np.where(zeroth > MIN_ORDER_0, c, np.float32(1.0))
-        # a lobe within one row, as at the critical angle, is not adjusted
-        return np.asarray(median_filter(c, (1, 3, 1), mode="nearest")), self._ones
-
-    def _lower_between(self, nodes: Real, place: float, parts: int, c: Array, s: Array) -> None:
-        """Lower c and s for light at a place between all neighbouring wavelengths."""
+    def _lower_between(self, nodes: Real, place: float, parts: int, s: Array) -> None:
+        """Lower s for light at a place between all neighbouring wavelengths."""
         between = nodes[:-1] ** (1.0 - place) * nodes[1:] ** place if len(nodes) > 1 else nodes
         lights = self._lights(between, *self._grid.middles(parts))
+        ceiling, passes = np.float32(self._settings.ceiling), self._settings.passes
 
         def lower(n: int) -> None:
-            pair = slice(n, n + 2)
-            shares = np.array([1.0 - place, place])[: len(c[pair])]
-            c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair], shares)
+            light, pair = lights[n](), slice(n, n + 2)
+            shares = np.array([1.0 - place, place])[: len(s[pair])]
+            s[pair] = lowered(s[pair], shares, lambda s: light.sent(s) / ceiling, passes)
 
         for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
             parallel(lower, range(first, len(between), 2))
-
-    def _lowered(
-        self, light: ScatteredLight, c: Array, s: Array, shares: Real
-    ) -> tuple[Array, Array]:
-        """Lower c and then s of neighbouring wavelengths (n, …) for light between them."""
-        settings = self._settings
-        if self._both_sides:
-            room = np.maximum(np.float32(settings.ceiling) - light.others(self._ones), 1e-6)
-
-            def order_0_excess(c: Array) -> Array:
-                zeroth = light.at_directions(c) * light.order_0(c)
-                factor = np.minimum(zeroth / room, settings.largest**2)
-                return np.where(zeroth > MIN_ORDER_0, factor, np.float32(1.0))
-
-            c = lowered(c, shares, order_0_excess, settings.passes)
-        middle = weighted(c, shares)
-        if light.sent(middle, weighted(s, shares)).max() > self._limit:
-
-            def excess(s: Array) -> Array:
-                return light.sent(middle, s) / np.float32(settings.ceiling)
-
-            s = lowered(s, shares, excess, settings.passes)
-        return c, s
 
 
 def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) -> Real:
@@ -265,15 +252,15 @@ class Energy:
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""
 
-        def make() -> DirectionalTables:
-            surface = Surface(self.table, self.material, height_scale)
-            conservation = surface.conservation(self.wavelength_range)
-            return {name: table for name, table in vars(conservation).items() if table is not None}
+        def make() -> Conservation:
+            light = self.wavelength_range
+            return Surface(self.table, self.material, height_scale, light).conservation(light)
 
         versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
-        return Conservation(**cached_directions("energy", self.table, made_of, make))
+        key, memory = key_of(self.table.digest(), made_of), _known.setdefault(self.table, {})
+        return cached("energy", key, memory, make, Conservation)
 
     @property
     def _lattice(self) -> tuple[int, float]:

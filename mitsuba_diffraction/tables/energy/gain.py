@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import map_coordinates
+import scipy
 
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Heights, model_of
@@ -56,7 +56,7 @@ class Gain:
             for c in (cos_i, cos_o)
         )
         at = np.broadcast_arrays(*rows, np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi))
-        ratio = map_coordinates(self._table, np.stack(at), order=1, mode="nearest")
+        ratio = scipy.ndimage.map_coordinates(self._table, np.stack(at), order=1, mode="nearest")
         reached = self.path.tangential(cos_i, cos_o, cos_turn) < FARTHEST
         return np.asarray(common * ratio * reached)
 
@@ -68,10 +68,10 @@ class Gain:
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 
-    def order_0(self, cos_i: Real, cos_o: Real, power: Real, turn: Real) -> Real:
+    def order_0(self, cos_i: Real, cos_o: Real, power: Real, turn: Real | float) -> Real:
         """Return the share of order 0 that goes to directions across its lobe.
 
-        power : of order 0 at these directions; turn : azimuths between them, (..., n), rad.
+        power : of order 0 at these directions; turn : azimuths between them, rad.
         """
         if self.path.let_through:
             return self.path.flat_transmittance(cos_i, cos_o) * power

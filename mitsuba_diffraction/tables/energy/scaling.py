@@ -49,6 +49,8 @@ def lowered(pages: Array, shares: Real, excess: Callable[[Array], Array], passes
     """
     for turn in range(passes):
         factors = _largest_around(excess(weighted(pages, shares)), pages.shape[-1])
+        if factors.max() == 1.0:
+            break
         last = turn == passes - 1
         pages = (pages / (factors if last else np.sqrt(factors))).astype(np.float32)
     return pages

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 26
+VERSION = 27
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,11 @@ class EnergySettings:
     fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of a scale to the
         next, and most wavelengths. Under thin films waves in between come and go.
     sweeps : of Sinkhorn and Knopp's iteration.
-    threshold : an albedo that is nowhere above needs no scale.
+    threshold : a reflector's albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; the margin to 1 is for directions between nodes.
     ceiling : most that is left between nodes.
-    largest : of a scale; of all light at most 1 from 80° on, since part of a lobe is below the
-        horizon there, and the rest reaches across directions of very different scales.
-    close : R + T that differs from 1 by less needs no scale.
-    tolerated : R + T between nodes above this is attenuated.
+    largest : of a scale; of a reflector at most 1 from 80° on.
+    close : light that differs from its aim by less needs no scale.
     passes : how often scales are lowered where an albedo between nodes is above the ceiling.
     """
 
@@ -58,7 +56,6 @@ class EnergySettings:
     ceiling: float = 1.001
     largest: float = 1.5
     close: float = 5e-4
-    tolerated: float = 1.004
     passes: int = 4
 
 

@@ -7,7 +7,8 @@ the light along ωo weighted by s(ωo), into a sum over the orders' lobes,
 
 over the frequencies that are visible, with κ = k w times the height scale and G as in `gain`:
 
-- order 0, the mirrored or refracted direction, by quadrature over its lobe;
+- order 0, the mirrored or refracted direction, by quadrature over its lobe, or over all directions
+  where the lobe is wide;
 - the few *strong* orders, one by one, with means over the lobe tabulated against its place, since
   an order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
 - the many *weak* ones as a smooth density, by quadrature over directions.
@@ -20,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import i0e
+import scipy
 
 from ...optics.geometry import wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
@@ -37,14 +38,16 @@ SMOOTHING = 0.6
 #: Weak orders of less power in all are left out.
 LEAST_WEAK = 2e-3
 
-_ACROSS = [part[8:] for part in np.polynomial.hermite.hermgauss(16)]  # half a lobe, in azimuth
-_WIDE = 0.04  # width of a lobe, in direction cosines, that is looked at across
+#: Width of order 0's lobe, in direction cosines, above which it is summed over all directions, as G
+#: differs from one azimuth to another. The quadrature resolves lobes half as wide.
+_WIDE = 0.08
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
 class Orders:
     """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
+    wavelength_range : of the light, nm.
     densest : largest index of the media that light travels in; order 0 of a dielectric is summed
         apart from the others however wide its lobe is.
     finer : factor on the quadrature's resolution.
@@ -53,6 +56,7 @@ class Orders:
     def __init__(
         self,
         table: DiffractionTable,
+        wavelength_range: tuple[float, float],
         height_scale: float = 1.0,
         densest: float = 1.0,
         finer: int = 1,
@@ -60,12 +64,13 @@ class Orders:
         self.sigma, self.sigma_0 = table.sigma, table.sigma_0
         self.roughness, self.height_scale = table.roughness, height_scale
         self.densest, settings = densest, energy_settings()
-        longest = float(wavenumber(table.wavelength_range[0]))
+        longest, shortest = (float(wavenumber(each)) for each in wavelength_range)
         rings, steps = finer * settings.rings, finer * settings.steps
         smoothing = SMOOTHING * longest * 0.5 * math.pi / rings
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
-        self.mixture = order_mixture(table, scale, smoothing, apart=densest > 1.0)
+        reach = min(2.0 * longest, table.q_limit)
+        self.mixture = order_mixture(table, scale, reach, smoothing, apart=densest > 1.0)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.strong = len(self.mixture.frequency)
@@ -78,8 +83,7 @@ class Orders:
         powers = order_0_power(table, self._kappas * scale)
         self._powers = powers * np.interp(self._kappas, nodes, left)
         #: Least w of light let through
-        self.least_width = densest * self.mixture.kappa_step
-        self.least_width /= float(wavenumber(table.wavelength_range[1]))
+        self.least_width = densest * self.mixture.kappa_step / shortest
 
     def order_0(self, kappa: Real) -> Real:
         """Return the power of order 0 at κ over the height scale and `densest`."""
@@ -114,25 +118,19 @@ class Transport:
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
-        self._shares = self._order_0_shares(theta, grid)
-        self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
-        self._others: list[Callable[[Array], Array]] = []
+        self._parts: list[Callable[[Array], Array]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
             half, nodes = grid.half, orders.nodes
             shares = self._weak_shares(half.theta, half.phi)
             to_nodes = grid.interpolation(nodes.theta, half.phi[:, None] + nodes.azimuth)
             here = half.interpolation(theta[:, None], phi)
-            self._others.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
+            self._parts.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
         if orders.strong:
-            self._others.append(self._strong(theta, phi, grid))
+            self._parts.append(self._strong(theta, phi, grid))
 
-    def order_0(self, s: Array) -> Array:
-        """Return the light of order 0 for weights on the grid, (t, p)."""
-        return np.asarray(self._shares @ self._mirrored(s), np.float32)
-
-    def others(self, s: Array) -> Array | float:
-        """Return the light of all other orders for weights on the grid, (t, p); 0 without any."""
-        return sum((part(s) for part in self._others), 0.0)
+    def __call__(self, s: Array) -> Array:
+        """Return the light of all orders for weights on the grid, (t, p)."""
+        return np.asarray(sum(part(s) for part in self._parts), np.float32)
 
     def _start(self, theta: Real) -> tuple[Real, Real]:
         """Return cosines of incidence, and sines of the mirrored or refracted directions."""
@@ -142,6 +140,28 @@ class Transport:
     def _kappa(self, cos_i: Real, cos_o: Real) -> Real:
         """Return κ over the height scale and `Orders.densest`."""
         return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
+
+    def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
+        """Return the map from weights on a grid to the light of order 0."""
+        if self._width_0 > _WIDE:
+            nodes = self._orders.nodes
+            every = self._order_0_everywhere(theta)
+            to_nodes = grid.interpolation(nodes.theta, phi[:, None] + nodes.azimuth)
+            return lambda s: np.asarray(every @ to_nodes(s).T, np.float32)
+        shares = self._order_0_shares(theta, grid)
+        mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
+        return lambda s: np.asarray(shares @ mirrored(s), np.float32)
+
+    def _order_0_everywhere(self, theta: Real) -> Real:
+        """Return shares (t, n) of order 0 that go to the quadrature's directions."""
+        cos_i, sine = self._start(theta[:, None])
+        nodes, path = self._orders.nodes, self._path
+        squared = ((nodes.x + sine) ** 2 + nodes.y**2) / self._width_0**2
+        lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
+        power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
+        cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
+        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth)
+        return np.asarray(lobe * gain, np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
         """Return shares (t, rows) of order 0 that go to the polar angles of a grid.
@@ -160,16 +180,9 @@ class Transport:
         step = (last - first) * np.where(cut, 2.0 * place, 1.0) / LOBE_NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
-        parts *= i0e(2.0 * sin_o * sine / width**2)
-
+        parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
-        # azimuths across the lobe, at which G of a wide one differs towards the horizon
-        across, weights = _ACROSS if width > _WIDE else (np.zeros(1), np.ones(1))
-        turn = across * width / np.sqrt(np.maximum(sin_o * sine, 1e-9))[..., None]
-        turn = np.pi - np.minimum(turn, np.pi)
-        cos_in, cos_out, share = (x[..., None] + 0.0 * turn for x in (cos_i, cos_o, power))
-        gain = self._gain.order_0(cos_in, cos_out, share, turn)
-        parts *= gain @ (weights / weights.sum())
+        parts *= self._gain.order_0(np.broadcast_to(cos_i, cos_o.shape), cos_o, power, np.pi)
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 
@@ -233,28 +246,17 @@ class ScatteredLight:
     paths: list[Transport]
     here: LinearMap
 
-    def order_0(self, weights: Array) -> Array:
-        """Return the sums of order 0."""
-        return self._sum(lambda path: path.order_0(weights[path.left]))
+    def sums(self, weights: Array) -> Array:
+        """Return the light of all orders for weights."""
+        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
+        for path in self.paths:
+            sums[path.came] += path(weights[path.left])
+        return sums
 
-    def others(self, weights: Array) -> Array:
-        """Return the sums of all other orders."""
-        return self._sum(lambda path: path.others(weights[path.left]))
-
-    def balanced(self, c: Array, weights: Array) -> Array:
-        """Return the sums of all orders, with order 0 scaled by c."""
-        return self.others(weights) + self.at_directions(c) * self.order_0(c * weights)
-
-    def sent(self, c: Array, s: Array) -> Array:
-        """Return the sums of all orders, with order 0 scaled by c and all light by s."""
-        return self.at_directions(s) * self.balanced(c, s)
+    def sent(self, s: Array) -> Array:
+        """Return the light of all orders, scaled by s at both ends."""
+        return self.at_directions(s) * self.sums(s)
 
     def at_directions(self, scale: Array) -> Array:
         """Interpolate a scale to the directions, (sides, t, p)."""
         return np.stack([self.here(side) for side in scale])
-
-    def _sum(self, sent: Callable[[Transport], Array | float]) -> Array:
-        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
-        for path in self.paths:
-            sums[path.came] += sent(path)
-        return sums

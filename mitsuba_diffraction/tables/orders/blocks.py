@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from ...optics.coat import face_transmittance
 from ...optics.orders import port_power
@@ -81,7 +81,9 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     for j, q in np.ndindex(divided.shape[3:]):
         here = known[..., j, q]
         if here.any() and not here.all():
-            nearest = distance_transform_edt(~here, return_distances=False, return_indices=True)
+            nearest = scipy.ndimage.distance_transform_edt(
+                ~here, return_distances=False, return_indices=True
+            )
             divided[..., j, q] = divided[(*nearest, j, q)]
     return np.asarray(divided)
 

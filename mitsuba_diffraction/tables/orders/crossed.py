@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import map_coordinates
 
 from ...errors import DiffractionError
 from ...optics.orders import crossed_square, wavelength_coordinate
@@ -142,7 +142,7 @@ class CrossedTable:
         lit &= (np.abs(n) <= m_y) & propagates(x, y, lam, m, n, self.periods)
         orders = np.where(lit, n, 0.0) + m_y, np.where(lit, m, 0.0) + m_x
         at = np.stack([*places, *orders]).reshape(5, -1)
-        found = map_coordinates(self.values, at, np.float64, 1, mode="nearest")
+        found = scipy.ndimage.map_coordinates(self.values, at, np.float64, 1, mode="nearest")
         return np.where(lit, found.reshape(x.shape), 0.0)
 
     def records(self) -> Records:

@@ -24,12 +24,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import netcdf_file
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ..fields import mapping
 from .crossed import CrossedTable
 from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
 
@@ -42,7 +43,7 @@ _STEP = 1.0 / 30_000.0
 _MUELLER = " mueller"
 #: Attribute of tables of crossed gratings.
 _CROSSED = "crossed"
-_AGAIN = "solve it again with solve_orders"
+_AGAIN = "solve it again (the command 'solve', or solve_orders)"
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -98,7 +99,7 @@ def _written(
             f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
         )
     content = io.BytesIO()
-    with netcdf_file(content, "w") as file:
+    with scipy.io.netcdf_file(content, "w") as file:
         file.title, file.header = title, json.dumps(dict(table.header), sort_keys=True)
         setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
         file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
@@ -155,7 +156,7 @@ def load_any_orders(path: str | os.PathLike[str]) -> OrderTable | CrossedTable:
     if kind_of(path) is not FileKind.ORDERS:
         raise DiffractionError(f"'{path}' is not a table of orders; {_advice(Path(path))}")
     try:
-        with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
+        with scipy.io.netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
             version = int(getattr(file, ORDERS_ATTRIBUTE))
             if version != FORMAT_VERSION:
                 raise DiffractionError(
@@ -179,14 +180,16 @@ def _advice(path: Path) -> str:
         )
     if kind_of(path) is FileKind.TABLE:
         return "tables of heights (EXR) belong to the BSDF 'diffraction'"
-    return "make one with solve_orders, or with read_orders from efficiencies of other programs"
+    return (
+        "make one with the command 'solve' (solve_orders), or of efficiencies of other programs "
+        "with 'solve --import' (read_orders)"
+    )
 
 
 def _table(file: Any) -> OrderTable:
     """Return the table of an open file."""
     outline = _outline(file)
-    if not isinstance(header := json.loads(outline["header"]), dict):
-        raise ValueError("its header is no JSON object")
+    header = mapping(json.loads(outline["header"]), "header")
     packed: dict[tuple[int, str], NDArray[np.int16]] = {}
     unpacked: dict[tuple[int, str], NDArray[np.float32]] = {}
     for name, variable in file.variables.items():
@@ -251,7 +254,8 @@ def _crossed(file: Any) -> CrossedTable:
         raise ValueError("its checksum is of another one")
     values = (variable[:] * variable.scale_factor).astype(np.float32)
     (d_x, d_y), (low, high) = map(float, file.periods), map(float, file.wavelengths)
-    return CrossedTable((d_x, d_y), (low, high), values, json.loads(file.header))
+    header = mapping(json.loads(file.header), "header")
+    return CrossedTable((d_x, d_y), (low, high), values, header)
 
 
 def _crossed_checksum(file: Any, numbers: NDArray[Any]) -> str:

@@ -8,7 +8,6 @@ import pytest
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.preprocess import crop
-from mitsuba_diffraction.heights.recipes import Recipe
 
 HEIGHTS = np.arange(48.0).reshape(6, 8) * 0.001
 FIELD = HeightField(HEIGHTS, (0.5, 0.25), name="scan", history=["old"])
@@ -47,7 +46,7 @@ def test_files_recipes_and_memory_are_cropped_alike(tmp_path, given):
     assert FIELD.treated(crop=given).digest() == loaded.digest()
     recipe = tmp_path / "a.toml"
     recipe.write_text('source = "a.npy"\npixel_size = [0.5, 0.25]\ncrop = 1.0\n')
-    assert Recipe.load(recipe).field().digest() == loaded.digest()
+    assert HeightField.load(recipe).digest() == loaded.digest()
 
 
 def test_gaps_outside_the_middle_do_not_matter_and_tilt_is_that_of_the_middle(tmp_path):

@@ -11,8 +11,8 @@ from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightFiel
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
-from mitsuba_diffraction.tables.colour.table import ColourTable
-from mitsuba_diffraction.tables.store import VARIABLE, cached_colours, colour_record, colours_of
+from mitsuba_diffraction.tables.colour.table import ColourTable, cached_colours
+from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.directions import Array, rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -119,7 +119,7 @@ def test_a_table_too_large_is_coarser_and_says_so(monkeypatch: pytest.MonkeyPatc
 def test_a_record_gives_back_the_table() -> None:
     table = DiffractionTable.build(rough_patch((20, 24), (0.3, 0.3), 0.3), coherence_width=5.0)
     colours = ColourTable.build(table)
-    again = colours_of(colour_record(colours))
+    again = ColourTable.from_record(colours.to_record())
     assert again.grid == colours.grid
     assert again.expansion == colours.expansion
     assert np.array_equal(again.coefficients, colours.coefficients)

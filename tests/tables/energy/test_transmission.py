@@ -13,6 +13,8 @@ from tests.support.directions import rough_patch
 
 #: Between nodes of angles and azimuths; at the critical angle from within lobes are half reflected.
 THETA, PHI = np.radians([1.0, 31.0, 59.0, 74.0]), np.radians([11.0, 184.0])
+#: Angle from the critical one, rad, within which s has a kink: light beside it is lowered.
+KINK = np.radians(3.0)
 KINDS = {"interface": False, "sheet": True}
 
 
@@ -52,12 +54,20 @@ def sums(field, index, width, thin, model="small_slope"):
     return (np.stack(part) for part in zip(*pairs, strict=True))
 
 
+def beside_kinks(conserved, index, thin):
+    """R + T, (…, angles, azimuths), without directions near the critical angle from within."""
+    critical = np.inf if thin else np.arcsin(1.0 / index)
+    below = np.abs(THETA - critical) > KINK
+    return np.concatenate([conserved[:, 0], conserved[:, 1, below]], axis=1)
+
+
 @pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
 @pytest.mark.parametrize("index", [1.01, 1.2, 2.4])
 def test_a_flat_surface_sends_on_all_light_whatever_its_index(index, thin):
     raw, kept = sums(flat(), index, 65.0, thin)
     assert np.abs(raw - 1.0).max() < 5e-3  # a lobe of half a degree is spread at 74°
-    assert np.abs(kept - 1.0).max() < 1e-3
+    assert np.abs(beside_kinks(kept, index, thin) - 1.0).max() < 1e-3
+    assert np.abs(kept - 1.0).max() < 5e-3
 
 
 @pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
@@ -75,8 +85,9 @@ def test_a_narrow_window_makes_no_light(index, thin):
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 def test_a_shallow_surface_sends_on_all_light(model, thin):
     _, kept = sums(shallow(), 1.2, 20.0, thin, model)
-    assert np.abs(kept - 1.0).max() < 1e-2  # lobes of 6° at 74°
+    assert np.abs(beside_kinks(kept, 1.2, thin) - 1.0).max() < 1e-2  # lobes of 6° at 74°
     assert np.abs(kept[:, :, :2] - 1.0).max() < 1e-3
+    assert 0.98 < kept.min() <= kept.max() < 1.002
 
 
 def test_a_gentle_sheet_sends_on_nearly_all_light():
@@ -86,8 +97,8 @@ def test_a_gentle_sheet_sends_on_nearly_all_light():
     assert kept.max() < 1.002
 
 
-def test_steep_orders_that_exceed_1_on_their_own_are_attenuated():
-    """Order 0 of steps 0.3 µm high has too little light to make up for the others."""
+def test_steps_send_on_no_more_than_they_get():
+    """Without a scale walls 0.3 µm high send on up to 1.05."""
     use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=40))
     table = DiffractionTable.build(steps(), coherence_width=20.0, height_scale_max=2.4)
     surface = Surface(table, Dielectric(2.4, "small_slope", False))

@@ -164,5 +164,5 @@ def test_a_header_that_is_no_object_is_refused(tmp_path, monkeypatch):
     file = tmp_path / "list.nc"
     monkeypatch.setattr("json.dumps", lambda *_, **__: "[1, 2]")  # with a checksum that is right
     GRATING.save(file)
-    with pytest.raises(DiffractionError, match="header is no JSON object"):
+    with pytest.raises(DiffractionError, match="header does not fit"):
         OrderTable.load(file)

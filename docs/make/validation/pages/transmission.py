@@ -52,7 +52,7 @@ within {GRAZING:g}° of the normal, as Kirchhoff / `small_slope`:
 {table(header, rows)}
 
 At slopes up to 0.1 `small_slope` is within {percent(normal)} in light along the normal, and within
-{percent(worst)} up to 75°. `energy_conserving` does not change colours."""
+{percent(worst)} up to 75°. `energy_conserving` scales all orders of a direction alike."""
 
 
 def _surfaces(measured: Measurements) -> str:
@@ -72,8 +72,7 @@ model → `energy_conserving`, the default.
 
 {table(["surface", "light", *map(angle, PASSED)], rows)}
 
-Only order 0 is scaled: missing light stays missing where it is weak, as on blazed gratings. Where
-the other orders exceed 1, all light is attenuated."""
+All light is scaled: missing light is shared by all orders."""
 
 
 def _recipes(measured: Measurements) -> str:

@@ -10,8 +10,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.arithmetic import formula, is_complex, of, squared
-from mitsuba_diffraction.optics.dialects import GLSL, OSL
-from mitsuba_diffraction.optics.programs import Program
+from mitsuba_diffraction.shading.dialects import GLSL, OSL
+from mitsuba_diffraction.shading.programs import Program
 
 
 class Ends(NamedTuple):

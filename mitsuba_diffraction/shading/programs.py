@@ -1,4 +1,4 @@
-"""Programs: formulas of this folder, written as functions of a shading language.
+"""Programs: formulas of `optics`, written as functions of a shading language.
 
 `Program.add` runs a formula on `symbols`. The formula becomes a function of the program, and so
 does each function with the decorator `arithmetic.formula` that it calls. Local variables keep their
@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from ..errors import DiffractionError
-from . import arithmetic
+from ..optics import arithmetic
 from .dialects import Dialect
 from .printer import Function, Printer, record_of
 from .symbols import (
@@ -59,7 +59,7 @@ class Program:
 
         Parameters
         ----------
-        formula : function of this folder.
+        formula : function of `optics`, or of a model in its arithmetic.
         arguments : of each parameter its kind ("float", "complex", "vector": three components), a
             tuple of kinds, or else a value that is constant in the program.
         name : of the function; the formula's by default.

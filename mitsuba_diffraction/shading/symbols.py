@@ -15,7 +15,7 @@ from types import FrameType
 from typing import Any, NoReturn, TypeAlias
 
 from ..errors import DiffractionError
-from . import arithmetic
+from ..optics import arithmetic
 
 #: Kinds of symbols: a real number, a complex number, a condition, and three real numbers.
 KINDS = ("float", "complex", "bool", "vector")

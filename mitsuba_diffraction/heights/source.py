@@ -1,0 +1,181 @@
+"""Where heights come from: a file, a recipe, several files, or an array; the kind is asked once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+from ..errors import DiffractionError
+from ..files import FileKind, kind_of, readable_file
+from . import gratings
+from .field import HeightField
+from .read import LoadOptions, read_heights, treat
+from .recipes import SOURCE_ONLY, Recipe
+
+#: Name of a file.
+Name = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Source of heights; make one with `of`.
+
+    Attributes
+    ----------
+    kind : kind of the file; None of several files, and of heights in memory.
+    files : the file, or several files of heights; () of heights in memory.
+    options : how heights are read; they precede the options of a recipe.
+    recipe : content of the file if it is a recipe, else None.
+    patches : heights in memory, or () if they have to be read.
+    """
+
+    kind: FileKind | None
+    files: tuple[Path, ...]
+    options: LoadOptions
+    recipe: Recipe | None = None
+    patches: tuple[HeightField, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        value: Name | HeightField | Sequence[Name] | Sequence[HeightField],
+        options: LoadOptions | None = None,
+    ) -> Self:
+        """Return the source that a value names; heights are not read yet.
+
+        Parameters
+        ----------
+        value : file of heights, recipe or table; several files of heights; or one or several
+            height fields.
+        options : how heights are read, and height fields treated.
+
+        Raises a DiffractionError if a file cannot be read, or a recipe is not valid.
+        """
+        how = options or LoadOptions()
+        several = [value] if isinstance(value, str | os.PathLike | HeightField) else list(value)
+        files = tuple(readable_file(v) for v in several if not isinstance(v, HeightField))
+        if not files:
+            fields = tuple(treat(v, how) for v in several if isinstance(v, HeightField))
+            return cls(None, (), how, patches=fields)
+        kinds = [kind_of(file) for file in files]
+        if len(files) > 1 and FileKind.RECIPE in kinds:
+            shown = files[kinds.index(FileKind.RECIPE)]
+            raise DiffractionError(f"'{shown}' is a recipe; name it alone, or files of heights")
+        recipe = Recipe.load(files[0]) if kinds[0] is FileKind.RECIPE else None
+        return cls(kinds[0] if len(files) == 1 else None, files, how, recipe)
+
+    @property
+    def path(self) -> Path | None:
+        """The file; None of heights in memory."""
+        return self.files[0] if self.files else None
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Fields of `TableSettings` that a recipe sets, checked."""
+        return {} if self.recipe is None else self.recipe.table
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all that the heights are made of.
+
+        Of files their bytes and the options; of a recipe its text, sources and the generators; of
+        height fields their numbers.
+        """
+        if not self.files:
+            first, *others = [field.digest() for field in self.patches]
+            return _digest_of(first, *others) if others else first
+        recipe = self.recipe
+        if recipe is None:
+            return _digest_of(self.options.specified(), *map(_sha256, self.files))
+        files = [readable_file(source) for source in recipe.sources]
+        if recipe.generator is not None:
+            files += sorted(Path(gratings.__file__).parent.glob("*.py"))
+        options = [recipe.options.specified(), self.options.specified()]
+        arguments = [dict(patch) for patch in recipe.arguments]
+        return _digest_of(options, recipe.generator, arguments, *map(_sha256, files))
+
+    def fields(self) -> list[HeightField]:
+        """Read or generate the heights of all patches.
+
+        Raises a DiffractionError if a file cannot be read as heights, holds none, or a recipe's
+        generator refuses an argument.
+        """
+        if self.patches:
+            return list(self.patches)
+        self._refuse_tables()
+        if self.recipe is None:
+            return [read_heights(file, self.options, self.kind) for file in self.files]
+        recipe, merged = self.recipe, self.recipe.options.updated(self.options)
+        if recipe.generator is None:
+            return [read_heights(file, merged) for file in recipe.sources]
+        for key in SOURCE_ONLY:
+            if getattr(self.options, key) is not None:
+                raise DiffractionError(
+                    f"{str(recipe.path)!r} makes its heights with {recipe.generator!r}; {key} "
+                    "contradicts it: change the recipe's [arguments] instead"
+                )
+        generator: Callable[..., HeightField] = getattr(gratings, recipe.generator)
+        return [treat(_generated(generator, recipe, values), merged) for values in recipe.arguments]
+
+    def field(self) -> HeightField:
+        """Read or generate the heights of the only patch.
+
+        Raises a DiffractionError as `fields` does, and if there are several patches.
+        """
+        recipe = self.recipe
+        if recipe is not None and (count := len(recipe.sources) or len(recipe.arguments)) > 1:
+            raise DiffractionError(
+                f"{str(recipe.path)!r} describes {count} patches, where one is needed; precompute "
+                "its table and use that"
+            )
+        return self.fields()[0]
+
+    def read(self) -> Self:
+        """Return this source with its heights in memory; the digest stays."""
+        return replace(self, patches=tuple(self.fields()))
+
+    def as_recipe(self) -> Recipe | None:
+        """Return the recipe of these heights; None of heights in memory, which no file names."""
+        if self.recipe is not None:
+            return replace(self.recipe, options=self.recipe.options.updated(self.options))
+        if self.path is None:
+            return None
+        output = Path(f"{self.path.stem}.exr")
+        return Recipe(self.path, self.files, None, (), self.options, {}, output)
+
+    def _refuse_tables(self) -> None:
+        """Refuse files that hold no heights."""
+        if self.kind is FileKind.TABLE:
+            raise DiffractionError(
+                f"'{self.path}' is a table; this needs the heights it was made of, or their recipe"
+            )
+        if self.kind is FileKind.ORDERS:
+            raise DiffractionError(
+                f"'{self.path}' has solved orders, which leave where the grating equation says, "
+                "and no heights; 'mitsuba-diffraction orders', 'spectrum' and 'brdf-map' show it"
+            )
+
+
+def _generated(
+    generator: Callable[..., HeightField], recipe: Recipe, arguments: Mapping[str, Any]
+) -> HeightField:
+    """Call a recipe's generator; its errors name the recipe."""
+    try:
+        return generator(**arguments)
+    except DiffractionError as error:
+        raise DiffractionError(f"{str(recipe.path)!r}: [arguments]: {error}") from error
+
+
+def _digest_of(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _sha256(path: Path) -> str:
+    with open(readable_file(path), "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

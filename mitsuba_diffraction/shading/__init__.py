@@ -1,0 +1,10 @@
+"""Formulas of `optics` as programs in shading languages.
+
+Contents
+--------
+symbols     numbers that record a formula's expressions
+programs    formulas written as functions of a shading language
+printer     text of such a function
+dialects    words of GLSL and OSL
+pair_power  power of a boundary model for a pair of directions, under a coat or bare
+"""
