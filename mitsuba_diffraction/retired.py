@@ -1,4 +1,4 @@
-"""Parameters, and values of them, of earlier versions: they are ignored, with one line."""
+"""Retired parameters and retired values: they are ignored, with one line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REPLACED = {
     "diffuse_weight": "a nested BSDF gets the light that is not reflected, T(ωi) T(ωo)",
     "accept": "a table that misses its tolerance is written, with its measured error",
 }
-#: What holds in place of some values of a parameter.
+#: Replacements of a parameter's values.
 REPLACED_VALUES = {
     ("periodic", value): "a scan is seen through windows, which need no treatment of its edges; "
     "periodic=exact states that it is whole periods of a surface"

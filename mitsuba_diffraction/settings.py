@@ -187,7 +187,7 @@ class TableSettings:
     )
     windows: str | float = _setting(
         "auto", _windows, "µm, width of the windows of a scan, whose powers are averaged; auto: "
-        "the scan's smaller side up to 32 µm, or half of it", "auto, or a positive number of µm",
+        "the scan's smaller side up to 32 µm, or half the side", "auto, or a positive number of µm",
         metavar="auto|W", type=str,
     )  # fmt: skip
     window_width: float | None = _setting(

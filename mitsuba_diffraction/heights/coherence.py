@@ -60,7 +60,7 @@ def usual_window(side: float) -> float:
     """Return the width of the windows of a scan, µm, from its smaller side.
 
     A scan up to 32 µm is one window. A wider one is cut into windows of half its side, which costs
-    as many orders as a tile of it has and averages over nine windows or more.
+    as many orders as one tile has, and averages over several windows.
     """
     return min(side, max(ONE_WINDOW, 0.5 * side))
 

@@ -35,7 +35,7 @@ QUARTER_WAVE = 8.0
 #: A plane that rises by less than this part of the RMS height occurs by chance in rough patches.
 CHANCE = 0.5
 #: A plane occurs by chance in few pixels, too: in white noise of N it rises by √(12/N) of the RMS
-#: height, one standard deviation. So many of them are a tilt.
+#: height, one standard deviation. A tilt rises by so many.
 SURE = 4.0
 #: A plane that rises by at most the largest mean step between neighbouring lines, over this, is
 #: that of a facet or of a groove: one period of a blazed or lamellar grating rises by 1.5 steps.

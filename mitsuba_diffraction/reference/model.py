@@ -56,7 +56,7 @@ class Light(NamedTuple):
 class Sigmas(NamedTuple):
     """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
 
-    `windows` are those of a scan, which does not tile the plane.
+    `windows`: a scan's, which does not tile the plane.
     """
 
     orders: float

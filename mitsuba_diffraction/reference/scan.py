@@ -2,11 +2,11 @@
 
 A scan is seen through windows of width W, half overlapping, over which powers are averaged (Welch,
 IEEE Transactions on Audio and Electroacoustics 15, 70, 1967). With t(r) = exp(−r²/2σ_t²) about the
-middle of a window and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are those of
+middle of a window and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are DFTs of
 
     f = c t (s − a_0)   in the window, 0 around it up to 2W,   Σ_j |a_j|² = 1 over all orders,
 
-which sets c: nearly √(1/mean t²), by Parseval, but for what f has at j = 0 in place of a_0. Their
+which sets c: nearly √(1/mean t²), by Parseval, but for the bin j = 0, where a_0 replaces f's. Their
 lobe exp(−σ_l²|q − q_j|²) has 1/σ_l² + 1/σ_t² = 1/σ²: the transform of t² under σ_l is as wide as
 that of the light's window σ.
 """

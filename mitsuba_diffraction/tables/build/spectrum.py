@@ -129,7 +129,7 @@ class Spectrum:
         assert self._tapers is not None
         y, x = self._tapers
         values = function(self.heights).astype(self.complex_type, copy=False)
-        # in double precision: orders are what is left of nearly 1 without it
+        # in double precision: orders are small beside a mean of nearly 1
         wide_y, wide_x = (np.square(taper, dtype=np.float64) for taper in (y, x))
         mean = complex(wide_y @ (values @ wide_x)) / float(wide_y.sum() * wide_x.sum())
         values -= self.complex_type(mean)
