@@ -69,10 +69,9 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
     make_folder = recipe is not None and output is None
     if output is None:
         output = Path(f"{source.files[0].stem}.exr") if recipe is None else recipe.output
-    inputs = [*source.files, *(recipe.sources if recipe else ())]
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
-    check_outputs([output], inputs, "table", make_folder=make_folder)
+    check_outputs([output], make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = source.fields()

@@ -121,7 +121,7 @@ def tilted(field: HeightField, shortest: float) -> bool:
 
 
 def tilt_warning(field: HeightField, shortest: float) -> str:
-    """Return a warning of a scan that is not levelled, or ""."""
+    """Return a warning of a tilted scan, or ""."""
     if not tilted(field, shortest):
         return ""
     turn = math.degrees(2 * math.atan(math.hypot(*plane_of(field))))

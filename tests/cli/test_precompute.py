@@ -225,9 +225,12 @@ def test_the_source_is_never_overwritten(run, heights, here):
     field = {"Y": np.load(heights).astype(np.float32)}
     OpenEXR.File({}, field).write("heights.exr")
     before = (here / "heights.exr").read_bytes()
-    line = run("precompute", "heights.exr", *QUICK).failed_in_one_line()
-    assert "overwrite its own source" in line
+    ran = run("precompute", "heights.exr", *QUICK)
+    assert "its output is called 'heights-2.exr'" in ran.err
+    line = run("precompute", "heights.exr", *QUICK, "-o", "heights.exr").failed_in_one_line()
+    assert "would overwrite" in line
     assert (here / "heights.exr").read_bytes() == before
+    assert (here / "heights-2.exr").exists()
 
 
 @pytest.mark.parametrize("output", ["nowhere/table.exr", "/proc/table.exr", "folder.exr"])
