@@ -18,7 +18,7 @@ from .console import Bar, say
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
-    from ..analysis.spectrometer import Geometry
+    from ..analysis.spectrometer import MeasurementGeometry
     from ..analysis.treatments import Treatment
     from ..tables.orders import OrderTable
     from ..tables.source import TableSource
@@ -38,7 +38,7 @@ class Measurement:
     """
 
     args: argparse.Namespace
-    geometry: Geometry
+    geometry: MeasurementGeometry
     lam: Any
     bar: Bar
     _noted: int = 0
@@ -146,7 +146,9 @@ class Measurement:
                 say(f"{file.name}: azimuth {found}")
         return self._spectrum(table, geometry, self.lam, angular=args.iridescence and not quiet)
 
-    def _spectrum(self, table: Any, geometry: Geometry, lam: Any, *, angular: bool) -> Spectra:
+    def _spectrum(
+        self, table: Any, geometry: MeasurementGeometry, lam: Any, *, angular: bool
+    ) -> Spectra:
         """Measure the spectra of a table's BSDF, and its variables over all angles."""
         from ..analysis.angular_variables import angular_variables
         from ..analysis.media import follow, loaded_in_media

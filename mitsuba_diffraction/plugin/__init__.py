@@ -41,3 +41,5 @@ memory          arrays in the variant's memory, and reading them
 loops           sums in a loop inside a kernel, which derivatives pass
 types           names of the types of arguments
 """
+
+import mitsuba  # noqa: F401 - before the modules here: the import registers them (`when_imported`)

@@ -224,7 +224,17 @@ from .layers import UnderCoat
 from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
 from .surface import DiffractingSurface
-from .types import Colour, Context, Float, Mask, Properties, Spectrum, Vector2f, Vector3f
+from .types import (
+    Colour,
+    Context,
+    Float,
+    Mask,
+    Powers,
+    Properties,
+    Spectrum,
+    Vector2f,
+    Vector3f,
+)
 
 
 class Diffraction(DiffractingSurface):
@@ -278,22 +288,19 @@ class Diffraction(DiffractingSurface):
             power, density = self.power.power(pair, site.scale, site.si), mi.Float(0.0)
         else:
             power, density = self.power.both(pair, site.scale, drawing, site.si)
-        # Eq. 4 to 9: times N' of the material and the rest
+        # Eq. 4 to 10: times N' of the material and the rest
         return self.light(ctx, site, pair, power, active), with_even_share(density)
 
-    def light(self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask) -> Spectrum:
+    def light(self, ctx: Context, site: Site, pair: Pair, power: Powers, active: Mask) -> Spectrum:
         """Return f cosθo of the structure, and of the coat's face where there is one.
 
         power : ⟨|P|²⟩ / (4π²σ⁴ λ²) of the pair in 1/µm², eq. 2 and 3, from the power model.
         """
-        # Eq. 4 without power and N
-        factor = self.geometry(pair)
+        shadowing = 1.0
         if self.vcavity:
-            factor *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        if not mi.is_rgb:
-            power = dr.maximum(power, 0.0)  # cut series may be below
-        # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
-        value = self.lobe(ctx, site, pair, self.boundary, factor * power, active)
+            shadowing = vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
+        # Eq. 4 to 10: N' or a Mueller matrix from Jones matrices
+        value = self.lobe(ctx, site, pair, self.boundary, power, active, shadowing)
         if self.coat is not None:
             value += self.face(ctx, site, pair.outer, self.mirror, active)
         if self.energy.scales:

@@ -93,9 +93,11 @@ class Pair:
     w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
     above : whether light stays above the surface; else both directions are mirrored from below.
+    medium : optical index of the medium that `outer` is in, over that above the surface.
     """
 
     above = True
+    medium: Float = 1.0
 
     def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
         self.wi, self.wo, self.frame = si.wi, wo, frame
@@ -169,6 +171,7 @@ class Turned(Pair):
         turned = mi.SurfaceInteraction3f(si)
         turned.wi = si.wi * side
         super().__init__(turned, wo * side, frame, active)
+        self.medium = n
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property

@@ -24,7 +24,8 @@ from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
-from .integral import window_power
+from .integral import window_powers
+from .mirror import horizon_correction, interfering
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -97,8 +98,11 @@ def brdf(
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     material = _material(model, index_of(eta, k, light.wavelength, film), coat)
     if material.index is None:
-        power = window_power(field, *light, *window)
-        return kirchhoff_factor(*light, window.sigmas.orders) * power
+        others, zeroth, cosine = window_powers(field, *light, *window)
+        others *= kirchhoff_factor(*light, window.sigmas.orders)
+        zeroth *= horizon_correction(light, window.sigmas.zeroth, None)
+        area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
+        return interfering(others, zeroth / area, cosine)
     return _reflected(boundary.unpolarised, field, light, material, window)
 
 
@@ -171,14 +175,18 @@ def _lit(
         assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
         jones = _matrices(field, inside, relative, material.model)
-        power = window_power(field, *inside, *window)
-        return coats.reflected(light, window.sigmas, material.coat, relative, power, jones, measure)
+        powers = window_powers(field, *inside, *window)
+        return coats.reflected(
+            light, window.sigmas, material.coat, relative, powers, jones, measure
+        )
     averaged = window.coherence == COHERENCES[0]
     if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
         return models.default_brdf(field, light, index, window.sigmas, measure)
     jones = _matrices(field, light, index, material.model)
-    power = window_power(field, *light, *window)
-    return models.reflected(light, window.sigmas.orders, power, jones, measure)
+    others, zeroth, cosine = window_powers(field, *light, *window)
+    rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
+    mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
+    return interfering(rest, mirror, cosine)
 
 
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:

@@ -15,10 +15,10 @@ Budget, recommended   best setting within a budget
 from __future__ import annotations
 
 from .accuracy import lit_pairs, measure_depths, measure_wavelengths
-from .measuring import Measured, Setting, measure, settings
+from .measuring import MeasuredSetting, TradeoffSetting, measure, settings
 from .report import Budget, recommended
 
 __all__ = [
-    "Budget", "Measured", "Setting", "lit_pairs", "measure", "measure_depths",
+    "Budget", "MeasuredSetting", "TradeoffSetting", "lit_pairs", "measure", "measure_depths",
     "measure_wavelengths", "recommended", "settings",
 ]  # fmt: skip

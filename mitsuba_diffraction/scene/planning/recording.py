@@ -26,6 +26,7 @@ from ...plugin.types import (
     Float,
     Interaction,
     Mask,
+    Powers,
     Properties,
     Spectrum,
     Vector2f,
@@ -161,7 +162,7 @@ def _kind(session: Session) -> type[BSDF]:
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
         def light(
-            self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask
+            self, ctx: Context, site: Site, pair: Pair, power: Powers, active: Mask
         ) -> Spectrum:
             value = super().light(ctx, site, pair, power, active)
             light = mi.unpolarized_spectrum(value)

@@ -7,14 +7,14 @@ import pytest
 
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.paths import Path
-from mitsuba_diffraction.tables.energy.conserved import Dielectric
+from mitsuba_diffraction.tables.energy.conserved import Transmitter
 from mitsuba_diffraction.tables.energy.gain import Gain
 from tests.support.directions import rough_patch
 
 PATHS = [
     pytest.param(path, id=f"{name} {path.came.number}-{path.left.number}")
     for name, thin in (("surface", False), ("sheet", True))
-    for path in Dielectric(1.5, "small_slope", thin).paths(np.ones(1), 1e-3)[0]
+    for path in Transmitter(1.5, "small_slope", thin).paths(np.ones(1), 1e-3)[0]
     if path.index is not None  # the flat side of a sheet has no table
 ] + [pytest.param(Path(0.9 + 6.0j, "small_slope"), id="metal")]
 
