@@ -39,7 +39,7 @@ WAVELENGTHS = 24
 def patches_figure(fields: Sequence[HeightField]) -> Figure:
     """Draw a row for each patch; panels of other patches have the first patch's curves in grey.
 
-    From left to right: the patch and a detail of it, seen from above; the distribution of heights;
+    From left to right: the patch and one detail, seen from above; the distribution of heights;
     the spectrum of heights along x and y; and the far field of light along the normal at 450, 550
     and 650 nm, shown as blue, green and red (not colorimetric), logarithmic.
     """

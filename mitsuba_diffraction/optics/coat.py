@@ -17,7 +17,7 @@ directions,
 For a flat structure this sum is exact. It is reciprocal. By the second term T G ρ is at most 1 in
 either direction, so a coated structure never reflects more than it receives while the structure
 reflects no more than a flat one. Light that the structure sends beyond the critical angle is lost,
-although the face returns all of it and some leaves in the end (docs/validation/layers.md).
+although the face returns this light and some leaves in the end (docs/validation/layers.md).
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from ..tables.table import DiffractionTable
 
 #: Nodes of an interval of κ, Chebyshev's of the first kind on 0 to 1, in the channels of a pixel.
 NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
-#: Phase (rad) of the highest over the deepest point that an interval of κ spans: a cosine of it is
+#: Phase (rad) of the highest over the deepest point that an interval of κ spans: its cosine is
 #: off by 0.003.
 _PHASE = 2.0
 #: Orders drawn in a sample, each of a wavelength.

@@ -38,7 +38,7 @@ _REQUIRED = (400.0, 700.0)
 
 
 class Material:
-    """What a surface reflects with: an index in each channel, and what follows from it.
+    """Material of a surface: an index in each channel, its reflectance, tint and absorption.
 
     Attributes
     ----------

@@ -125,7 +125,7 @@ def mueller(jones: ArrayLike) -> Real:
     as above, S₃ > 0 turns clockwise for an observer who looks into the light.
     """
     entries = np.asarray(jones, np.complex128)
-    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and the Stokes vector is a linear map of it
+    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and the Stokes vector is linear in that product
     pairs = np.einsum("...ik,...jl->...ijkl", entries, entries.conj())
     coherency = pairs.reshape(*entries.shape[:-2], 4, 4)
     stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
