@@ -36,7 +36,7 @@ SCENE = """<scene version="3.0.0">
         <bsdf type="diffraction">
             <string name="heightfield" value="{heights}"/>
             <string name="pixel_size" value="{pixel}"/>
-            <string name="periodic" value="none"/>
+            <string name="periodic" value="exact"/>
             <string name="level" value="none"/>
         </bsdf>
     </shape>
