@@ -140,7 +140,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row["tiling"] = REPEATS if table.source.get("repeats") else ""
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]
-        row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
+        if "standard_error" in table.source["windows"]:
+            row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
     # without a material ideal reflection: the effect of the structure alone

@@ -120,11 +120,11 @@ def run(args: argparse.Namespace) -> Figures:
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
     from ..analysis.spectra import mean_spectra
-    from ..analysis.spectrometer import Geometry
+    from ..analysis.spectrometer import MeasurementGeometry
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
     auto = args.light_azimuth == "auto"
-    geometry = Geometry(
+    geometry = MeasurementGeometry(
         args.light, tuple(dict.fromkeys(detectors)), 0.0 if auto else args.light_azimuth,
         args.acceptance,
     )  # fmt: skip

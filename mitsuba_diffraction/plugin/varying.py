@@ -25,7 +25,7 @@ LEAST_SCALE = 1e-30
 
 
 class Varying:
-    """One number, or a texture's or mesh attribute's number at each point.
+    """Parameter that is a number, or a texture's or mesh attribute's number at each point.
 
     Parameters
     ----------

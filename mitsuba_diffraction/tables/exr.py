@@ -120,7 +120,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         ) from error
     if not isinstance(document, dict):
         raise DiffractionError(
-            f"'{path}' is an EXR image but no table; make one of it with the command "
+            f"'{path}' is an EXR image but no table; make a table with the command "
             "'precompute' (DiffractionTable.build), or give it as heightfield"
         )
     version = document.pop("version", None)

@@ -70,7 +70,7 @@ class Record:
 
 
 class Recorded(Protocol):
-    """What the cache stores."""
+    """Content of the cache: an object that packs itself into a record."""
 
     def to_record(self) -> Record:
         """Return the record of this object."""

@@ -21,16 +21,16 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Sample, means, unit_vector
+from .cells import Cells, CellSample, ExportGrid, means, unit_vector
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
-DEFAULT = Grid(
+DEFAULT = ExportGrid(
     np.arange(0.0, 86.0, 8.5), np.linspace(-180.0, 180.0, 25), np.arange(360.0, 831.0, 20.0), 64
 )
 
 
 def save_rgl(
-    bsdf: Any, path: Path, grid: Grid = DEFAULT, text: str = "", progress: Progress = silent
+    bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write a BSDF of the current variant for `measured`.
 
@@ -43,14 +43,16 @@ def save_rgl(
     nodes = np.linspace(0.0, 1.0, n)
     axes = np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
 
-    def sample(azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float) -> Sample:
+    def sample(
+        azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float
+    ) -> CellSample:
         place = dr.minimum(dr.abs(u + a / (n - 1)), 1.0)
         theta_m = 0.5 * np.pi * dr.square(place)
         half = unit_vector(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
         wi = unit_vector(elevation, azimuth)
         cosine = dr.dot(wi, half)
         solid = place * dr.sin(theta_m) * dr.maximum(cosine, 0.0)
-        return Sample(wi, 2.0 * cosine * half - wi, solid)
+        return CellSample(wi, 2.0 * cosine * half - wi, solid)
 
     cells = Cells([axis.ravel() for axis in axes], sample)
     values = means(bsdf, cells, grid.wavelengths, np.pi / (n - 1), True, progress)

@@ -44,7 +44,7 @@ def sinusoidal(
     period
         Distance between grooves, µm.
     depth
-        Peak to valley, µm; the amplitude h₀ of the closed form J_m²(κh₀) is half of it.
+        Peak to valley, µm; the amplitude h₀ of the closed form J_m²(κh₀) is half the depth.
     axis
         Direction along which the height changes.
     periods

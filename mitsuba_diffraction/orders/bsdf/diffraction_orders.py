@@ -81,7 +81,7 @@ from ...plugin.types import (
     Vector3f,
 )
 from ..table import OrderTable
-from .lobes import DaylightLobes, Lobes, SpectralLobes, Window
+from .lobes import DaylightLobes, Lobes, OrderLobe, SpectralLobes
 from .parameters import Parameters, read_parameters
 from .polarised_lobes import PolarisedLobes
 
@@ -260,7 +260,7 @@ def requested(ctx: Context, passed: Mask) -> Mask:
 
 def _lobes_of(read: Parameters) -> Lobes:
     """Return the lobes of the current variant."""
-    table, window = read.table, Window(read.table, read.coherence_width)
+    table, window = read.table, OrderLobe(read.table, read.coherence_width)
     if mi.is_rgb:
         return DaylightLobes(window)
     if mi.is_polarized and table.polarised and table.sides == 1:

@@ -115,7 +115,7 @@ class Lobes(Protocol):
         """Return the sum of the orders' efficiencies, of all sides."""
 
 
-class Window:
+class OrderLobe:
     """Lobe of an order under the coherence window, in units of orders.
 
     An order is a whole number; on a crossed grating a vector of two.
@@ -196,7 +196,7 @@ class SpectralLobes:
     wavelength : nm, of mono variants.
     """
 
-    def __init__(self, window: Window, wavelength: float) -> None:
+    def __init__(self, window: OrderLobe, wavelength: float) -> None:
         self._window, self.lookup = window, window.lookup
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
@@ -254,7 +254,7 @@ class SpectralLobes:
 class DaylightLobes:
     """Lobes of RGB variants, summed over daylight (`daylight`)."""
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self, window: OrderLobe) -> None:
         self._window, self.lookup = window, window.lookup
         self.sigma, self.period = window.sigma, window.period
         weights = daylight_weights(self.sigma, self.period)

@@ -20,7 +20,7 @@ SAMPLES = 128
 _COUNTED = 1e-4
 
 
-class Measured(NamedTuple):
+class InterpolationError(NamedTuple):
     """Error of interpolation, over random directions and wavelengths.
 
     mean : of the light in all orders but 0, which the table has too much or too little in an order.
@@ -59,7 +59,7 @@ class Measured(NamedTuple):
         }
 
 
-def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
+def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> InterpolationError:
     """Compare a table, as the renderer reads it, with solutions at random lights.
 
     Directions are sampled as in diffuse light within the superstrate, or a block, wavelengths
@@ -107,7 +107,7 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
             turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
     each = np.concatenate(relative)
     largest = int(each.argmax()) if len(each) else -1
-    return Measured(
+    return InterpolationError(
         *missed_shares(missed, light),
         np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
         float(turned / light.sum()) if table.polarised else None,

@@ -11,12 +11,12 @@ from ...errors import DiffractionError, check_keys, one_line, quoted
 from ...files import read_text
 from ...heights.lengths import count_between, number_between
 from ...limits import MOST_LAYERS, check_count
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .profiles import Profile
 from .stations import Grating
-from .structure import Film, Part, Slice, Structure
+from .structure import Part, ProfileFilm, Slice, Structure
 
-Substance = str | float | complex | Material
+Substance = str | float | complex | TabulatedIndex
 #: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
 #: thickness and parts, of a material and the x in µm at which it begins and ends.
 Layers = Sequence[tuple[Any, ...]]
@@ -24,7 +24,7 @@ Layers = Sequence[tuple[Any, ...]]
 
 def structure_of(
     profile: Profile,
-    substance: Material,
+    substance: TabulatedIndex,
     wavelengths: tuple[float, float],
     *,
     layers: Layers = (),
@@ -115,14 +115,14 @@ def material_text(grating: Grating) -> str:
     return " on ".join([*films, *own, *lower, *([lowest.name] if lowest else [])])
 
 
-def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> Film:
+def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> ProfileFilm:
     """Return a layer, (material, thickness), on a profile."""
     if len(layer) != 2 or not isinstance(layer[1], float | int):
         raise DiffractionError(
             f"{where}: expected a material and a thickness in µm, got {quoted(layer)}; slices lie "
             "beneath a profile"
         )
-    return Film(_index(layer[0], where, wavelengths), _thickness(layer[1], where))
+    return ProfileFilm(_index(layer[0], where, wavelengths), _thickness(layer[1], where))
 
 
 def _slice(
@@ -161,10 +161,10 @@ def _check_parts(parts: Iterable[Part], where: str, period: float) -> None:
             )
 
 
-def _index(material: Any, where: str, wavelengths: tuple[float, float]) -> Material:
+def _index(material: Any, where: str, wavelengths: tuple[float, float]) -> TabulatedIndex:
     """Return a material that has an index."""
     try:
-        if not isinstance(material, str | int | float | complex | Material):
+        if not isinstance(material, str | int | float | complex | TabulatedIndex):
             raise DiffractionError(f"expected a material, got {quoted(material)}")
         known = material_of(material, wavelengths)
     except DiffractionError as error:

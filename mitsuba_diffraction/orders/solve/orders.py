@@ -20,7 +20,7 @@ from .accuracy import WORST, diffuse_light, measured_error, powers
 from .block import to_node
 from .directions import Directions, solve_directions
 from .films import Layers, Substance, structure_of
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
 from .nodes import (
     MAX_NODES,
@@ -58,7 +58,7 @@ MOST_BYTES = 128 << 20
 
 def solve_orders(
     profile: Profile,
-    material: str | float | complex | Material = "Al",
+    material: str | float | complex | TabulatedIndex = "Al",
     *,
     superstrate: float = 1.0,
     thin: bool = False,
@@ -136,7 +136,7 @@ def solve_orders(
     return _solve_cells(problem, how, work, tell, facts)
 
 
-def _block(profile: Profile, substance: Material, how: Settings) -> Grating:
+def _block(profile: Profile, substance: TabulatedIndex, how: Settings) -> Grating:
     """Return the grating of a block's face: upside down, with the block above.
 
     The block has more channels, and light of the rarer medium has some of them (`blocks`). Coupled

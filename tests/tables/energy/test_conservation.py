@@ -9,9 +9,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
+from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar
@@ -30,7 +30,7 @@ def tables():
 
 def raw_albedo(table, theta, phi, wavelength, material):
     directions = np.radians([theta]), np.radians([phi])
-    surface = Surface(table, reflector(*MATERIALS[material]))
+    surface = SurfaceEnergy(table, reflector(*MATERIALS[material]))
     return float(surface.albedos(Conservation(), *directions, wavelength)[0][0, 0, 0])
 
 
@@ -74,7 +74,7 @@ def test_a_flat_surface_reflects_what_fresnel_says():
 
 @pytest.mark.parametrize("surface", ["grating", "rough"])
 def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
-    glass = Surface(tables[surface], reflector("small_slope", 1.5))
+    glass = SurfaceEnergy(tables[surface], reflector("small_slope", 1.5))
     found = glass.conservation((400.0, 700.0))
     assert found.scale is None
     assert found.albedo.values.max() < 1.0
@@ -86,7 +86,7 @@ def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
         np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32, periodic=True
     )
     table = md.DiffractionTable.build(gentle)
-    metal = Surface(table, reflector("small_slope", ALUMINIUM))
+    metal = SurfaceEnergy(table, reflector("small_slope", ALUMINIUM))
     found = metal.conservation((550.0, 550.0))
     assert found.scale is None
 
@@ -100,7 +100,7 @@ def conserved(surface, wavelengths, theta, phi):
 
 
 def test_a_rough_surface_keeps_what_it_may(tables):
-    mirror = Surface(tables["rough"], reflector("kirchhoff", None))
+    mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
     theta, phi = np.radians([3.0, 31.0, 52.0, 68.0, 77.0]), np.radians([5.0, 72.0, 201.0, 333.0])
     raw, kept = conserved(mirror, [550.0], theta, phi)
     assert raw.max() > 1.01  # or the test would say little
@@ -113,7 +113,7 @@ def test_a_rough_surface_keeps_what_it_may(tables):
 @pytest.mark.parametrize("material", ["aluminium", "perfect"])
 def test_a_grating_gains_nothing_between_nodes_either(tables, material):
     """Where orders become propagating the albedo has kinks, and without a material spikes."""
-    surface = Surface(tables["grating"], reflector(*MATERIALS[material]))
+    surface = SurfaceEnergy(tables["grating"], reflector(*MATERIALS[material]))
     rng = np.random.default_rng(0)
     theta, phi = np.radians(rng.uniform(0, 80, 30)), np.radians(rng.uniform(0, 360, 20))
     raw, kept = conserved(surface, [520.0, 547.0, 560.0], theta, phi)
@@ -126,7 +126,7 @@ def test_a_grating_gains_nothing_between_nodes_either(tables, material):
 def test_coarser_settings_take_less_work_and_are_another_record(tables):
     before = use_energy_settings(EnergySettings(polar=12, azimuthal=16, wavelengths=2, rings=12))
     try:
-        mirror = Surface(tables["rough"], reflector("kirchhoff", None))
+        mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
         scale = mirror.conservation((400.0, 700.0)).scale
     finally:
         use_energy_settings(before)
@@ -137,7 +137,7 @@ def test_coarser_settings_take_less_work_and_are_another_record(tables):
 @pytest.mark.parametrize("material", MATERIALS)
 def test_the_tabulated_gain_is_the_gain(tables, material):
     model, index = MATERIALS[material]
-    gain = Gain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
+    gain = PathGain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
     rng = np.random.default_rng(0)
     cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
     for cos_i in np.cos(np.radians([[0.0], [33.0], [71.0]])):
