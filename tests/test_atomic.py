@@ -14,6 +14,7 @@ import pytest
 from mitsuba_diffraction.atomic import atomic_path, remove_temporaries
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.tables import exr
+from tests.support.systems import posix
 
 KILLED = """
 import os, sys
@@ -118,3 +119,16 @@ def test_a_writer_that_loses_the_error_of_a_full_disk_is_found_out(tmp_path, mon
         exr.write_channels(target, {"Y": np.ones((2, 2), np.float32)})
     assert target.read_text() == "before"
     assert os.listdir(tmp_path) == ["a.exr"]
+
+
+@posix
+def test_permissions_follow_the_umask_which_no_thread_sees_changed(tmp_path, monkeypatch):
+    before = os.umask(0o027)
+    change = os.umask
+    try:
+        monkeypatch.setattr(os, "umask", lambda _: pytest.fail("all threads' files would change"))
+        with atomic_path(tmp_path / "a.txt") as path:
+            path.write_text("whole")
+    finally:
+        change(before)
+    assert (tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640

@@ -17,7 +17,6 @@ import inspect
 import json
 import os
 import shlex
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -25,11 +24,10 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, check_keys
-from ..files import FileKind, kind_of, path_within, read_text
+from ..files import FileKind, kind_of, path_within, read_toml
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
-from .formats import first_line
 from .read import LoadOptions, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
@@ -65,7 +63,7 @@ class Recipe:
         """
         file = Path(path)
         shown = repr(str(file))
-        content = _parse(file, shown)
+        content = read_toml(file)
         if content.get("method") == SOLVED:
             raise DiffractionError(
                 f"{shown} is a recipe of solved orders: run the command 'solve "
@@ -177,14 +175,6 @@ def options_and_settings(
         return options, {k: checked(k, content[k]) for k in RECIPE_SETTINGS if k in content}
     except DiffractionError as error:
         raise DiffractionError(f"{where}: {error}") from error
-
-
-def _parse(file: Path, shown: str) -> dict[str, Any]:
-    """Read a TOML file."""
-    try:
-        return tomllib.loads(read_text(file))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DiffractionError(f"{shown} is not a recipe (TOML): {first_line(error)}") from error
 
 
 def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:
