@@ -38,14 +38,16 @@ def open_image(
     Raises an UnidentifiedImageError, an OSError, if the content is of another format; a
     DiffractionError if a file is small, and its pixels as numbers of 8 bytes are many.
     """
+    name = "an image" if not isinstance(file, str | os.PathLike) else repr(os.fspath(file))
     try:
         image = Image.open(file, formats=formats)
     except UnidentifiedImageError as error:
         raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
+    except Image.DecompressionBombError as error:
+        raise DiffractionError(f"{name} is too large: {error}") from error
     if isinstance(file, str | os.PathLike):
-        name = os.fspath(file)
         try:
-            check_content(8.0 * image.width * image.height, os.path.getsize(name), repr(name))
+            check_content(8.0 * image.width * image.height, os.path.getsize(file), name)
         except DiffractionError:
             image.close()
             raise

@@ -1,8 +1,8 @@
-"""Files that the running command reads: none of its outputs replaces one of them.
+"""Files that the running command reads: no output replaces an input.
 
 `files.readable_file`, through which every reader of the package goes, notes its file here; scenes
-note what Mitsuba reads for them. `atomic.atomic_path`, through which every file is written, asks.
-Only commands note: whoever calls the library may replace what they have read.
+note the files that Mitsuba reads. `atomic.atomic_path`, through which every file is written, asks.
+Only commands note: programs that call the library may replace files that they have read.
 """
 
 from __future__ import annotations

@@ -8,10 +8,11 @@ lists all limits; tests/test_limits.py compares its table with this module.
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import threading
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -58,7 +59,7 @@ def check_content(claimed: float, size: int, shown: str) -> None:
 
     Raises a DiffractionError if the content is large, and larger than compression explains.
     """
-    if claimed > max(SMALL_CONTENT, MOST_COMPRESSED * size):
+    if not claimed <= max(SMALL_CONTENT, MOST_COMPRESSED * size):  # NaN neither
         raise DiffractionError(
             f"{shown}: {size} bytes claim to hold {claimed:.3g}; a file may hold {SMALL_CONTENT} "
             f"bytes, or {MOST_COMPRESSED} times its size; damaged?"
@@ -70,7 +71,7 @@ def check_count(count: float, most: int, shown: str, what: str) -> None:
 
     Raises a DiffractionError with both numbers.
     """
-    if count > most:
+    if not count <= most:
         raise DiffractionError(f"{shown}: {count:.10g} {what}; at most {most} are supported")
 
 
@@ -130,7 +131,7 @@ def bounded_memory(size: int, shown: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _address_space(more: int) -> Iterator[None]:
-    """Limit the memory that the process maps inside to what it has, and `more` bytes."""
+    """Limit the memory that the process maps inside: the present amount, and `more` bytes."""
     if not sys.platform.startswith("linux"):
         yield
         return
@@ -147,3 +148,29 @@ def _address_space(more: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def tree_sizes(inner: Sequence[Sequence[int]]) -> list[float]:
+    """Return the number of nodes in the tree below each node of a graph, itself included.
+
+    A node that is reached on two ways counts twice, and in a circle without end.
+
+    inner : numbers of the nodes to which each node refers.
+    """
+    sizes = [0.0] * len(inner)
+    # False on the way down, True once the size is known
+    known: dict[int, bool] = {}
+    for first in range(len(inner)):
+        waiting = [first]
+        while waiting:
+            number = waiting[-1]
+            if number not in known:
+                known[number] = False
+                waiting += [other for other in inner[number] if other not in known]
+                continue
+            waiting.pop()
+            if not known[number]:
+                circle = not all(known[other] for other in inner[number])
+                total = 1.0 + sum(sizes[other] for other in inner[number])
+                sizes[number], known[number] = math.inf if circle else total, True
+    return sizes

@@ -16,7 +16,7 @@ from mitsuba_diffraction import DiffractionError, limits
 from mitsuba_diffraction.files import read_text, readable_file
 from mitsuba_diffraction.scene.load import set_variant
 from tests.support import ROOT
-from tests.support.small_files import FILES
+from tests.support.small_scenes import FILES
 
 
 def test_security_lists_the_limits():

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tests.support import ROOT
-from tests.support.small_files import FILES
+from tests.support.small_scenes import FILES
 
 pytestmark = pytest.mark.thorough
 
@@ -21,7 +21,7 @@ MOST_SECONDS = 20.0
 def test_small_files_take_neither_memory_nor_time(tmp_path):
     """All are read in one process, so that each peak is that of all files before as well."""
     ran = subprocess.run(
-        [sys.executable, "-m", "tests.support.small_files", tmp_path, *FILES],
+        [sys.executable, "-m", "tests.support.small_scenes", tmp_path, *FILES],
         cwd=ROOT, capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr[-500:]

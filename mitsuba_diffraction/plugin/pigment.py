@@ -11,11 +11,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
 from ..files import GLTF, read_text, readable_file
 from ..gltf import load_gltf
 from ..images import FORMATS
+from ..limits import check_content
 from ..optics.colour import decode_srgb
 from .types import BSDF
 
@@ -130,7 +131,7 @@ def _base_colour(file: Path) -> dict[str, Any]:
     """
     trimesh = optional("trimesh", f"pigment='{file}'")
     try:
-        meshes = load_gltf(file, f"pigment='{file}'").geometry.values()
+        meshes = load_gltf(file, f"pigment='{file}'", materials=True).geometry.values()
     except DiffractionError:
         raise
     except Exception as error:  # whatever the package makes of damaged files
@@ -151,7 +152,15 @@ def _base_colour(file: Path) -> dict[str, Any]:
         raise DiffractionError(
             f"pigment='{file}': its picture is none of {', '.join(FORMATS)}; save it as PNG"
         )
-    linear = decode_srgb(np.asarray(picture.convert("RGB")) / 255.0) * factor
+    shown = f"pigment='{file}'"
+    check_content(24.0 * picture.width * picture.height, file.stat().st_size, shown)
+    try:
+        levels = np.asarray(picture.convert("RGB"))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise DiffractionError(
+            f"{shown}: its picture is damaged: {one_line(str(error))}"
+        ) from error
+    linear = decode_srgb(levels / 255.0) * factor
     return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32))}
 
 

@@ -158,6 +158,7 @@ def _instantiated(
     )
     from .bands import put_bands
     from .clamping import put_clamp
+    from .nodes import check_nodes
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -179,6 +180,7 @@ def _instantiated(
             put_materials(state, values.materials)
             put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
+            check_nodes(state)
             remove_dark_lights(state)
             if values.clamp is not None:
                 put_clamp(state, values.clamp)

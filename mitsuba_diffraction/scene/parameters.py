@@ -9,18 +9,18 @@ import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
 from ..gltf import note_named
 from ..inputs import note_input
+from ..limits import DEEPEST_ELEMENT, DEEPEST_INCLUDE, MOST_INCLUDES, check_count
 from .stage import STUDIO
 
 _REFERENCE = re.compile(r"\$(\w+)")
-# Mitsuba stops at 15 includes within each other.
-_DEEPEST = 15
 # Parameters of Mitsuba's plugins and of this package's whose text is the name of a file.
 _FILES = ("filename", "heightfield", "table", "layers", "pigment")
 
@@ -93,11 +93,11 @@ def files_of(
     """
     from ..heights.recipes import Recipe
 
-    defaults = parameters_of(scene, values) or {}
-    known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
     files: dict[Path, None] = {}
     waiting = [scene]
-    if scene.suffix.lower() == ".xml":
+    if scene.suffix.lower() == ".xml":  # else heights or a recipe
+        defaults = parameters_of(scene, values) or {}
+        known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
         with contextlib.suppress(_Unreadable):
             for element, folders in _elements(_Document.of_scene(scene, values), known, {}):
                 if name := _file_named(element, known):
@@ -146,7 +146,24 @@ def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:
 
 
 class _Unreadable(Exception):
-    """An included file is missing or malformed, and Mitsuba says so."""
+    """An included file is missing, and Mitsuba says so."""
+
+
+class _Shallow(ElementTree.TreeBuilder):
+    """Builder of a tree that refuses elements too far within each other."""
+
+    def __init__(self, shown: str) -> None:
+        super().__init__()
+        self._shown, self._depth = shown, 0
+
+    def start(self, tag: Any, attrs: Any) -> ElementTree.Element:
+        self._depth += 1
+        check_count(self._depth, DEEPEST_ELEMENT, self._shown, "elements within each other")
+        return super().start(tag, attrs)
+
+    def end(self, tag: Any) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
 
 
 @dataclass(frozen=True)
@@ -160,6 +177,7 @@ class _Document:
     roots : folders within which includes have to lie.
     chosen : names of parameters that the user has set: files that they name may lie anywhere.
     depth : of includes within each other.
+    includes : number of includes of the scene so far, for each of which Mitsuba reads a file.
     """
 
     file: Path
@@ -167,6 +185,7 @@ class _Document:
     roots: tuple[Path, ...]
     chosen: Collection[str]
     depth: int = 0
+    includes: list[int] = field(default_factory=lambda: [0])
 
     @classmethod
     def of_scene(cls, scene: Path, values: Mapping[str, str] | None) -> _Document:
@@ -177,21 +196,21 @@ class _Document:
     def root(self) -> ElementTree.Element:
         """Return the outermost element.
 
-        Raises a DiffractionError for pipes, and for malformed XML with includes.
+        Raises a DiffractionError for pipes, malformed XML, and elements too far within each other.
         """
         refuse_pipe(self.file)
-        if self.depth > _DEEPEST or not os.path.isfile(self.file):
+        if self.depth > DEEPEST_INCLUDE or not os.path.isfile(self.file):
             raise _Unreadable
         try:
-            return ElementTree.parse(self.file).getroot()
+            parser = ElementTree.XMLParser(target=_Shallow(f"'{self.file}'"))
+            return ElementTree.parse(self.file, parser).getroot()
         except ElementTree.ParseError as error:
-            content = self.file.read_bytes()
-            if b"<include" in content or b"<path" in content:
-                raise DiffractionError(
-                    f"'{self.file}' is malformed XML ({error}); mend it, since its includes "
-                    "cannot be checked"
-                ) from error
-            raise _Unreadable from error
+            raise DiffractionError(
+                f"'{self.file}' is malformed XML ({error}); mend it, since Mitsuba may read it "
+                "differently"
+            ) from error
+        except DiffractionError:
+            raise
         except (OSError, ValueError) as error:
             raise _Unreadable from error
 
@@ -233,6 +252,10 @@ def _elements(
             if element.tag == "path":
                 folders = (inner.file, *folders)
             else:
+                inner.includes[0] += 1
+                check_count(
+                    inner.includes[0], MOST_INCLUDES, f"'{document.file}'", "includes so far"
+                )
                 yield from _elements(inner, values, defaults)
 
 

@@ -66,13 +66,12 @@ def test_a_circle_of_includes_ends(tmp_path):
     assert parameters_of(file) is None
 
 
-@given(
-    st.binary(max_size=200).filter(lambda text: b"<include" not in text and b"<path" not in text)
-)
-def test_any_file_is_left_to_mitsuba_if_it_is_no_xml(tmp_path_factory, content):
+@given(st.binary(max_size=200))
+def test_files_that_are_no_xml_are_refused(tmp_path_factory, content):
     file = tmp_path_factory.mktemp("any") / "scene.xml"
     file.write_bytes(content)
-    check_parameters(file, {"spp": "1"}) if parameters_of(file) is None else None
+    with pytest.raises(DiffractionError, match=f"'{file}'"):
+        check_parameters(file, {"spp": "1"})
 
 
 @pytest.fixture
@@ -194,3 +193,10 @@ def test_files_are_found_where_mitsuba_looks_for_them(folder, monkeypatch, tmp_p
     assert {file.name for file in files_of(scene)} == {"scene.xml", "current.ply", "beside.ply"}
     scene = _scene(folder, '<path value="parts"/>', *meshes)
     assert len(files_of(scene)) == 4
+
+
+def test_files_of_heights_and_recipes_are_listed_too(tmp_path):
+    (tmp_path / "scan.npy").write_bytes(b"\x93NUMPY")
+    (tmp_path / "scan.toml").write_text('source = "scan.npy"\npixel_size = 0.1\n')
+    assert files_of(tmp_path / "scan.npy") == [tmp_path / "scan.npy"]
+    assert {file.name for file in files_of(tmp_path / "scan.toml")} == {"scan.npy", "scan.toml"}

@@ -1,11 +1,12 @@
 """Small files that ask for all memory, all day, or an address that does not exist.
 
-`python -m tests.support.small_files FOLDER NAME ...` writes and reads files in one process, and
+`python -m tests.support.small_scenes FOLDER NAME ...` writes and reads files in one process, and
 prints a line of JSON for each: the refusal, seconds, and the peak memory of the process so far.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import struct
 import sys
@@ -26,8 +27,10 @@ class Hostile(NamedTuple):
 FILES: dict[str, Hostile] = {}
 
 
-def hostile(name: str, read: Callable[[Path], object]) -> Callable[..., Callable[[Path], None]]:
-    """Register the function that writes the file `name`."""
+def hostile(
+    name: str, read: Callable[[Path], object], needs: str = ""
+) -> Callable[..., Callable[[Path], None]]:
+    """Register the function that writes the file `name`, if the package that reads it is there."""
 
     def register(write: Callable[[Path], None]) -> Callable[[Path], None]:
         def written(folder: Path) -> Path:
@@ -36,7 +39,8 @@ def hostile(name: str, read: Callable[[Path], object]) -> Callable[..., Callable
             return path
 
         assert name not in FILES
-        FILES[name] = Hostile(written, read)
+        if not needs or importlib.util.find_spec(needs) is not None:
+            FILES[name] = Hostile(written, read)
         return write
 
     return register
@@ -151,7 +155,7 @@ def _(path: Path) -> None:
     path.write_bytes(archive(("main.xml", 1 << 28, 1 << 28)))
 
 
-@hostile("lying.x3p", heights)
+@hostile("lying.x3p", heights, "SurfaceTopography")
 def _(path: Path) -> None:
     path.write_bytes(archive(("main.xml", 1 << 31, 10)))
 
@@ -220,7 +224,3 @@ def run(names: list[str], folder: Path) -> None:
             }),
             flush=True,
         )  # fmt: skip
-
-
-if __name__ == "__main__":
-    run(sys.argv[2:], Path(sys.argv[1]))

@@ -59,8 +59,6 @@ def read_image(path: Path) -> RawHeights:
         raise DiffractionError(
             f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
         ) from error
-    except Image.DecompressionBombError as error:
-        raise DiffractionError(f"{shown} is too large: {first_line(error)}") from error
     except _DAMAGED as error:
         raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
 

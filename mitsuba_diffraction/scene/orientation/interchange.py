@@ -5,7 +5,7 @@ Texture coordinates are Mitsuba's, whose v runs downwards in a picture, as Mitsu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,12 @@ import numpy as np
 
 from ...errors import DiffractionError, one_line, quoted
 from ...extras import optional
-from ...files import GLTF, USD, path_beside, refuse_pipe
+from ...files import GLTF, USD, path_beside, readable_file, refuse_pipe
 from ...gltf import load_gltf
 from ...inputs import note_input
+from ...limits import MOST_PLACED, bounded_memory, check_content, check_count
 from ...plugin.meshes import Floats, Ints, MeshArrays
+from .mesh_indices import check_indices
 
 
 def interchange_mesh(file: Path) -> MeshArrays:
@@ -31,9 +33,11 @@ def interchange_mesh(file: Path) -> MeshArrays:
     """
     reader = _gltf_parts if file.suffix.lower() in GLTF else _usd_parts
     package = optional("trimesh" if reader is _gltf_parts else "pxr.UsdGeom", f"mesh '{file}'")
+    shown, size = f"mesh '{file}'", readable_file(file).stat().st_size
     try:
-        parts = [part for part in reader(package, file) if len(part.faces)]
-    except DiffractionError:
+        with bounded_memory(size, shown):
+            parts = list(_checked_parts(reader(package, file), size, shown))
+    except (DiffractionError, MemoryError):
         raise
     except Exception as error:  # whatever the packages make of damaged files
         reason = one_line(str(error))[-200:] or type(error).__name__
@@ -50,6 +54,21 @@ def interchange_mesh(file: Path) -> MeshArrays:
         _joined([part.uv for part in parts]),
         np.concatenate(faces),
     )
+
+
+def _checked_parts(parts: Iterable[MeshArrays], size: int, shown: str) -> Iterator[MeshArrays]:
+    """Yield the parts that have triangles.
+
+    Raises a DiffractionError if a triangle names no vertex, or parts grow beyond the file's limit.
+    """
+    claimed = 0.0
+    for number, part in enumerate(parts, 1):
+        check_count(number, MOST_PLACED, shown, "placed meshes or more")
+        claimed += sum(array.nbytes for array in part if array is not None)
+        check_content(claimed, size, shown)
+        check_indices(part.faces, len(part.positions), shown)
+        if len(part.faces):
+            yield part
 
 
 def stated_up(file: Path) -> str | None:
@@ -151,13 +170,13 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
         counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
         corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], np.int64)
         points = np.array(mesh.GetPointsAttr().Get() or [], np.float64)
-        starts = np.cumsum(counts) - counts
-        fans = [
-            (start, start + n, start + n + 1)
-            for start, count in zip(starts, counts, strict=True)
-            for n in range(1, count - 1)
-        ]
-        faces = np.array(fans, np.int64).reshape(-1, 3)
+        if (counts < 0).any() or counts.sum() != len(corners):
+            raise DiffractionError(
+                f"mesh '{file}': faceVertexCounts of {prim.GetPath()} are {counts.sum()} corners, "
+                f"and faceVertexIndices {len(corners)}; export the mesh again"
+            )
+        check_indices(corners, len(points.reshape(-1, 3)), f"mesh '{file}'")
+        faces = _fans(counts)
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, ::-1]
         own = geometry.Primvar(mesh.GetNormalsAttr())
@@ -171,6 +190,17 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
             None if uv is None else uv * [1.0, -1.0] + [0.0, 1.0],
             faces,
         )
+
+
+def _fans(counts: Ints) -> Ints:
+    """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
+
+    counts : corners of each polygon.
+    """
+    triangles = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, triangles)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
 def _of_corners(values: Any, interpolation: str, corners: Ints, counts: Ints) -> Floats | None:

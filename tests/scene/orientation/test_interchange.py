@@ -177,8 +177,10 @@ def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name:
     entry.pop("bufferView", None)
     entry["uri"] = name.format(outside=folder.parent)
     file.write_text(json.dumps(document))
+    # a mesh needs no pictures, which are read for pigments alone
+    read = load_mesh if part == "buffers" else lambda file: pigment_bsdf(str(file))
     with pytest.raises(DiffractionError, match=r"outside of its folder|is a pipe"):
-        load_mesh(file)
+        read(file)
 
 
 def test_pictures_in_gltf_run_no_program(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
