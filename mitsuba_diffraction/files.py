@@ -194,24 +194,34 @@ def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
         raise DiffractionError(f"{os.fspath(path)!r} is not text (UTF-8)") from error
 
 
-def read_toml(path: str | os.PathLike[str], meant: str = "TOML") -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    meant : what the file should be, for the message.
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a TOML file, whose whole numbers fit 64 bits, as TOML has them.
 
     Raises a DiffractionError as `read_text` does, or if the file is not TOML.
     """
-    text, shown = read_text(path), repr(os.fspath(path))
+    text = read_text(path)
     if long := _LONG_KEY.search(text):
         line = text.count("\n", 0, long.start()) + 1
         raise DiffractionError(
-            f"{shown}, line {line}: a key may have {MOST_KEY_PARTS} parts with dots between"
+            f"{os.fspath(path)!r}, line {line}: a key may have {MOST_KEY_PARTS} parts with dots "
+            "between"
         )
     try:
-        return tomllib.loads(text)
-    # integers of thousands of digits are a ValueError, as are all errors of the syntax
-    except (ValueError, RecursionError) as error:
-        raise DiffractionError(f"{shown} is not {meant}: {one_line(str(error))}") from error
+        content = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # ValueError: also numbers of 5,000 digits
+        raise DiffractionError(
+            f"{os.fspath(path)!r} is not TOML: {one_line(str(error)).partition(';')[0]}"
+        ) from error
+    waiting: list[Any] = [content]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict | list):
+            waiting += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise DiffractionError(
+                f"{os.fspath(path)!r} is not TOML: the number {quoted(value)} exceeds 64 bits"
+            )
+    return content
 
 
 def refuse_pipe(path: Path) -> None:

@@ -9,12 +9,14 @@ exit code than 0. The second imports its modules (Mitsuba above all) when called
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import time
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import NoReturn
 
 from ..errors import DiffractionError, printable, shortened
@@ -74,6 +76,11 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
+    with noted():  # options may read files when they are parsed
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     try:
         for text in sys.argv[1:] if argv is None else argv:
             check_name(text)
@@ -86,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
     speak_for(args.parser)
-    with own_program(), warnings_in_one_line(), ended_at_once(), noted():
+    with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 
@@ -131,6 +138,7 @@ def _add_common(group: argparse._ActionsContainer) -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
+    _load_matplotlib()
     try:
         note_arguments(args)
         if args.json not in (None, STDOUT):
@@ -161,6 +169,16 @@ def _run(args: argparse.Namespace) -> int:
         if not args.debug:
             text += "; run it again with --debug for the traceback, and please report it"
         return _fail(error, text, args.debug)
+
+
+def _load_matplotlib() -> None:
+    """Import Matplotlib without the settings of the current folder.
+
+    Its `matplotlibrc` may make LaTeX run a program of the folder's, for every text of a figure.
+    """
+    if os.path.lexists("matplotlibrc"):
+        with contextlib.chdir(Path(__file__).parent):
+            import matplotlib  # noqa: F401
 
 
 def _fail(error: Exception, text: str, debug: bool) -> int:

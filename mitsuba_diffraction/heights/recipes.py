@@ -64,7 +64,7 @@ class Recipe:
         """
         file = Path(path)
         shown = repr(str(file))
-        content = read_toml(file, "a recipe (TOML)")
+        content = read_toml(file)
         if content.get("method") == SOLVED:
             raise DiffractionError(
                 f"{shown} is a recipe of solved orders: run the command 'solve "

@@ -93,11 +93,11 @@ def files_of(
     """
     from ..heights.recipes import Recipe
 
-    defaults = parameters_of(scene, values) or {}
-    known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
     files: dict[Path, None] = {}
     waiting = [scene]
-    if scene.suffix.lower() == ".xml":
+    if scene.suffix.lower() == ".xml":  # else heights or a recipe
+        defaults = parameters_of(scene, values) or {}
+        known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
         with contextlib.suppress(_Unreadable):
             for element, folders in _elements(_Document.of_scene(scene, values), known, {}):
                 if name := _file_named(element, known):

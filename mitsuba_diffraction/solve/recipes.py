@@ -76,7 +76,7 @@ class SolvedRecipe:
         that is not allowed.
         """
         file, shown = Path(path), repr(os.fspath(path))
-        content = read_toml(file, "a recipe (TOML)")
+        content = read_toml(file)
         if content.get("method") != SOLVED:
             raise DiffractionError(
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '

@@ -193,3 +193,10 @@ def test_files_are_found_where_mitsuba_looks_for_them(folder, monkeypatch, tmp_p
     assert {file.name for file in files_of(scene)} == {"scene.xml", "current.ply", "beside.ply"}
     scene = _scene(folder, '<path value="parts"/>', *meshes)
     assert len(files_of(scene)) == 4
+
+
+def test_files_of_heights_and_recipes_are_listed_too(tmp_path):
+    (tmp_path / "scan.npy").write_bytes(b"\x93NUMPY")
+    (tmp_path / "scan.toml").write_text('source = "scan.npy"\npixel_size = 0.1\n')
+    assert files_of(tmp_path / "scan.npy") == [tmp_path / "scan.npy"]
+    assert {file.name for file in files_of(tmp_path / "scan.toml")} == {"scan.npy", "scan.toml"}
