@@ -34,7 +34,7 @@ DONE = [
     ["brdf-map", *_TABLE, *_METAL, "--resolution", "8", "--samples", "1", "-o", "out/map.png"],
     ["spectrum", *_TABLE, *_METAL, "--light", "30", "--detector", "0", "--step", "100", "-o",
      "out/spectrum.csv"],
-    ["evaluate", *_TABLE, *_METAL, "--step", "100", "--angle-step", "5", "--windows", "0", "-o",
+    ["evaluate", *_TABLE, *_METAL, "--step", "20", "--angle-step", "2", "--windows", "0", "-o",
      "out/bands.png"],
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
      "100", "--no-compiled", "-o", "out/sweep.png"],
