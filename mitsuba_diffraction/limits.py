@@ -33,6 +33,10 @@ SMALL_CONTENT, MOST_COMPRESSED = 1 << 29, 200
 LARGEST_MEMBER_TEXT = 1 << 25
 #: Pixels of heights: 16384², 2 GiB.
 MOST_PIXELS = 1 << 28
+#: Parts of a dotted key in a TOML file; Python's reader takes the square of it in steps.
+MOST_KEY_PARTS = 32
+#: Patches of a recipe: its sources, or seeds.
+MOST_PATCHES = 1000
 #: Layers of a stack, repetitions included.
 MOST_LAYERS = 1000
 #: Numbers in a file of efficiencies, or a table of orders.

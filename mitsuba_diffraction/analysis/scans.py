@@ -57,10 +57,13 @@ def table_of(scan: Scan, progress: Progress = silent) -> DiffractionTable:
     Raises a DiffractionError if no table can be made of the scan.
     """
     patches, settings = scan
+    names = [patch.name for patch in patches]
     digest = key_of("scan", *(patch.digest() for patch in patches))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        return cached_table(digest, settings, lambda: build_with(patches, settings, progress))
+        return cached_table(
+            digest, settings, lambda: build_with(patches, settings, progress), names
+        )
 
 
 def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: Any) -> Any:

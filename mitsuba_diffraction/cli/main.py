@@ -76,6 +76,11 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
+    with noted():  # options may read files when they are parsed
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     try:
         for text in sys.argv[1:] if argv is None else argv:
             check_name(text)
@@ -88,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
     speak_for(args.parser)
-    with own_program(), warnings_in_one_line(), ended_at_once(), noted():
+    with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 

@@ -40,6 +40,7 @@ class TableRequest:
     digest : of the heights.
     settings : of the table.
     height_scale : the largest factor on the heights that the BSDF uses.
+    names : of the patches.
     build : builds the table with any settings.
     recipe : says where the heights come from; None for an array.
     """
@@ -47,12 +48,13 @@ class TableRequest:
     digest: str
     settings: TableSettings
     height_scale: float
+    names: tuple[str, ...]
     build: Callable[[TableSettings], DiffractionTable]
     recipe: Recipe | None
 
     def cached(self, settings: TableSettings) -> DiffractionTable:
         """The table with these settings, from the cache or built."""
-        return cached_table(self.digest, settings, lambda: self.build(settings))
+        return cached_table(self.digest, settings, lambda: self.build(settings), self.names)
 
 
 class Factors(NamedTuple):
@@ -188,7 +190,8 @@ def table_of_heights(
 ) -> DiffractionTable:
     """Return the table of a height field."""
     factors = Factors(height_scale, 1.0)
-    return provider(_request(heights.digest(), lambda: [heights], asked, factors, None))
+    names = (heights.name,)
+    return provider(_request(heights.digest(), lambda: [heights], asked, factors, None, names))
 
 
 def _request(
@@ -197,6 +200,7 @@ def _request(
     asked: Mapping[str, Any],
     factors: Factors,
     recipe: Recipe | None,
+    names: tuple[str, ...] = (),
 ) -> TableRequest:
     height_scale, stretch = factors
 
@@ -221,7 +225,11 @@ def _request(
             f"{settings.height_scale_max:g} of the recipe (a coat counts as its index times the "
             "heights); raise it there"
         )
-    return TableRequest(digest, settings, height_scale, build, recipe)
+    if recipe is not None:
+        names = tuple(source.name for source in recipe.sources) or (str(recipe.generator),) * len(
+            recipe.arguments
+        )
+    return TableRequest(digest, settings, height_scale, names, build, recipe)
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:

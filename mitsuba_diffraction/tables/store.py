@@ -16,12 +16,13 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 import platformdirs
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
@@ -39,6 +40,9 @@ from .table import FORMAT_VERSION, DiffractionTable
 VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
 #: The files unused for longest go when all are larger than this together.
 MAX_BYTES = 4 << 30
+
+#: Seconds after which it is said that another process holds a lock.
+PATIENCE = 5.0
 
 SUFFIX = ".cache"
 _MAGIC = "mitsuba_diffraction cache"
@@ -136,9 +140,18 @@ def _from_disk(
 def _locked(path: Path) -> Iterator[None]:
     """Hold the lock of a file among all processes; does nothing without file locks."""
     lock = FileLock(path.with_suffix(".lock"))
-    with contextlib.suppress(OSError):
+    try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
+        lock.acquire(timeout=PATIENCE)
+    except Timeout:
+        warn(
+            f"another process holds '{lock.lock_file}' and makes what this one needs: waiting for "
+            "it; if none is at work, remove that file"
+        )
+        with contextlib.suppress(OSError):
+            lock.acquire()
+    except OSError:
+        pass
     try:
         yield
     finally:
@@ -258,19 +271,36 @@ def table_key(digest: str, settings: TableSettings) -> str:
 
 
 def cached_table(
-    digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
+    digest: str,
+    settings: TableSettings,
+    build: Callable[[], DiffractionTable],
+    names: Sequence[str],
 ) -> DiffractionTable:
-    """Return the table of heights with this digest, from memory, from disk, or built and stored."""
+    """Return the table of heights with this digest, from memory, from disk, or built and stored.
+
+    names : of the patches. The file in the cache has none: patches of other names may be equal.
+    """
     key = table_key(digest, settings)
-    return cached("table", key, _tables, build, _table_record, _table_of)
+    named = partial(_table_of, names=names)
+    return cached("table", key, _tables, build, _table_record, named)
 
 
 def _table_record(table: DiffractionTable) -> Record:
     document = json.loads(json.dumps(document_of(table), default=plain))
+    for patch in _patches(document["source"]):
+        patch["name"] = ""
     return Record(document, [table.coefficients])
 
 
-def _table_of(record: Record) -> DiffractionTable:
+def _patches(source: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the descriptions of the first patch, and of all if there are several."""
+    return [source, *source.get("patches", [])]
+
+
+def _table_of(record: Record, names: Sequence[str]) -> DiffractionTable:
+    source = record.document["source"]
+    for patch, name in zip(_patches(source), (names[0], *names), strict=False):
+        patch["name"] = name
     table = parse_document(record.document)
     (coefficients,) = record.arrays
     if coefficients.shape != (shape := shape_of(table)):

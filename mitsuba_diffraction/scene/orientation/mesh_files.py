@@ -1,4 +1,4 @@
-"""Mesh files, most of them read by Mitsuba, PLY files of polygons cut into triangles first."""
+"""Mesh files: Mitsuba reads most, and PLY files of polygons after they are cut into triangles."""
 
 from __future__ import annotations
 
