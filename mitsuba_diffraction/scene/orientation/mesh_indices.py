@@ -109,7 +109,9 @@ def ply_header(file: Path, shown: str = "") -> Header | None:
     shown, form, elements = shown or f"mesh '{file}'", "", []
     end = re.search(rb"\nend_header[ \t\r]*\n", start)
     if end is None:
-        raise DiffractionError(f"{shown}: its header has no end; export the mesh again")
+        raise DiffractionError(
+            f"{shown} is a damaged PLY: its header has no end; export the mesh again"
+        )
     for line in start[: end.start()].decode("latin-1").split("\n")[1:]:
         words = line.split()
         if words[:1] == ["format"] and len(words) > 1:
