@@ -24,8 +24,8 @@ LARGEST_FILE = 1 << 32
 LARGEST_TEXT = 1_000_000
 #: Bytes of a CSV of efficiencies: two million lines.
 LARGEST_LISTING = 100_000_000
-#: Characters of a line of a grid of heights.
-LONGEST_LINE = 4_000_000
+#: Characters of a line in a text of heights.
+LONGEST_LINE = 1_000_000
 #: Bytes that every file may unpack to. A larger content needs a file of more than one byte for each
 #: `MOST_COMPRESSED` bytes: deflate packs zeros 1000 to 1, and measurements less than 10 to 1.
 SMALL_CONTENT, MOST_COMPRESSED = 1 << 29, 200

@@ -190,6 +190,11 @@ def _(path: Path) -> None:
     path.write_text("1" * 5_000_000)
 
 
+@hostile("long_line.dat", heights)
+def _(path: Path) -> None:
+    path.write_text("1 " * 4_000_000)
+
+
 @hostile("layers.toml", layers)
 def _(path: Path) -> None:
     path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
