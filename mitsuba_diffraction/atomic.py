@@ -30,8 +30,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.
 
-    What is written is on the disk before it is renamed. Writers that swallow errors when they close
-    a file, such as Mitsuba's and OpenEXR's, encode to memory, and Python writes.
+    The content is on the disk before the file is renamed. Of writers that lose errors when they
+    close a file, Mitsuba's pictures are encoded to memory, and other files are read back.
 
     Raises a DiffractionError as `check_target` does, if the folder is missing or cannot be written,
     or the disk is full.

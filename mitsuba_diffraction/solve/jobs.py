@@ -324,7 +324,7 @@ def make_folder(folder: Path) -> None:
 
 
 def remove_results(folder: Path) -> None:
-    """Remove the results in a folder, and the folder if nothing else lies in it."""
+    """Remove the results in a folder, and the folder once it is empty."""
     with suppress(OSError):
         for file in folder.glob(f"*{_SUFFIX}"):
             file.unlink()
