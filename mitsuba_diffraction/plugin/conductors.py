@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..columns import read_columns
 from ..errors import DiffractionError
-from ..optics.colour import LONGEST, SHORTEST
 from ..optics.materials import METALS, TISSUES
 from . import installed
 from .parameter_changes import children
@@ -67,6 +66,10 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
     return nodes, np.asarray(eta + 1j * k)
 
 
+#: Wavelengths, nm, between which spectra are constant beyond their nodes.
+_ENDS = 100.0, 10000.0
+
+
 def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     """Return a number over wavelength as a texture, constant beyond its nodes (nm).
 
@@ -76,7 +79,7 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
         value = float(np.interp(wavelength, nodes, values))
         return mi.load_dict({"type": "uniform", "value": value})
     # Mitsuba has 0 beyond
-    ends = np.union1d(nodes, [x for x in (SHORTEST, LONGEST) if not nodes[0] <= x <= nodes[-1]])
+    ends = np.union1d(nodes, [x for x in _ENDS if not nodes[0] <= x <= nodes[-1]])
     extended = np.interp(ends, nodes, values)
     if mi.is_spectral:
         lists = (", ".join(map(str, numbers.tolist())) for numbers in (ends, extended))

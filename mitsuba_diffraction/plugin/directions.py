@@ -69,16 +69,23 @@ class Site:
 
     Attributes
     ----------
-    si : the interaction.
+    si : the interaction, its wavelengths within those that are looked up.
     frame : the patch as it lies there.
     scale : factor on the heights.
     wavenumbers : 2π/λ of each channel, rad/µm.
+    given : the interaction as it is given, for a nested BSDF; None if it is `si`.
     """
 
     si: Interaction
     frame: PatchFrame
     scale: Float = 1.0
     wavenumbers: list[Float] = field(default_factory=list)
+    given: Interaction | None = None
+
+    @property
+    def nested_si(self) -> Interaction:
+        """The interaction for a nested BSDF."""
+        return self.si if self.given is None else self.given
 
 
 class Pair:

@@ -21,6 +21,10 @@ from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
 from .window_positions import PlacedWindow, WindowPositions
 
+#: Light up to so many times a table's longest wavelength is looked up; longer waves have the values
+#: of this one, shorter ones than the table's are not reflected.
+INFRARED = 4.0
+
 
 class PowerModel(Protocol):
     """Diffracted power in the variant's channels, and a density to draw directions from."""
@@ -38,6 +42,9 @@ class PowerModel(Protocol):
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
+
+    def bounded(self, si: Interaction) -> Interaction:
+        """Interaction whose wavelengths are among those that are looked up."""
 
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """`power` of a flat surface."""
@@ -73,9 +80,10 @@ class SpectralPower:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
-        #: Least and largest 2π/λ that the table serves, rad/µm, to rounding.
-        longest, shortest = (float(wavenumber(lam)) for lam in reversed(table.wavelength_range))
-        self._served = longest * (1.0 - 1e-5), shortest * (1.0 + 1e-5)
+        # To rounding. The table holds the low frequencies of infrared light, too
+        shortest, longest = table.wavelength_range
+        self._served = float(wavenumber(shortest)) * (1.0 + 1e-5)
+        self._bounds = shortest * (1.0 - 2e-5), longest * INFRARED
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -152,9 +160,17 @@ class SpectralPower:
             [dr.exp(apart * square) * (square * peak) for square in squares]
         )
 
+    def bounded(self, si: Interaction) -> Interaction:
+        """See `PowerModel.bounded`; light of shorter wavelengths has no power."""
+        if not mi.is_spectral:
+            return si
+        known = mi.SurfaceInteraction3f(si)
+        known.wavelengths = dr.clip(si.wavelengths, *self._bounds)
+        return known
+
     def _serves(self, k: Float) -> Mask:
         """Whether the table is of light of this 2π/λ."""
-        return (k >= self._served[0]) & (k <= self._served[1])
+        return k <= self._served
 
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if not mi.is_spectral:

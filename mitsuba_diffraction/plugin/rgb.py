@@ -163,6 +163,10 @@ class RGBPower:
         density = self.density(pair.outer, drawing_scale, si)
         return self.power(pair, height_scale, si), density
 
+    def bounded(self, si: Interaction) -> Interaction:
+        """See `PowerModel.bounded`; colours have no bounds."""
+        return si
+
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers

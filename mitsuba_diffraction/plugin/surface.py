@@ -173,7 +173,8 @@ class DiffractingSurface(SurfaceBSDF):
     def site_at(self, si: Interaction, active: Mask) -> Site:
         """See `SurfaceBSDF.site_at`."""
         scale = self.height_scale.at(si, active)
-        return Site(si, self.frame_at(si, active), scale, self.power.wavenumbers(si))
+        known = self.power.bounded(si)
+        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known), si)
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the patch as it lies at points of the surface."""
