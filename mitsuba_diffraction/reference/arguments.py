@@ -16,7 +16,7 @@ from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import COHERENCES, SURFACE, TableSettings, checked
 from .model import Light, Sigmas
-from .scan import Windows
+from .scan import ScanWindows
 
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
@@ -36,7 +36,7 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
     if taper is None:
         return Sigmas(sigma_of(width), sigma_of(light))
     looked_up = (width**-2 - taper**-2) ** -0.5
-    return Sigmas(sigma_of(looked_up), sigma_of(light), Windows(width, sigma_of(taper)))
+    return Sigmas(sigma_of(looked_up), sigma_of(light), ScanWindows(width, sigma_of(taper)))
 
 
 class Window(NamedTuple):

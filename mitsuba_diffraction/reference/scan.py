@@ -28,14 +28,14 @@ Complex = NDArray[np.complex128]
 Tapers = tuple[Real | None, Real | None]
 
 
-class Windows(NamedTuple):
+class ScanWindows(NamedTuple):
     """Width W of the windows of a scan, and σ_t of their taper, µm."""
 
     width: float
     taper: float
 
 
-def parts(field: HeightField, windows: Windows | None) -> list[Real]:
+def parts(field: HeightField, windows: ScanWindows | None) -> list[Real]:
     """Heights (ny, nx) of the windows, µm; of the whole patch, without, if it tiles the plane."""
     if windows is None:
         return [field.heights]
@@ -52,7 +52,7 @@ def parts(field: HeightField, windows: Windows | None) -> list[Real]:
     return levelled
 
 
-def tapers(field: HeightField, windows: Windows | None) -> Tapers | None:
+def tapers(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     """Tapers of the windows; None if the patch tiles the plane."""
     if windows is None:
         return None
@@ -65,8 +65,10 @@ def tapers(field: HeightField, windows: Windows | None) -> Tapers | None:
     return found[0], found[1]
 
 
-def faded(screen: Complex, along: Tapers) -> tuple[Complex, complex]:
-    """Return f with the zeros around it, and a_0."""
+def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex | None]:
+    """Return f with the zeros around it, and a_0; the screen itself and None without tapers."""
+    if along is None:
+        return screen, None
     t_y, t_x = (np.ones(n) if t is None else t for n, t in zip(screen.shape, along, strict=True))
     t = np.outer(t_y, t_x)
     mean = complex(np.sum(t**2 * screen) / np.sum(t**2))

@@ -13,9 +13,9 @@ from ..optics.geometry import wavenumber
 from ..settings import checked
 from . import boundary, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
+from .boundary import mixed
 from .coat import refracted
 from .integral import field_powers
-from .model import blended
 
 
 def btdf(
@@ -62,7 +62,7 @@ def btdf(
     if model == "small_slope":
         variance = roughness.at(k * np.hypot(*total[:, :2].T))
         s = boundary.small_slope_weight(kappa, variance, eta)
-        jones = blended(jones, through.small_slope(above, inside, eta), s)
+        jones = mixed(jones, through.small_slope(above, inside, eta), s)
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
     frequency = -k[:, None] * total[:, :2]

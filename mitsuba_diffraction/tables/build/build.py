@@ -42,7 +42,7 @@ from .choose import (
 from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
-from .powers import Spectra
+from .powers import PatchSpectra
 from .windows import Run, extent_of, shape_of, windows_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
@@ -71,7 +71,7 @@ class Attempt:
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
         self._tick = _Ticks(tell)
-        self._spectra = Spectra(patches, outer, double, self._tick)
+        self._spectra = PatchSpectra(patches, outer, double, self._tick)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
         transforms = expansion.intervals * expansion.series_terms * self._spectra.count
         self._tick.transforms = transforms

@@ -66,7 +66,7 @@ class Power:
         return Power(self.bins, self.change / count, self.order_0 / count)
 
 
-class Spectra:
+class PatchSpectra:
     """Transforms of patches.
 
     Parameters

@@ -30,7 +30,7 @@ from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, Gain
+from .gain import LEAST_COSINE, PathGain
 from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between directions, at least.
@@ -44,7 +44,7 @@ _WIDE = 0.08
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
-class Orders:
+class ScatteredOrders:
     """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
     wavelength_range : of the light, nm.
@@ -102,7 +102,7 @@ class Transport:
 
     def __init__(
         self,
-        orders: Orders,
+        orders: ScatteredOrders,
         path: Path,
         wavelength: float,
         theta: Real,
@@ -112,7 +112,7 @@ class Transport:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
         above = float(wavenumber(wavelength))
-        self._gain = Gain(path, orders.roughness, above, orders.height_scale)
+        self._gain = PathGain(path, orders.roughness, above, orders.height_scale)
         self._k = above * path.left.index  # where the light goes to
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
@@ -137,7 +137,7 @@ class Transport:
         return np.maximum(np.cos(theta), LEAST_COSINE), sine
 
     def _kappa(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return κ over the height scale and `Orders.densest`."""
+        """Return κ over the height scale and `ScatteredOrders.densest`."""
         return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
 
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:

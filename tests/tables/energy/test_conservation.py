@@ -11,7 +11,7 @@ from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar
@@ -137,7 +137,7 @@ def test_coarser_settings_take_less_work_and_are_another_record(tables):
 @pytest.mark.parametrize("material", MATERIALS)
 def test_the_tabulated_gain_is_the_gain(tables, material):
     model, index = MATERIALS[material]
-    gain = Gain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
+    gain = PathGain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
     rng = np.random.default_rng(0)
     cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
     for cos_i in np.cos(np.radians([[0.0], [33.0], [71.0]])):
