@@ -34,9 +34,13 @@ current variant of Mitsuba and in every variant that is set later.
 
 from __future__ import annotations
 
+import os
 import sys
 
 if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main__ comes last
+    # Python would import what follows from the current folder, which may be somebody else's
+    if not sys.flags.safe_path and sys.path[0] != os.path.dirname(os.path.dirname(__file__)):
+        del sys.path[0]
     from _mitsuba_diffraction import prepare
 
     prepare()

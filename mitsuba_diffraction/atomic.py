@@ -7,11 +7,13 @@ import hashlib
 import os
 import platform
 import re
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import DiffractionError
+from .inputs import note_output, refuse_input
 from .system import process_lives
 
 # A temporary file is .STEM.HOST-PID-RANDOM.SUFFIX, so that a later run can tell whether the process
@@ -28,12 +30,14 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.
 
-    Raises a DiffractionError if the folder is missing or cannot be written, if `path` is a folder,
+    What is written is on the disk before it is renamed. Writers that swallow errors when they close
+    a file, such as Mitsuba's and OpenEXR's, encode to memory, and Python writes.
+
+    Raises a DiffractionError as `check_target` does, if the folder is missing or cannot be written,
     or the disk is full.
     """
     target = Path(path)
-    if target.is_dir():
-        raise DiffractionError(f"cannot write '{target}': it is a folder; name a file in it")
+    check_target(target)
     remove_abandoned(target.parent, re.escape(target.stem[:_STEM]), target.suffix)
     try:
         handle, name = tempfile.mkstemp(
@@ -51,11 +55,13 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     _in_use.add(temporary)
     try:
         yield temporary
+        _flush(temporary)
         # mkstemp makes private files; a finished result follows the user's umask like any other
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
         _replace(temporary, target)
+        note_output(target)
     except OSError as error:
         raise DiffractionError(
             f"cannot write '{target}': {error.strerror or error}; no file was left behind"
@@ -64,6 +70,29 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         with contextlib.suppress(PermissionError):  # on Windows, a file that a writer left open
             temporary.unlink(missing_ok=True)
         _in_use.discard(temporary)
+
+
+def check_target(target: Path) -> None:
+    """Refuse an output in whose place no file may be put.
+
+    Raises a DiffractionError if it is a folder, a pipe or a device, or a file that the running
+    command reads.
+    """
+    try:
+        mode = target.stat().st_mode
+    except (OSError, ValueError):  # missing, or no name of a file: reported by who creates it
+        return
+    if stat.S_ISDIR(mode):
+        raise DiffractionError(f"cannot write '{target}': it is a folder; name a file in it")
+    if not stat.S_ISREG(mode):
+        raise DiffractionError(f"cannot write '{target}': it is a pipe or a device; name a file")
+    refuse_input(target)
+
+
+def _flush(temporary: Path) -> None:
+    """Have the content of a file on its disk: a network's or a full disk may refuse it late."""
+    with temporary.open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def _replace(temporary: Path, target: Path) -> None:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from .errors import DiffractionError, quoted
 from .files import readable_file
+from .limits import LARGEST_LISTING, bounded_lines
 
 Reals = NDArray[np.float64]
 
@@ -40,8 +41,6 @@ WAVELENGTH_UNITS = {
     "nm": 1.0, "nanometer": 1.0, "µm": 1e3, "μm": 1e3, "um": 1e3, "micron": 1e3, "micrometer": 1e3,
     "å": 0.1, "a": 0.1, "angstrom": 0.1, "m": 1e9,
 }  # fmt: skip
-# Bytes of a text at most, unless the caller knows better: two million lines.
-_LARGEST = 100_000_000
 _MISSING = {
     "", "nan", "na", "n/a", "#n/a", "bad", "none", "null", "-", "--", "inf", "-inf", "1.#qnan",
     "-1.#ind", "#div/0!",
@@ -140,7 +139,7 @@ class Columns(NamedTuple):
         )
 
 
-def read_columns(path: str | os.PathLike[str], largest: int = _LARGEST) -> Columns:
+def read_columns(path: str | os.PathLike[str], largest: int = LARGEST_LISTING) -> Columns:
     """Read the numbers of a text file by the rules above.
 
     Raises a DiffractionError if the file cannot be read, is no text, is larger than `largest`
@@ -157,12 +156,12 @@ def read_columns(path: str | os.PathLike[str], largest: int = _LARGEST) -> Colum
         encoding = _encoding(file)
         try:
             with file.open(encoding=encoding) as stream:
-                return parse_columns(stream, shown)
+                return parse_columns(bounded_lines(stream, shown), shown)
         except UnicodeDecodeError:
             if encoding != "utf-8-sig":
                 raise
             with file.open(encoding="cp1252", errors="replace") as stream:
-                return parse_columns(stream, shown)
+                return parse_columns(bounded_lines(stream, shown), shown)
     except UnicodeError as error:
         raise DiffractionError(
             f"{shown} is not text; export it as text from the program that wrote it"

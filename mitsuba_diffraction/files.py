@@ -2,8 +2,8 @@
 
 `kind_of` alone decides the kind of a file.
 
-Opening a pipe waits for somebody to write into it, and a device has no end. A name that is not
-UTF-8 cannot be handed to Mitsuba or OpenEXR.
+Opening a pipe waits for somebody to write, and a device has no end. Mitsuba and OpenEXR accept
+names in UTF-8 only.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from .errors import DiffractionError
+from .errors import DiffractionError, quoted
+from .inputs import note_input
+from .limits import LARGEST_FILE, LARGEST_TEXT
 
-#: Largest text that is read at once, bytes: recipes, plans and reports are far smaller.
-LARGEST_TEXT = 1_000_000
 #: Attribute of an EXR file that makes it a table; the JSON in it holds everything but coefficients.
 TABLE_ATTRIBUTE = "mitsuba_diffraction"
 #: Attribute that tells tables of orders from other NetCDF files.
@@ -75,7 +75,7 @@ def kind_of(path: str | os.PathLike[str]) -> FileKind:
     """
     content = b""
     with contextlib.suppress(DiffractionError):
-        content = _beginning(path, _BEGINNING)
+        content = beginning(path, _BEGINNING)
     for begins, attribute, kind in _CONTENTS:
         if content.startswith(begins) and attribute in content:
             return kind
@@ -102,11 +102,12 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
     Raises a DiffractionError if the file is missing, a folder, a pipe or a device, unreadable or
     empty, or if its name is not UTF-8.
     """
-    _beginning(path, 1)
+    beginning(path, 1)
+    note_input(path)
     return Path(path)
 
 
-def _beginning(path: str | os.PathLike[str], count: int) -> bytes:
+def beginning(path: str | os.PathLike[str], count: int) -> bytes:
     """Return the first bytes of a file, `count` at most; errors as in `readable_file`."""
     shown = repr(os.fspath(path))
     check_name(path)
@@ -116,7 +117,7 @@ def _beginning(path: str | os.PathLike[str], count: int) -> bytes:
         if file.is_dir():
             raise DiffractionError(f"{shown} is a folder; name a file in it")
         with file.open("rb") as stream:
-            first = stream.read(count)
+            first, size = stream.read(count), os.fstat(stream.fileno()).st_size
     except DiffractionError:
         raise
     except FileNotFoundError as error:
@@ -127,6 +128,10 @@ def _beginning(path: str | os.PathLike[str], count: int) -> bytes:
         raise DiffractionError(f"cannot read {shown}: {error}") from error
     if not first:
         raise DiffractionError(f"{shown} is empty (0 bytes)")
+    if not size:
+        raise DiffractionError(
+            f"{shown} has content without a size, as files of /proc; copy it, and name the copy"
+        )
     return first
 
 
@@ -143,13 +148,31 @@ def path_within(file: Path, name: str) -> Path:
     return path
 
 
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a file.
+def path_beside(file: Path, name: str) -> Path:
+    """Return the path of an input that a file names, relative to the file's folder.
 
-    Raises a DiffractionError as `readable_file` does.
+    Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
+    """
+    path = file.parent / name
+    if not path.resolve().is_relative_to(file.parent.resolve()):
+        raise DiffractionError(
+            f"{str(file)!r} names {quoted(name)}, which is outside of its folder; copy that there"
+        )
+    return path
+
+
+def read_bytes(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> bytes:
+    """Return the content of a file of at most `largest` bytes.
+
+    Raises a DiffractionError as `readable_file` does, or if the file is larger.
     """
     file = readable_file(path)
     try:
+        if (size := file.stat().st_size) > largest:
+            raise DiffractionError(
+                f"{str(file)!r} is too large: {size} bytes, at most {largest} are read; is it the "
+                "right file?"
+            )
         return file.read_bytes()
     except OSError as error:
         raise DiffractionError(f"cannot read {str(file)!r}: {error.strerror}") from error
@@ -160,17 +183,10 @@ def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
 
     Raises a DiffractionError as `readable_file` does, or if the file is larger, or not text.
     """
-    file = readable_file(path)
-    size = file.stat().st_size
-    if size > largest:
-        raise DiffractionError(
-            f"{str(file)!r} is too large: {size} bytes, and a text may have {largest}; is it "
-            "the right file?"
-        )
     try:
-        return read_bytes(file).decode("utf-8")
+        return read_bytes(path, largest).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise DiffractionError(f"{str(file)!r} is not text (UTF-8)") from error
+        raise DiffractionError(f"{os.fspath(path)!r} is not text (UTF-8)") from error
 
 
 def refuse_pipe(path: Path) -> None:

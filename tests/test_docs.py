@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import importlib.util
 import io
@@ -172,6 +173,22 @@ def test_modules_that_it_names_exist(page):
     assert len(modules) > 5
     folders = PACKAGE, ROOT
     assert {name for name in modules if not any((f / name).is_file() for f in folders)} == set()
+
+
+def test_names_of_modules_that_the_map_names_exist():
+    named = re.findall(r"`([\w/]+\.py)`, `([\w.]+)`", PAGES["ARCHITECTURE.md"])
+    named = [(file, name) for file, name in named if not name.endswith(".py")]
+    assert len(named) > 15
+    unknown = []
+    for file, name in named:
+        body = ast.parse((PACKAGE / file).read_text(encoding="utf-8")).body
+        for part in name.split("."):
+            found = [node for node in body if getattr(node, "name", None) == part]
+            body = found[0].body if found else []
+            if not found:
+                unknown.append(f"{file}: {name}")
+                break
+    assert not unknown
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve.grating_index import material_of
-from ..tables.energy.conservation import Energy, Surface
-from ..tables.energy.conserved import Dielectric, Reflector
+from ..tables.energy.conservation import Energy, SurfaceEnergy
+from ..tables.energy.conserved import Reflector, Transmitter
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.
@@ -68,7 +68,7 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
     """
     result: dict[str, Any] = {}
     for name, thin in (("dielectric 1.5, both sides", False), ("sheet 1.5", True)):
-        sums = _sums(table, Dielectric(1.5, "small_slope", thin), PASSED)
+        sums = _sums(table, Transmitter(1.5, "small_slope", thin), PASSED)
         result[name] = {
             f"{kind}, from {side}": {
                 f"{angle:g}°": _range(sums[:, n, m, i]) for i, angle in enumerate(PASSED)
@@ -80,7 +80,7 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
 
 
 def _sums(
-    table: DiffractionTable, material: Reflector | Dielectric, angles: Sequence[float]
+    table: DiffractionTable, material: Reflector | Transmitter, angles: Sequence[float]
 ) -> NDArray[np.float64]:
     """Return R or R + T, (wavelengths, raw or conserved, sides, angles, azimuths).
 
@@ -88,7 +88,7 @@ def _sums(
     """
     conservation = Energy(table, material, table.wavelength_range).at(1.0)
     phi = (np.arange(AZIMUTHS, dtype=np.float64) + 0.3) * (2.0 * np.pi / AZIMUTHS)
-    surface, theta = Surface(table, material), np.radians(angles)
+    surface, theta = SurfaceEnergy(table, material), np.radians(angles)
     pairs = [surface.albedos(conservation, theta, phi, wavelength) for wavelength in WAVELENGTHS]
     return np.array(pairs, float)
 

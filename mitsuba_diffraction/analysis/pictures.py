@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
-from ..tables.energy.conservation import Conservation, Surface
+from ..tables.energy.conservation import Conservation, SurfaceEnergy
 from ..tables.energy.conserved import Reflector
 from ..tables.table import DiffractionTable
 
@@ -39,7 +39,7 @@ WAVELENGTHS = 24
 def patches_figure(fields: Sequence[HeightField]) -> Figure:
     """Draw a row for each patch; panels of other patches have the first patch's curves in grey.
 
-    From left to right: the patch and a detail of it, seen from above; the distribution of heights;
+    From left to right: the patch and one detail, seen from above; the distribution of heights;
     the spectrum of heights along x and y; and the far field of light along the normal at 450, 550
     and 650 nm, shown as blue, green and red (not colorimetric), logarithmic.
     """
@@ -141,7 +141,7 @@ def albedo_figure(table: DiffractionTable) -> Figure:
     (shaded) and their mean. Right: the largest over the wavelengths, against both angles; the
     colour scale is centred at 1, where energy is conserved, and ends at the largest value at 80°.
     """
-    surface = Surface(table, Reflector("kirchhoff", lambda wavelengths: None))
+    surface = SurfaceEnergy(table, Reflector("kirchhoff", lambda wavelengths: None))
     theta = LAST * (1.0 - np.linspace(1.0, 0.0, 64) ** 1.5)  # denser towards grazing angles
     phi = np.arange(0.0, 360.1, 5.0)
     wavelengths = np.geomspace(*table.wavelength_range, WAVELENGTHS)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError
+from ..scene.parameters import note_files
 from .iridescence import HUES
 from .survey_files import write_table
 
@@ -54,6 +55,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
         else:
             held = [name]
         files |= dict.fromkeys(held)
+    for file in files:
+        note_files(file)
     return list(files)
 
 

@@ -34,7 +34,7 @@ from ..progress import Progress, silent
 from .known_wavelengths import check_material
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction
-from .spectrometer import Geometry, across_plane, cone, light_direction, lobe_width
+from .spectrometer import MeasurementGeometry, across_plane, cone, light_direction, lobe_width
 
 Reals = NDArray[np.float64]
 
@@ -65,7 +65,6 @@ class Spectra:
     value : (n, detectors), for unpolarised light; 1 is all of what `relative` names.
     s, p : the same for light polarised across and in the plane of incidence, or None.
     error : standard errors of `value` where it is a mean over several surfaces, or None.
-    band : least and largest values over treatments of the heights, or None.
     angular : `angular_variables` of each surface, or empty.
     geometry : angles.
     relative : one of `RELATIVE`.
@@ -73,12 +72,11 @@ class Spectra:
 
     wavelength: Reals
     value: Reals
-    geometry: Geometry
+    geometry: MeasurementGeometry
     relative: str
     s: Reals | None = None
     p: Reals | None = None
     error: Reals | None = None
-    band: tuple[Reals, Reals] | None = None
     angular: tuple[dict[str, float], ...] = ()
 
     def names(self, group: str = "") -> list[str]:
@@ -118,7 +116,8 @@ def spectrum(
     bsdf : a Mitsuba BSDF of the current variant, spectral and vectorised. In a polarised variant
         the result has s and p as well.
     light : angle of the lamp from the normal, degrees; its light is parallel.
-    detectors : angles of the detectors in the plane of incidence, degrees; see `Geometry`.
+    detectors : angles of the detectors in the plane of incidence, degrees; see
+        `MeasurementGeometry`.
     light_azimuth : azimuth of the lamp from the patch's x axis, degrees.
     acceptance : full angle of a detector's cone, degrees.
     relative : "white", relative to a Lambertian standard of reflectance 1; "mirror", relative to a
@@ -129,7 +128,9 @@ def spectrum(
         parameters that depend on it, as `media.follow` does.
     progress : called as progress(done, total, text).
     """
-    geometry = Geometry(light, tuple(float(d) for d in detectors), light_azimuth, acceptance)
+    geometry = MeasurementGeometry(
+        light, tuple(float(d) for d in detectors), light_azimuth, acceptance
+    )
     check_choice("relative", relative, RELATIVE)
     if not mi.is_spectral or "scalar" in mi.variant():
         raise DiffractionError(
@@ -222,7 +223,7 @@ def brdf_values(bsdf: Any, wi: Reals, wo: Reals, wavelength: Reals) -> Reals:
 def _signals(
     bsdf: Any,
     sigma: float | None,
-    geometry: Geometry,
+    geometry: MeasurementGeometry,
     lam: Reals,
     before: Callable[[float], None] | None,
     progress: Progress,
@@ -244,7 +245,7 @@ def _signals(
 
 def _integrals(
     bsdf: Any,
-    geometry: Geometry,
+    geometry: MeasurementGeometry,
     lam: Reals,
     before: Callable[[float], None] | None,
     cones: Sequence[tuple[Reals, Reals]],
@@ -290,7 +291,7 @@ def _stokes(light: Reals, across: Reals) -> Reals:
     return np.array([1.0, math.cos(double), math.sin(double)])
 
 
-def _of_mirror(sigma: float | None, geometry: Geometry, lam: Reals) -> Reals:
+def _of_mirror(sigma: float | None, geometry: MeasurementGeometry, lam: Reals) -> Reals:
     """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to.
 
     Its f is Kirchhoff's factor times ⟨|P|²⟩ = 4π²σ⁴ exp(−σ²q²), eq. 3 and 4 of `reference.model`.

@@ -24,7 +24,7 @@ _MOST_NODES = 1 << 22
 
 
 @dataclass(frozen=True)
-class Geometry:
+class MeasurementGeometry:
     """Angles of a measurement, degrees.
 
     Raises a DiffractionError if an angle is out of range, there is no detector, or a cone reaches
@@ -81,17 +81,17 @@ def lobe_width(sigma: float | None, lam: Reals) -> float:
     return 0.05 if sigma is None else 1.0 / (2**0.5 * sigma * float(wavenumber(lam[0])))
 
 
-def light_direction(geometry: Geometry) -> Reals:
+def light_direction(geometry: MeasurementGeometry) -> Reals:
     """Return the unit vector (3,) towards the lamp."""
     return in_plane(geometry, -geometry.light)
 
 
-def in_plane(geometry: Geometry, angle: float) -> Reals:
+def in_plane(geometry: MeasurementGeometry, angle: float) -> Reals:
     """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
     return polar(math.radians(-angle), math.radians(geometry.azimuth))
 
 
-def cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
+def cone(geometry: MeasurementGeometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
     """Return directions (m, 3) in a detector's cone and their solid angles (m,).
 
     Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge is
@@ -122,7 +122,7 @@ def cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
     return directions, solid
 
 
-def across_plane(geometry: Geometry) -> Reals:
+def across_plane(geometry: MeasurementGeometry) -> Reals:
     """Return the unit vector (3,) normal to the plane of incidence: s."""
     phi = math.radians(geometry.azimuth)
     return np.array([-math.sin(phi), math.cos(phi), 0.0])

@@ -38,7 +38,7 @@ from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, table_of
-from .survey_files import write_rows, write_sheets
+from .survey_files import SHEET, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
@@ -140,7 +140,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row["tiling"] = REPEATS if table.source.get("repeats") else ""
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]
-        row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
+        if "standard_error" in table.source["windows"]:
+            row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
     # without a material ideal reflection: the effect of the structure alone
@@ -270,6 +271,11 @@ def run_survey(
     write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
     write_sheets(folder, ranking)
     return result
+
+
+def files_in(folder: Path) -> list[Path]:
+    """List the files that a survey of any scans writes into its folder."""
+    return [folder / name for name in (TABLE, SAMPLES, f"{SHEET}.png", f"{SHEET}-001.png")]
 
 
 def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -66,12 +66,13 @@ def _iridescence(row: Mapping[str, Any]) -> str:
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
     from matplotlib.figure import Figure
-    from PIL import Image
+
+    from ..images import open_image
 
     lines = math.ceil(len(rows) / _COLUMNS)
     figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100, layout="constrained")
     for axes, row in zip(figure.subplots(lines, _COLUMNS, squeeze=False).flat, rows, strict=False):
-        with Image.open(folder / row["map"]) as picture:
+        with open_image(folder / row["map"], ("PNG",)) as picture:
             axes.imshow(picture)
         period = row.get("period_1_um")
         title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "

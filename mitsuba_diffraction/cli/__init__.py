@@ -27,6 +27,7 @@ realtime               `view` and `compare`, `export-viewer` and `export-shader`
 export_bsdf            a surface's BRDF for other programs
 export_osl             a surface as a shader for Blender's Cycles
 options                options that several commands share, declared once, and their types
+arguments              files that a command line names, noted as inputs
 scene_options          the scene, its parameters and materials; a mesh on a stage; its rendering
 workers                options of commands that may run on many processes
 console                lines and bars on stderr, and Mitsuba's among them
@@ -36,6 +37,6 @@ report                 output files, checked before the work; figures as text, J
 
 from .console import Bar, say_error
 from .main import main
-from .report import check_writable
+from .report import check_outputs
 
-__all__ = ["Bar", "check_writable", "main", "say_error"]
+__all__ = ["Bar", "check_outputs", "main", "say_error"]

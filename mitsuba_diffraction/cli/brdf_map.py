@@ -18,7 +18,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, output_name
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -162,13 +162,11 @@ def run(args: argparse.Namespace) -> Figures:
     """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
-    output = args.output or Path(f"{args.source.stem}-map.exr")
-    only_png = output.suffix.lower() == ".png"
-    png = output if only_png else output.with_suffix(".png")
-    if only_png and args.spectral:
+    output = output_name(args.output, Path(f"{args.source.stem}-map.exr"), _files)
+    *exr, png = written = _files(output)
+    if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
-    written = [png] if only_png else [output, png]
-    check_outputs(written, [args.source], "map")
+    check_outputs(written)
 
     from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
 
@@ -179,7 +177,7 @@ def run(args: argparse.Namespace) -> Figures:
     check_map(bands, args.resolution, args.samples, args.spectral)
     result, surface, method = evaluate(args, light, bands, spectrum)
     exposure = None if bands.is_single else args.exposure
-    if not only_png:
+    if exr:
         notes = {"source": str(args.source), "surface": surface}
         save_exr(result, output, notes=notes | ({"method": args.method} if args.method else {}))
     save_png(result, png, exposure=exposure, title=args.source.name, notes=surface)
@@ -195,6 +193,12 @@ def run(args: argparse.Namespace) -> Figures:
             "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
             "bands": str(bands), "surface": surface, "method": method,
             "seconds": seconds}  # fmt: skip
+
+
+def _files(output: Path) -> list[Path]:
+    """Return the files of -o: an EXR and a PNG beside it, or only a PNG."""
+    png = output if output.suffix.lower() == ".png" else output.with_suffix(".png")
+    return list(dict.fromkeys((output, png)))
 
 
 def _by_bsdf(

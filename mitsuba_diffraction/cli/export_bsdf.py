@@ -13,7 +13,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, output_name
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
 _SUFFIXES = {"rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf")}
@@ -50,11 +50,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)
-    output = args.output or Path(f"{args.source.stem}.{_default_suffix(args.format)}")
+    output = output_name(args.output, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
     name = args.format or ("rgl" if output.suffix.lower() == ".bsdf" else "bird")
     if output.suffix.lower() not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
-    check_outputs([output], [args.source], "BRDF")
+    check_outputs([output])
 
     from ..scene.load import set_variant
 

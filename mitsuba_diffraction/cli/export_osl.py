@@ -12,7 +12,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in
-from .report import Figures, check_outputs, elapsed
+from .report import Figures, check_outputs, elapsed, output_name
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -46,10 +46,13 @@ def run(args: argparse.Namespace) -> Figures:
     options.refuse(args, ["folders"], ": is for --addon")
     take_source(args)
     look = args.source.stem if args.preset is None else args.preset.partition(",")[0]
-    folder = args.output or Path(f"{look}-osl")
     name = args.name or "diffraction_" + re.sub(r"[^A-Za-z0-9_]", "_", look)
-    outputs = [folder / f"{name}.osl"]
-    check_outputs(outputs, [args.source], "shader", make_folder=True)
+
+    def files_in(folder: Path) -> list[Path]:
+        return [folder / f"{name}{suffix}" for suffix in (".osl", ".json")]
+
+    folder = output_name(args.output, Path(f"{look}-osl"), files_in)
+    check_outputs(files_in(folder), make_folder=True)
 
     from ..osl import export
     from ..scene.load import set_variant
@@ -77,7 +80,7 @@ def _addon(args: argparse.Namespace) -> Figures:
         args.parser.error(
             "argument --addon: export SOURCE or --preset into a folder first, and name it by --with"
         )
-    check_outputs([args.addon], [], "add-on")
+    check_outputs([args.addon])
 
     from ..osl import make_addon
 

@@ -9,16 +9,19 @@ exit code than 0. The second imports its modules (Mitsuba above all) when called
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import time
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import NoReturn
 
 from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
+from ..inputs import noted
 from ..retired import retired
 from ..streams import own_program
 from . import (
@@ -42,9 +45,10 @@ from . import (
     tonemap,
     tradeoff,
 )
+from .arguments import note_arguments
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
-from .report import STDOUT, check_writable, save_report
+from .report import STDOUT, check_outputs, save_report
 
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
@@ -83,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
-    with own_program(), warnings_in_one_line(), ended_at_once():
+    with own_program(), warnings_in_one_line(), ended_at_once(), noted():
         return _run(args)
 
 
@@ -128,9 +132,11 @@ def _add_common(group: argparse._ActionsContainer) -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
+    _load_matplotlib()
     try:
+        note_arguments(args)
         if args.json not in (None, STDOUT):
-            check_writable(args.json)
+            check_outputs([args.json])
         retired(args.retired)
         args.began, args.code = time.perf_counter(), DONE
         save_report(args, args.run(args))
@@ -158,6 +164,16 @@ def _run(args: argparse.Namespace) -> int:
         if not args.debug:
             text += "; run it again with --debug for the traceback, and please report it"
         return _fail(error, text, args.debug)
+
+
+def _load_matplotlib() -> None:
+    """Import Matplotlib without the settings of the current folder.
+
+    Its `matplotlibrc` may make LaTeX run a program of the folder's, for every text of a figure.
+    """
+    if os.path.lexists("matplotlibrc"):
+        with contextlib.chdir(Path(__file__).parent):
+            import matplotlib  # noqa: F401
 
 
 def _fail(error: Exception, text: str, debug: bool) -> int:

@@ -12,7 +12,7 @@ from ..scene.load import load_scene, set_variant
 from ..scene.pictures import count_bad, write_exr
 from . import scene_options
 from .console import mitsuba_warnings, say, say_warning
-from .report import Figures, check_writable, default_output, elapsed, save_figure
+from .report import Figures, check_outputs, default_output, elapsed, output_name, save_figure
 
 #: The animal.
 OBSERVER = (
@@ -32,21 +32,27 @@ def run_observed(args: argparse.Namespace) -> Figures:
     eye = eye_of(args.observer)
     seen = responses(eye) * relit(args.illuminant or "d65")
     parameters = scene_options.scene_parameters(args)
-    output = args.output or Path(default_output(args.name, ".exr").name)
+
+    def files(exr: Path) -> list[Path]:
+        return [exr, exr.with_suffix(".png")]
+
+    output = output_name(args.output, Path(default_output(args.name, ".exr").name), files)
     if output.suffix.lower() != ".exr":
         args.parser.error(f"argument -o: --observer writes an EXR, not {str(output)!r}")
-    png = output.with_suffix(".png")
-    for path in (output, png):
-        check_writable(path)
+    output, png = files(output)
+    check_outputs([output, png])
     variant = set_variant(args.mode)
     if "_spectral" not in variant:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
-    from ..scene.bands import Bands
+    from ..scene.bands import SensorBands
 
-    bands = Bands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
+    bands = SensorBands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
     with mitsuba_warnings():
         result = scene_options.rendered(
-            args, variant, lambda _: load_scene(args.scene, parameters, bands=bands)
+            args,
+            variant,
+            lambda _: load_scene(args.scene, parameters, bands=bands),
+            lambda *_: check_outputs([output, png]),  # of what only loading tells
         )[2]
     if bad := count_bad(result.bitmap):
         say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in the PNG")

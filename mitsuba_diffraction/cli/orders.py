@@ -7,7 +7,7 @@ from pathlib import Path
 
 from . import options
 from .options import number_between
-from .report import Figures, check_outputs
+from .report import Figures, check_outputs, output_name
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> Figures:
     from ..solve.listing import list_orders
     from ..tables.orders import load_any_orders
 
-    output = args.output or Path(f"{args.table.stem}.csv")
-    check_outputs([output], [args.table], "list of orders")
+    output = output_name(args.output, Path(f"{args.table.stem}.csv"))
+    check_outputs([output])
     table = load_any_orders(args.table)
     low, high = table.wavelengths
     steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)

@@ -14,7 +14,7 @@ from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
-from .report import Figures, check_writable, lines_of
+from .report import Figures, check_outputs, lines_of
 
 if TYPE_CHECKING:
     from ..scene.planning.plan import PlannedTable
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> Figures:
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
     if args.output is not None:
-        check_writable(args.output)
+        check_outputs([args.output])
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
@@ -87,6 +87,7 @@ def run(args: argparse.Namespace) -> Figures:
         say_warning("every table is needed whole: no recipe was written")
     elif args.output is not None:
         files = recipe_files(args.output, len(limited))
+        check_outputs(files)
         for file, table in zip(files, limited, strict=True):
             recipe, comment = recipe_of(table, str(args.scene))
             recipe.save(file, comment)

@@ -14,7 +14,7 @@ from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
-from .report import Figures, check_outputs, check_writable, elapsed, plain, save_json
+from .report import Figures, check_outputs, elapsed, output_name, plain, save_json
 
 _EXPORTED = ("fast", "exact")
 
@@ -42,7 +42,7 @@ def view(args: argparse.Namespace) -> Figures:
     """Show the scene, which has no figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
-    check_writable(args.output / "view_000.png")
+    check_outputs([args.output / "view_000.png"])
     for package in ("moderngl", "moderngl_window", "imgui_bundle"):
         optional(package)
     from ..realtime.glsl.viewer import show
@@ -85,8 +85,12 @@ def compare(args: argparse.Namespace) -> Figures:
     """Compare, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
-    folder = args.output or Path(f"{args.name.stem}_compare")
-    check_writable(folder / "compare.json", make_folder=True)
+
+    def files_in(folder: Path) -> list[Path]:
+        return [folder / "compare.json", *folder.glob("*.exr"), *folder.glob("*.png")]
+
+    folder = output_name(args.output, Path(f"{args.name.stem}_compare"), files_in)
+    check_outputs(files_in(folder)[:1], make_folder=True)
 
     from ..realtime.shader_comparison.report import markdown
     from ..realtime.shader_comparison.run import Comparison
@@ -128,7 +132,7 @@ def export_viewer(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     scene_options.put_on_stage(args)
     parameters = scene_options.scene_parameters(args)
-    check_writable(args.output)
+    check_outputs([args.output])
 
     from ..realtime.web import export_viewer
 
@@ -179,8 +183,12 @@ def add_export_shader(subparsers: options.Subparsers) -> None:
 def export_shader(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     take_source(args)
-    folder = args.output or Path(f"{args.source.stem}-shader")
-    check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
+
+    def files_in(folder: Path) -> list[Path]:
+        return [folder / "constants.json", folder / "diffraction.glsl", *folder.glob("*.exr")]
+
+    folder = output_name(args.output, Path(f"{args.source.stem}-shader"), files_in)
+    check_outputs(files_in(folder)[:2], make_folder=True)
 
     from ..realtime.glsl.export import export_shader
 

@@ -33,7 +33,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
 from .observed import OBSERVER, run_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import Figures, check_writable, default_output, elapsed
+from .report import Figures, check_outputs, default_output, elapsed, output_name
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, add_workers, client_of, film_of, on_workers, say_report
 
@@ -110,6 +110,13 @@ class Outputs(NamedTuple):
     named: Path
     png: Path
 
+    @classmethod
+    def called(cls, output: Path) -> Outputs:
+        """Return the files of an output of this name."""
+        return cls(
+            output, output if output.suffix.lower() == ".png" else output.with_suffix(".png")
+        )
+
     @property
     def only_png(self) -> bool:
         """Whether no EXR is written."""
@@ -124,15 +131,20 @@ class Outputs(NamedTuple):
 
 def _outputs(args: argparse.Namespace) -> Outputs:
     """Return the files of `-o`, or of its default, after checking that they can be written."""
-    output = args.output or Path(default_output(args.name, ".exr").name)
-    if output.suffix.lower() not in (".exr", ".png"):
+    if args.output is not None and args.output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
-            f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"
+            f"argument -o: expected a name ending in .exr or .png, got {str(args.output)!r}"
         )
-    png = output if output.suffix.lower() == ".png" else output.with_suffix(".png")
-    for path in dict.fromkeys((output, png)):
-        check_writable(path)
-    return Outputs(output, png)
+    default = Path(default_output(args.name, ".exr").name)
+    output = output_name(args.output, default, partial(_files, args))
+    check_outputs(_files(args, output))
+    return Outputs.called(output)
+
+
+def _files(args: argparse.Namespace, output: Path) -> list[Path]:
+    """Return all files of an output of this name."""
+    outputs = Outputs.called(output)
+    return [*outputs, *(outputs.denoised if args.denoise else ())]
 
 
 def _on_workers(args: argparse.Namespace) -> Figures:
@@ -160,15 +172,18 @@ def _on_workers(args: argparse.Namespace) -> Figures:
 def _run_one(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
-    for path in outputs.denoised if args.denoise else ():
-        check_writable(path)
 
     def load(bar: Bar) -> Any:
         whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
         return whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
 
     variant = set_variant(args.mode)
-    check = partial(_check_colours, args, outputs.png) if outputs.only_png else None
+
+    def check(scene: Any, sensor: Any) -> None:
+        check_outputs(_files(args, outputs.named))  # of what only loading tells
+        if outputs.only_png:
+            _check_colours(args, outputs.png, scene, sensor)
+
     with mitsuba_warnings():
         scene, sensor, result = scene_options.rendered(args, variant, load, check)
         report = _finish(args, result, outputs, variant)
@@ -232,10 +247,10 @@ def _check_colours(args: argparse.Namespace, output: Path, scene: Any, sensor: A
 def _run_frames(args: argparse.Namespace) -> Figures:
     """Render the frames that are missing or outdated, then the film; return the figures."""
     folder, film = _folder_and_film(args)
-    check_writable(folder / "frame_0000.png", make_folder=True)
+    check_outputs(_files_of_frames(args, folder), make_folder=True)
     if film is not None:
         check_film(film)
-        check_writable(film)
+        check_outputs([film])
     frames = _frames(args, folder)
     reasons = {frame.png: frame.outdated(args.exr) for frame in frames}
     to_do = [frame for frame in frames if reasons[frame.png]]
@@ -289,7 +304,8 @@ def _frames_on_workers(
 
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
     """Return the folder of the frames, and the film, if there is one."""
-    output = args.output or Path(f"{args.name.stem}_frames")
+    default = Path(f"{args.name.stem}_frames")
+    output = output_name(args.output, default, partial(_files_of_frames, args))
     if output.suffix.lower() in FILMS:
         return output.with_suffix(""), output
     if output.suffix:
@@ -298,6 +314,12 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
             f"{' or '.join(FILMS)}, not {str(output)!r}"
         )
     return output, None
+
+
+def _files_of_frames(args: argparse.Namespace, folder: Path) -> list[Path]:
+    """Return the files of the frames in a folder."""
+    suffixes = (".png", ".exr") if args.exr else (".png",)
+    return [folder / f"frame_{n:04d}{s}" for n in range(args.frames) for s in suffixes]
 
 
 def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:

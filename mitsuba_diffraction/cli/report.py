@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, check_target
 from ..errors import DiffractionError
+from ..inputs import input_at
+from .console import say
 
 #: What a command measured and wrote, for --json.
 Figures = dict[str, Any]
@@ -130,17 +133,24 @@ def _text(value: Any, joint: str = " x ") -> str:
     return " ".join(str(value).split())
 
 
-def check_writable(path: Path, *, make_folder: bool = False) -> None:
-    """Refuse an output that cannot be written; no file is left behind.
+def check_outputs(outputs: Iterable[Path], *, make_folder: bool = False) -> None:
+    """Refuse outputs that cannot be written, or that would replace a file that the command reads.
 
-    path : the output.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
-    Raises a DiffractionError if the folder is missing, cannot be written or is a file, or `path` is
-    a folder.
+    Raises a DiffractionError as `atomic.check_target` does, or if the folder is missing, cannot be
+    written or is a file. No file is left behind.
     """
-    if path.is_dir():
-        raise DiffractionError(f"cannot write '{path}': it is a folder; name a file in it")
+    folders: dict[Path, Path] = {}
+    for path in outputs:
+        check_target(path)
+        folders.setdefault(path.parent, path)
+    for path in folders.values():
+        _check_folder(path, make_folder)
+
+
+def _check_folder(path: Path, make_folder: bool) -> None:
+    """Refuse an output in whose folder no file can be made."""
     folder = path.parent
     if make_folder and folder.exists() and not folder.is_dir():
         raise DiffractionError(f"cannot write to '{folder}': it is a file; name a folder")
@@ -166,20 +176,25 @@ def default_output(source: Path, suffix: str) -> Path:
     return source.with_suffix(suffix)
 
 
-def check_outputs(
-    outputs: Iterable[Path], sources: Iterable[Path], what: str, *, make_folder: bool = False
-) -> None:
-    """Refuse outputs of a command that cannot be written, or that would overwrite an input.
+def output_name(
+    given: Path | None, default: Path, files: Callable[[Path], Iterable[Path]] = lambda path: [path]
+) -> Path:
+    """Return the output that is given, or else the default name.
 
-    what : the kind of output, a word for the message.
+    A default name that would replace a file that the command reads gets a number, in one line on
+    stderr; a given one is refused by `check_outputs`.
 
-    Raises a DiffractionError as in `check_writable`, or if a source would be overwritten.
+    files : returns all files that an output of this name has.
     """
-    read = [source for source in sources if source.exists()]
-    for path in outputs:
-        for source in read:
-            if path.exists() and path.samefile(source):
-                raise DiffractionError(
-                    f"the {what} would overwrite its own source '{source}'; name another with -o"
-                )
-        check_writable(path, make_folder=make_folder)
+    if given is not None:
+        return given
+    names = (default.with_name(f"{default.stem}-{n}{default.suffix}") for n in itertools.count(2))
+    read: list[str] = []
+    for name in itertools.chain([default], names):
+        found = [source for file in files(name) if (source := input_at(file)) is not None]
+        if not found:
+            break
+        read += found
+    if read:
+        say(f"this command reads '{read[0]}', so its output is called '{name}'")
+    return name

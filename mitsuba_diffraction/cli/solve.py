@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
-from .report import Figures, check_outputs
+from .report import Figures, check_outputs, output_name
 from .solve_crossed import solve_crossed_cell
 from .workers import add_workers, executor_for
 
@@ -110,24 +110,24 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> Figures:
     """Solve, write the table, and return the figures."""
     source = Path(args.source)
-    output = args.output or Path(f"{source.stem}.nc")
+    output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
         from ..solve.measured import read_orders
 
         _check_import(args)
-        check_outputs([output], [source], "table")
+        check_outputs([output])
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable | CrossedTable = read_orders(
             source, period, superstrate=args.superstrate or 1.0
         )
     elif args.crossed:
-        check_outputs([output], [source], "table")
+        check_outputs([output])
         table = solve_crossed_cell(source, output, args)
     else:
         recipe = recipe_of(args)
         output = recipe.output
         # the folder that a recipe names is made
-        check_outputs([output], [source], "table", make_folder=args.output is None)
+        check_outputs([output], make_folder=args.output is None)
         if args.output is None:
             output.parent.mkdir(parents=True, exist_ok=True)
         table = solve_recipe(recipe, args)

@@ -32,7 +32,7 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
         args.parser.error("argument --crossed: needs --period, µm")
     cell = read_heights(
         source,
-        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="none"),
+        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="exact"),
     )
     rows, columns = cell.heights.shape
     sizes = args.period / columns, (args.period_y or args.period) / rows

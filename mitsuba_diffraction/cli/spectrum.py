@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from .brdf_map import add_surface
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, elapsed, save_figure
+from .report import Figures, check_outputs, elapsed, output_name, save_figure
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -107,27 +108,23 @@ def run(args: argparse.Namespace) -> Figures:
     groups = _groups(args)
     files = [file for members in groups.values() for file in members]
     first = next(iter(groups))
-    output = args.output or Path(f"{first or files[0].stem}-spectrum.csv")
-    written = [output, output.with_suffix(".png"), output.with_name(f"{output.stem}-colours.csv")]
-    errors = output.with_name(f"{output.stem}-errors.csv")
-    if args.observer is not None:
-        written += [output.with_name(f"{output.stem}-{name}.csv") for name in _SEEN]
-    angular = output.with_name(f"{output.stem}-iridescence.csv")
-    if args.iridescence:
-        written.append(angular)
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
-    check_outputs([*written, errors] if repeated else written, files, "spectrum")
+    default = Path(f"{first or files[0].stem}-spectrum.csv")
+    output = output_name(args.output, default, partial(_files, args, repeated))
+    check_outputs(_files(args, repeated, output))
+    written = _files(args, False, output)
+    errors, angular = _beside(output, "errors"), _beside(output, "iridescence")
     lam = _wavelengths(args)
     eye, light = _eye(args, lam)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
     from ..analysis.spectra import mean_spectra
-    from ..analysis.spectrometer import Geometry
+    from ..analysis.spectrometer import MeasurementGeometry
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
     auto = args.light_azimuth == "auto"
-    geometry = Geometry(
+    geometry = MeasurementGeometry(
         args.light, tuple(dict.fromkeys(detectors)), 0.0 if auto else args.light_azimuth,
         args.acceptance,
     )  # fmt: skip
@@ -178,6 +175,19 @@ def run(args: argparse.Namespace) -> Figures:
             "detectors": shown.geometry.detectors,
             "acceptance": args.acceptance, "relative": args.relative,
             "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
+
+
+def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]:
+    """Return the files of -o, with standard errors of `repeated` scans."""
+    names = [
+        "colours", *(_SEEN if args.observer is not None else ()),
+        *(["iridescence"] if args.iridescence else []), *(["errors"] if repeated else []),
+    ]  # fmt: skip
+    return [output, output.with_suffix(".png"), *(_beside(output, name) for name in names)]
+
+
+def _beside(output: Path, name: str) -> Path:
+    return output.with_name(f"{output.stem}-{name}.csv")
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:

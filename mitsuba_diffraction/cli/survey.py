@@ -5,17 +5,19 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..errors import DiffractionError
 from ..scene.load import set_variant
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
-from .report import Figures, check_writable, elapsed
-from .workers import THREADS, add_workers, client_of, on_workers, worker_threads
+from .report import Figures, check_outputs, elapsed, output_name
+from .workers import THREADS, add_workers, client_of, on_workers, say_files, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
 _SIZES = 1.5
@@ -30,7 +32,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
         "command then exits with 1; a second run measures only new scans.",
         options.files("scans of any format, or recipes"),
-        ("-o --output FOLDER", "", Path, Path("survey")),
+        ("-o --output FOLDER", "default: survey", Path),
         options.TREATMENTS,
         ("--theta DEG", "angle of the light from the normal, across the strongest grating",
          number_between(0, 89), 30.0),
@@ -57,7 +59,8 @@ def run(args: argparse.Namespace) -> Figures:
     try:
         rows = _measured(args)
     except KeyboardInterrupt:
-        say(f"interrupted; finished scans are in '{args.output}': run the command again to go on")
+        folder = args.output or "survey"
+        say(f"interrupted; finished scans are in '{folder}': run the command again to go on")
         args.code = INTERRUPTED
         return {}
     for row in rows:
@@ -86,10 +89,25 @@ def run(args: argparse.Namespace) -> Figures:
     return {"rows": rows, "seconds": seconds}
 
 
+def _read_by(scans: Sequence[Path]) -> Iterator[Path]:
+    """Yield the scans with the files that their recipes name; survey.csv tells of wrong recipes."""
+    from ..scene.parameters import files_of
+
+    for scan in scans:
+        with contextlib.suppress(DiffractionError):
+            yield from files_of(scan)
+
+
 def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Measure new scans, here or on workers, and return the rows of all scans."""
     own_options, settings = options.load_options(args), options.table_options(args)
-    check_writable(args.output / "survey.csv", make_folder=True)
+
+    from ..analysis.repeats import scan_files
+    from ..analysis.survey import files_in
+
+    args.files = scan_files(args.files)
+    args.output = output_name(args.output, Path("survey"), files_in)
+    check_outputs(files_in(args.output), make_folder=True)
 
     from ..analysis.known_wavelengths import known_range
     from ..analysis.media import medium_index
@@ -107,6 +125,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
             from ..cluster.workers import check_workers
 
             check_workers(client, variant)
+            say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(
             args.files, args.output, treatments=treatments,

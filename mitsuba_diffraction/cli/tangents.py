@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between, path_ending_in
-from .report import Figures, check_writable
+from .report import Figures, check_outputs
 
 if TYPE_CHECKING:
     from ..scene.orientation.tangents import TangentReport
@@ -40,7 +40,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> Figures:
     """Write the mesh, say where its field is singular, and return the figures."""
-    check_writable(args.output)
+    check_outputs([args.output])
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.mesh_files import load_mesh, write_ply
     from ..scene.orientation.tangents import BREAK, check_tangents

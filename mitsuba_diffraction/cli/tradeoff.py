@@ -13,7 +13,7 @@ from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
-from .report import Figures, check_writable, save_json
+from .report import Figures, check_outputs, output_name, save_json
 
 
 class Effort(NamedTuple):
@@ -37,7 +37,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "integral in double precision, the colours' ΔE2000, the time of eval beside "
         "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
         "error against time, and one of error against depth; recommends a setting.",
-        ("-o --output FOLDER", "where files go", Path, Path("tradeoff")),
+        ("-o --output FOLDER", "where files go; default: tradeoff", Path),
         ("--quick", "fewer settings, a smaller patch", bool),
     )  # fmt: skip
     options.add_table(parser, ["coherence_width"])
@@ -60,7 +60,8 @@ def run(args: argparse.Namespace) -> Figures:
     """Measure, write and recommend, and return the figures."""
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
-    check_writable(args.output / "tradeoff.json", make_folder=True)
+    args.output = output_name(args.output, Path("tradeoff"), _files_in)
+    check_outputs(_files_in(args.output), make_folder=True)
     from ..analysis.machine import describe_machine
     from ..analysis.timing import PIXEL
     from ..analysis.tradeoff import (
@@ -120,6 +121,11 @@ def run(args: argparse.Namespace) -> Figures:
     print("\n".join(lines(results, spectral, best, _budget(args))))
     print(f"wrote {args.output / 'tradeoff'}.json, .csv, .png and depth.png")
     return document
+
+
+def _files_in(folder: Path) -> list[Path]:
+    names = ("tradeoff.json", "tradeoff.csv", "tradeoff.png", "depth.png")
+    return [folder / name for name in names]
 
 
 def _budget(args: argparse.Namespace) -> dict[str, float | None]:

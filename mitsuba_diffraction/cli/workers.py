@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import importlib.util
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from .options import add_options, refuse, whole_number
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from ..cluster.frames import Film, FrameRequest
+    from ..cluster.frames import FrameRequest, FrameSequence
 
 #: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
@@ -72,19 +72,30 @@ def client_of(args: argparse.Namespace) -> Iterator[Any]:
 
 def film_of(
     args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
-) -> Film:
+) -> FrameSequence:
     """Return the renderer of the command's frames on workers."""
-    from ..cluster.frames import Film
+    from ..cluster.frames import FrameSequence
 
-    film = Film(
+    film = FrameSequence(
         client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
         preview=args.preview, threads=worker_threads(args),
     )  # fmt: skip
+    say_files(path for task in film.frames for path, _ in task.files.files)
     say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
     return film
 
 
-def say_report(film: Film) -> dict[str, Any]:
+def say_files(files: Iterable[str | os.PathLike[str]]) -> None:
+    """Print the files that are sent to workers without them, before the first is sent."""
+    here = Path.cwd()
+    names = []
+    for file in sorted({Path(os.path.abspath(file)) for file in files}):
+        inside = file.is_relative_to(here)
+        names.append(str(file.relative_to(here) if inside else file))
+    say(f"files for workers that lack them: {', '.join(names)}")
+
+
+def say_report(film: FrameSequence) -> dict[str, Any]:
     """Print the workers' statistics in a line, and return them as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} stored before" if report["kept"] else ""

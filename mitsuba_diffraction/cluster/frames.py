@@ -71,7 +71,7 @@ def render(
     """
     name = set_variant(variant)
     with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
-        film = Film(
+        film = FrameSequence(
             client, Path(scene), [FrameRequest(dict(parameters or {}), spp, seed)], name,
             keep=Path(keep or Path(temporary) / "passes"), warn=warn, sensor=sensor,
             preview=preview, threads=threads,
@@ -91,7 +91,7 @@ class FrameRequest:
     seed: int
 
 
-class Film:
+class FrameSequence:
     """Frames of one scene, from workers.
 
     Raises a DiffractionError if the scene cannot be loaded, or a worker is of no use.

@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import DiffractionError
+from ..limits import MOST_PIXELS
 from .lengths import LONGEST_HEIGHT, PixelSize, pixel_size_of
 
 FloatArray = npt.NDArray[np.float64]
 
-# 16384² pixels, 2 GiB of heights: beyond it no table could be built in the memory of a workstation.
-MAX_PIXELS = 2**28
 #: Statistics of fields with more than LARGE pixels are summed over blocks of ROWS rows.
 LARGE, ROWS = 2**25, 256
 
@@ -191,10 +190,10 @@ def check_pixel_count(ny: int, nx: int, name: str) -> None:
     """Refuse a shape that is too small or too large, before memory is allocated for it."""
     if ny < 2 or nx < 2:
         raise DiffractionError(f"{name}: {nx} x {ny} pixels are too few; at least 2 x 2 are needed")
-    if ny * nx > MAX_PIXELS:
+    if ny * nx > MOST_PIXELS:
         raise DiffractionError(
-            f"{name}: {nx} x {ny} pixels are more than the {MAX_PIXELS} that are supported "
-            f"(about {math.isqrt(MAX_PIXELS)}²); crop the file or use coarser pixels"
+            f"{name}: {nx} x {ny} pixels are more than the {MOST_PIXELS} that are supported "
+            f"(about {math.isqrt(MOST_PIXELS)}²); crop the file or use coarser pixels"
         )
 
 

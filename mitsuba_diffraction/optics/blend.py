@@ -18,7 +18,7 @@ The term with R₀ is the first correction to B, of order (κσ)², in the local
 for a sinusoid's first order. On a metal K and B differ by the facet's tilt alone, and the
 correction halves the errors of either polarisation on gentle aluminium at normal incidence. On a
 dielectric K and B also differ by Brewster's angle: in oblique light K is so far off that even a
-small share of it increases the error. R₀ makes the correction small there. The band and the fourth
+small share of K increases the error. R₀ makes the correction small there. The band and the fourth
 power are chosen by rigorous solutions (docs/validation.md).
 """
 

@@ -17,7 +17,7 @@ directions,
 For a flat structure this sum is exact. It is reciprocal. By the second term T G ρ is at most 1 in
 either direction, so a coated structure never reflects more than it receives while the structure
 reflects no more than a flat one. Light that the structure sends beyond the critical angle is lost,
-although the face returns all of it and some leaves in the end (docs/validation/layers.md).
+although the face returns this light and some leaves in the end (docs/validation/layers.md).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .fresnel import Index, amplitudes
 Powers = tuple[Number, Number]
 
 
-class Crossing(NamedTuple):
+class FaceCoefficients(NamedTuple):
     """Face of a coat, as light of one direction sees it from either side.
 
     Attributes
@@ -58,13 +58,13 @@ def refracted(direction: Direction, n: Number) -> Direction:
 
 
 @formula
-def crossing(cosine: Number, n: Number) -> Crossing:
+def crossing(cosine: Number, n: Number) -> FaceCoefficients:
     """Return T_s, T_p, r_s and r_p of a face, for the cosine of the angle outside."""
     xp = of(cosine, n)
     inside = xp.sqrt(xp.maximum(cosine * cosine + (n * n - 1.0), 0.0))
     outside, steep = 4.0 * cosine * inside, n * n * cosine
     over_s, over_p = xp.reciprocal(inside + cosine), xp.reciprocal(steep + inside)
-    return Crossing(
+    return FaceCoefficients(
         outside * (over_s * over_s),
         n * n * outside * (over_p * over_p),
         (cosine - inside) * over_s,
@@ -85,7 +85,9 @@ def face_transmittance(cosine: Number, n: Number) -> Number:
     return 0.5 * (s + p)
 
 
-def passed_powers(geometry: Geometry, index: Index, came: Crossing, left: Crossing) -> list[Number]:
+def passed_powers(
+    geometry: Geometry, index: Index, came: FaceCoefficients, left: FaceCoefficients
+) -> list[Number]:
     """Return T T G of the entries of a Jones matrix; arguments as for `transmitted`."""
     xp = of(*came, *left)
     ends = []
@@ -110,7 +112,7 @@ def _passed(into: tuple[Number, ...], out: tuple[Number, ...]) -> Number:
 
 
 def transmitted(
-    jones: Jones, geometry: Geometry, index: Index, came: Crossing, left: Crossing
+    jones: Jones, geometry: Geometry, index: Index, came: FaceCoefficients, left: FaceCoefficients
 ) -> Jones:
     """Return √(T T G) J, the structure's matrix as seen from outside of the coat.
 
@@ -126,7 +128,7 @@ def transmitted(
 
 
 def coated_power(
-    jones: Jones, geometry: Geometry, index: Index, came: Crossing, left: Crossing
+    jones: Jones, geometry: Geometry, index: Index, came: FaceCoefficients, left: FaceCoefficients
 ) -> Number:
     """Return N' outside of the coat, the `boundary.power` of `transmitted` without its roots."""
     ss, sp, ps, pp = passed_powers(geometry, index, came, left)

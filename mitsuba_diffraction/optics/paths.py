@@ -21,6 +21,7 @@ from .blend import Real
 from .boundary import Direction, Heights, Jones
 from .coat import crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
+from .mirror import grazing_slope, horizon_correction, mirror
 from .stack import Stacked
 
 
@@ -126,10 +127,7 @@ class Path:
         All cosines broadcast; heights : of the model's, None if it does not depend on them.
         """
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
-        sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
-        wi = sin_i, np.zeros_like(sin_i), cos_i
-        wo = sin_o * cos_turn, sin_o * np.sqrt(1.0 - cos_turn**2), cos_o
-        pair, jones = self._jones(wi, wo, heights)
+        pair, jones = self._jones(*directions(cos_i, cos_o, cos_turn), heights)
         return np.asarray(boundary.power(jones) / (2.0 * pair.cos_i * pair.cos_o) ** 2)
 
     def _jones(
@@ -170,17 +168,42 @@ class Path:
         came, left = (through.flat_transmittances(cosine, n, self.thin) for cosine in outer)
         return 0.5 * (np.sqrt(came[0] * left[0]) + np.sqrt(came[1] * left[1]))
 
-    def face_reflectance(self, cos_i: Real, cos_o: Real, cos_turn: Real | float = -1.0) -> Real:
-        """Return G of the flat face of a sheet or a coat for light that it reflects outside."""
-        face = Path(None, "kirchhoff")
-        total = np.hypot(face.tangential(cos_i, cos_o, cos_turn), face.width(cos_i, cos_o))
-        shares = reflectance(0.5 * total, self.came.at_structure)  # at ωi + ωo
-        return np.asarray(face.common(cos_i, cos_o, cos_turn) * shares)
+    def mirrored(
+        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, sharpness: float
+    ) -> tuple[Real, Real]:
+        """Return G of order 0 that is reflected, and of the flat face of a sheet or a coat.
+
+        sharpness : √(kσ₀) in the medium that directions are measured in.
+        """
+        cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
+        sharp, none = np.full_like(cos_i, sharpness), np.zeros_like(cos_i)
+        if self.index is None:
+            return horizon_correction(cos_i, cos_o, sharp, none), none
+        wi, wo = directions(cos_i, cos_o, cos_turn)
+        pair, n = boundary.geometry(wi, wo), np.asarray(self.came.at_structure)
+        if not self.thin:
+            slope = grazing_slope(self.index, np.asarray(sharpness)) + none
+            share = reflectance(pair.cos_half, self.index)
+            return share * horizon_correction(cos_i, cos_o, sharp, slope), none
+        slope = grazing_slope(n, np.asarray(sharpness)) + none
+        face = reflectance(pair.cos_half, n) * horizon_correction(cos_i, cos_o, sharp, slope)
+        inside = boundary.geometry(refracted(wi, n), refracted(wo, n))
+        ends = (crossing(direction[2], n) for direction in (wi, wo))
+        jones = transmitted(mirror(inside, self.index), inside, self.index, *ends)
+        share = boundary.power(jones) * horizon_correction(cos_i, cos_o, sharp, none)
+        return share, face
 
     @property
     def _real(self) -> float:
         assert isinstance(self.index, (int, float))  # light is let through dielectrics alone
         return float(self.index)
+
+
+def directions(cos_i: Real, cos_o: Real, cos_turn: Real) -> tuple[Direction, Direction]:
+    """Return unit vectors of these cosines, of one shape, and of the azimuth between them."""
+    sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
+    across = np.sqrt(np.maximum(1.0 - cos_turn**2, 0.0))
+    return (sin_i, np.zeros_like(sin_i), cos_i), (sin_o * cos_turn, sin_o * across, cos_o)
 
 
 @dataclass(frozen=True)
@@ -205,3 +228,9 @@ class Returned(Path):
             passed = transmittances(np.asarray(cosine), self.sheet)
             shares.append(0.5 * sum(t * (1.0 - t) / (2.0 - t) for t in passed))
         return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)
+
+    def mirrored(
+        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, sharpness: float
+    ) -> tuple[Real, Real]:
+        share = self.common(cos_i, cos_o, cos_turn)
+        return share, np.zeros_like(share)

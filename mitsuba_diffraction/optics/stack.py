@@ -43,12 +43,19 @@ def amplitudes(
     r_s = r_p = np.zeros((1, 1), complex)
     for layer in range(len(epsilons) - 1):
         (below, q), (above, up) = ((epsilons[n], normals[n]) for n in (layer, layer + 1))
-        face_s, face_p = (up - q) / (up + q), (below * up - above * q) / (below * up + above * q)
+        face_s, face_p = _face(up, q), _face(below * up, above * q)
         if layer:
             there = np.exp(2j * wavenumber * thicknesses[layer - 1] * q)
             r_s, r_p = r_s * there, r_p * there
         r_s, r_p = (face_s + r_s) / (1.0 + face_s * r_s), (face_p + r_p) / (1.0 + face_p * r_p)
     return r_s, r_p
+
+
+def _face(first: Complex, second: Complex) -> Complex:
+    """Return (a − b)/(a + b), a face's amplitude; 0 where nothing changes, though both are 0."""
+    total = first + second
+    none = total == 0.0
+    return np.asarray(np.where(none, 0.0, (first - second) / np.where(none, 1.0, total)))
 
 
 def mean_powers(

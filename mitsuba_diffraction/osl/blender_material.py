@@ -115,8 +115,15 @@ def check_blender() -> None:
 
 
 def read_folder(folder: Path) -> dict[str, Any]:
-    """Return the document of an exported folder, with absolute paths of its files."""
-    documents = sorted(file for file in folder.glob("*.json") if file.with_suffix(".osl").exists())
+    """Return the document of an exported folder, with absolute paths of its files.
+
+    Raises a MaterialError if the folder is not one, or names files elsewhere.
+    """
+    documents = sorted(
+        file
+        for file in folder.glob("*.json")
+        if _is_own(file) and _is_own(file.with_suffix(".osl"))
+    )
     if len(documents) != 1:
         raise MaterialError(
             f"expected one shader (.osl with .json) in '{folder}', got {len(documents)}; name the "
@@ -124,19 +131,33 @@ def read_folder(folder: Path) -> dict[str, Any]:
         )
     try:
         exported = json.loads(documents[0].read_text(encoding="utf-8"))
-        exported["shader"] = (folder / exported["shader"]).resolve()
+        exported["shader"] = _file(folder, exported["shader"], ".osl")
         exported["textures"] = {
-            key: (folder / file).resolve() for key, file in exported["textures"].items()
+            key: _file(folder, name, ".exr") for key, name in exported["textures"].items()
         }
         inputs = [(entry["identifier"], entry["label"]) for entry in exported["inputs"]]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise MaterialError(
             f"cannot read '{documents[0]}' ({error}); export the shader again"
         ) from error
-    missing = [file for file in exported["textures"].values() if not file.exists()]
-    if missing or not inputs:
-        raise MaterialError(f"'{folder}' is incomplete; export the shader again")
+    files = [exported["shader"], *exported["textures"].values()]
+    if not inputs or not all(map(_is_own, files)):
+        raise MaterialError(
+            f"'{folder}' is incomplete, or has links in place of files; export the shader again"
+        )
     return dict(exported)
+
+
+def _file(folder: Path, name: str, suffix: str) -> Path:
+    """Return the path of a file that the document names; only names in its folder are allowed."""
+    if Path(name).name != name or Path(name).suffix != suffix:
+        raise ValueError(f"{name!r} is no name of a file *{suffix} in this folder")
+    return folder.resolve() / name
+
+
+def _is_own(file: Path) -> bool:
+    """Return whether a path is a regular file, and no link to one elsewhere."""
+    return file.is_file() and not file.is_symlink()
 
 
 def own_data(blocks: Any, name: str, shader: Path, *kind: str) -> Any:

@@ -94,7 +94,7 @@ class Exported:
 
 
 @dataclass(frozen=True)
-class Shader:
+class OslShader:
     """Shader of a surface before it is written.
 
     Attributes
@@ -170,7 +170,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     return exported
 
 
-def check_name(name: str, shader: Shader) -> None:
+def check_name(name: str, shader: OslShader) -> None:
     """Refuse a name that a shader cannot have.
 
     Raises a DiffractionError if it is no identifier, or a word of OSL or of the shader's source.
@@ -186,16 +186,16 @@ def check_name(name: str, shader: Shader) -> None:
         )
 
 
-def shader_of(described: Surface) -> Shader:
+def shader_of(described: Surface) -> OslShader:
     """Return the shader of a surface that `OSL` shows."""
     orders = described.orders
     placed = {"Rotation": described.orientation.number, "Pigment": pigment_of(described)}
     return _patch(described, placed) if orders is None else _orders(described, orders, placed)
 
 
-def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> Shader:
+def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> OslShader:
     texture = order_texture(table)
-    return Shader(
+    return OslShader(
         "orders.osl",
         order_formulas(),
         order_constants(table, texture),
@@ -207,7 +207,7 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
     )
 
 
-def _patch(described: Surface, placed: Mapping[str, Any]) -> Shader:
+def _patch(described: Surface, placed: Mapping[str, Any]) -> OslShader:
     table = described.patch
     textures = patch_textures(table)
     index = None if described.index is None else described.index(drawn_spectrum().wavelengths)
@@ -230,7 +230,7 @@ def _patch(described: Surface, placed: Mapping[str, Any]) -> Shader:
         constants |= energy.constants
         files["EnergyFile"] = energy.pixels
     constants["PIGMENT_SHARE"] = mean_transmittance(index, described.coat)
-    return Shader(
+    return OslShader(
         "patch.osl",
         patch_formulas(model, described.coat is not None),
         constants,
@@ -300,7 +300,7 @@ def _reflectance(
     return np.concatenate(parts)
 
 
-def _source(shader: Shader, sockets: Sequence[Socket], name: str) -> str:
+def _source(shader: OslShader, sockets: Sequence[Socket], name: str) -> str:
     """Return the source of a shader: constants, the shared functions, and its own."""
     spectrum = drawn_spectrum()
     arrays = [array_parameter("float", "Wavelengths", spectrum.wavelengths)]

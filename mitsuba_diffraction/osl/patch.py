@@ -18,7 +18,7 @@ from ..tables.table import DiffractionTable
 
 #: Nodes of an interval of κ, Chebyshev's of the first kind on 0 to 1, in the channels of a pixel.
 NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
-#: Phase (rad) of the highest over the deepest point that an interval of κ spans: a cosine of it is
+#: Phase (rad) of the highest over the deepest point that an interval of κ spans: its cosine is
 #: off by 0.003.
 _PHASE = 2.0
 #: Orders drawn in a sample, each of a wavelength.
@@ -168,6 +168,7 @@ def patch_constants(
     statistic : of the heights, see `boundary.Model`.
     """
     rows, columns = table.grid.shape
+    limit = table.settings.window_width or _UNLIMITED
     return {
         "DRAWS": DRAWS,
         "ORDERS": rows * columns,
@@ -186,7 +187,8 @@ def patch_constants(
         "DRAWS_ROWS": textures.rows,
         "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
-        "SCAN_WIDTH": table.settings.window_width or _UNLIMITED,
+        "SCAN_WIDTH": table.window_width if table.inverse_taper else limit,
+        "INVERSE_TAPER": table.inverse_taper,
         "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},

@@ -19,7 +19,7 @@ _STEP = 0.25
 _IMPORTANCE = (0.3, 0.5, 0.2)
 
 
-class Spectrum(NamedTuple):
+class WavelengthSampling(NamedTuple):
     """Wavelengths at even steps of a random number u from 0 to 1, and their weights.
 
     Attributes
@@ -33,7 +33,7 @@ class Spectrum(NamedTuple):
     colours: dict[str, NDArray[np.float64]]
 
 
-def drawn_spectrum() -> Spectrum:
+def drawn_spectrum() -> WavelengthSampling:
     """Tabulate wavelengths and weights under daylight."""
     lam = np.arange(ENDS[0] + 0.5 * _STEP, ENDS[1], _STEP)
     exact = {
@@ -45,7 +45,7 @@ def drawn_spectrum() -> Spectrum:
     cumulative /= cumulative[-1]
     u = np.linspace(0.0, 1.0, NODES)
     wavelengths = np.interp(u, cumulative, np.append(lam - 0.5 * _STEP, ENDS[1]))
-    return Spectrum(
+    return WavelengthSampling(
         wavelengths, {space: _weights(u, cumulative, values) for space, values in exact.items()}
     )
 

@@ -6,7 +6,7 @@ diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/p
 diffraction_dielectric  the plugin `diffraction_dielectric`, which lets light through as well
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
-depth_weights   its weights by the depth of solved gratings
+weights         its weights, given or by the depth of solved gratings
 base            `PluginBSDF`, answers, parameters and their changes; `SurfaceBSDF`, the one `sample`
 surface         `DiffractingSurface`, a table with factors, orientation and power
 description     record of a surface that shaders, OSL, maps and plans read
@@ -18,6 +18,7 @@ parameter_changes  changeable parameters, their checks; what `dr.freeze` must kn
 sources         table of a scene's heights, recipe or file, built once
 presets         named looks: a patch with its material and layers, by name
 registration    registration of the plugins in every variant
+installed       Mitsuba's own plugins and tables, before files of the same names beside a scene
 dictionary      `bsdf_dict`: from arrays
 directions      pairs of directions in the patch's frame: above, in a coat, below, through
 boundary        reflected amplitude of the material, with its polarisation
@@ -40,3 +41,5 @@ memory          arrays in the variant's memory, and reading them
 loops           sums in a loop inside a kernel, which derivatives pass
 types           names of the types of arguments
 """
+
+import mitsuba  # noqa: F401 - before the modules here: the import registers them (`when_imported`)

@@ -247,7 +247,7 @@ class SurfaceBSDF(PluginBSDF):
         if diffracts:
             value, density = self.diffracted(ctx, site, wo, active, kinds)
         if nested is not None:
-            below = ask(self.nested, nested, site.si, wo, active, kinds)
+            below = ask(self.nested, nested, site.nested_si, wo, active, kinds)
             if "v" in kinds:
                 value += mi.Spectrum(self.beneath(site, wo, active)) * _valid(below[0])
             if "d" in kinds:

@@ -4,12 +4,14 @@ The formulas are `optics.boundary.MODELS`. With J' = 2 cosθi cosθo J,
 
     f cosθo = N' / (λ² A w² cosθi) · ⟨|P|²⟩,   N' = ½ Σ|J'|²,
 
-and in polarised variants the Mueller matrix of J' takes the place of N'.
+and in polarised variants the Mueller matrix of J' takes the place of N'. Order 0 has the factor
+`Boundary.mirror` in place of N'/(w² cosθi cosθo).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -27,7 +29,9 @@ from ..optics.boundary import (
     model_of,
     power,
 )
-from ..optics.coat import Crossing, coated_power, crossing, transmitted
+from ..optics.coat import FaceCoefficients, coated_power, crossing, transmitted
+from ..optics.fresnel import reflectance
+from ..optics.mirror import grazing_slope, horizon_correction, mirror
 from .arithmetic import clip, index_of, maximum
 from .directions import CoatedPair, Pair, TablePoint
 from .materials import Material, Perfect
@@ -100,23 +104,61 @@ class Boundary:
         light = LightPath.of(pair, mode)
         indices = self.material.indices(si, active)
         heights = self.heights(pair, height_scale, self.material.wavenumbers(wavenumbers))
-        if len(indices) == 1:  # one index at all wavelengths
-            indices = indices * len(heights)
-        elif len(heights) == 1:
-            heights = heights * len(indices)
-        channels = list(zip(indices, heights, strict=True))
+        channels = _side_by_side(indices, heights)
         if self.model.power is not None and not (mi.is_polarized or light.passed):
-            powers = [self.model.power(light.pair, index) for index in indices]
+            powers = [self.model.power(light.pair, index) for index, _ in channels]
             return self.material.channels(powers)
         matrices = [self.model.jones(light.pair, *channel) for channel in channels]
+        return self._of_matrices(light, matrices, [index for index, _ in channels])
+
+    def mirror(
+        self,
+        pair: Pair,
+        wavenumbers: list[Float],
+        sigma_0: Float,
+        si: Interaction,
+        active: Mask,
+        mode: mi.TransportMode,
+    ) -> Spectrum:
+        """Return N_0 C(X_i) C(X_o) of eq. 10, or its Mueller matrix, for each channel.
+
+        sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `factor`.
+        """
+        ends, width = (pair.outer.cos_i, pair.outer.cos_o), sigma_0 * pair.outer.medium
+        sharpness = [dr.sqrt(k * width) for k in self.material.wavenumbers(wavenumbers)]
+        if isinstance(self.material, Perfect):
+            visible = [horizon_correction(*ends, each, mi.Float(0.0)) for each in sharpness]
+            return mi.depolarizer(mi.UnpolarizedSpectrum(visible))
+        light = LightPath.of(pair, mode)
+        channels = _side_by_side(self.material.indices(si, active), sharpness)
+        slopes = [mi.Float(0.0) if light.passed else grazing_slope(*each) for each in channels]
+        visible = [
+            horizon_correction(*ends, sharp, slope)
+            for (_, sharp), slope in zip(channels, slopes, strict=True)
+        ]
+        if not (mi.is_polarized or light.passed):
+            cosine = light.pair.cos_half
+            powers = [reflectance(cosine, index) for index, _ in channels]
+            return self.material.channels([p * c for p, c in zip(powers, visible, strict=True)])
+        matrices = []
+        for (index, _), factor in zip(channels, visible, strict=True):
+            root = dr.sqrt(factor)
+            matrices.append(tuple(entry * root for entry in mirror(light.pair, index)))
+        return self._of_matrices(light, matrices, [index for index, _ in channels])
+
+    def _of_matrices(
+        self, light: LightPath, matrices: list[Jones], indices: list[Number]
+    ) -> Spectrum:
+        """Return ½ Σ|J|² outside of a coat, or the Mueller matrix, for each channel."""
+        results: list[Any] = matrices
         if light.passed:
             outside = transmitted if mi.is_polarized else coated_power
             results = [
                 outside(jones, light.pair, index, *light.passed)
                 for jones, index in zip(matrices, indices, strict=True)
             ]
-        else:
-            results = matrices if mi.is_polarized else [power(jones) for jones in matrices]
+        elif not mi.is_polarized:
+            results = [power(jones) for jones in matrices]
         return light.mueller(results) if mi.is_polarized else self.material.channels(results)
 
     def heights(
@@ -139,6 +181,13 @@ def boundary_of(model: str, material: Material, roughness: RoughnessTable) -> Bo
     return Boundary(chosen, material, HeightStatistic(chosen.statistic(roughness)))
 
 
+def _side_by_side(indices: list[Number], others: list[Any]) -> list[tuple[Number, Any]]:
+    """Return pairs of each channel, where either list may hold one value for all."""
+    count = max(len(indices), len(others))
+    both = (values * count if len(values) == 1 else values for values in (indices, others))
+    return list(zip(*both, strict=True))
+
+
 @dataclass(frozen=True)
 class LightPath:
     """Light along −ω0, then along ω, for Jones matrices.
@@ -154,7 +203,7 @@ class LightPath:
     pair: Geometry
     ends: tuple[Vector3f, Vector3f]
     above: bool
-    passed: tuple[Crossing, ...]
+    passed: tuple[FaceCoefficients, ...]
 
     @classmethod
     def of(cls, pair: Pair, mode: mi.TransportMode) -> LightPath:
@@ -164,7 +213,7 @@ class LightPath:
         ends, cosines = [outer.wi, outer.wo], [outer.cos_i, outer.cos_o]
         if mode != mi.TransportMode.Importance:
             inner, ends, cosines = inner[::-1], ends[::-1], cosines[::-1]
-        passed: tuple[Crossing, ...] = ()
+        passed: tuple[FaceCoefficients, ...] = ()
         if isinstance(pair, CoatedPair):
             passed = tuple(crossing(cosine, pair.n) for cosine in cosines)
         side = mi.Vector3f(1.0, 1.0, 1.0 if outer.above else -1.0)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..columns import read_columns
 from ..errors import DiffractionError
-from ..optics.colour import LONGEST, SHORTEST
 from ..optics.materials import METALS, TISSUES
+from . import installed
 from .parameter_changes import children
 from .types import Texture
 
@@ -35,17 +35,20 @@ def unknown_conductor(material: str) -> str:
 
 def _names() -> list[str]:
     """Return names of tabulated conductors, without second entries from Palik's table."""
-    folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    names = _tabulated()
     return sorted(
         (name for name in names if name.removesuffix("_palik") not in names - {name}),
         key=str.lower,
     )
 
 
+def _tabulated() -> set[str]:
+    return {file.name.removesuffix(".eta.spd") for file in _folder().glob("*.eta.spd")}
+
+
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of a material's table, if there is one."""
-    if material not in TISSUES and not (material and _file(material, "eta").is_file()):
+    if material not in TISSUES and material not in _tabulated():
         return None
     nodes, _ = _table(material, "eta")
     return float(nodes[0]), float(nodes[-1])
@@ -63,6 +66,10 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
     return nodes, np.asarray(eta + 1j * k)
 
 
+#: Wavelengths, nm, between which spectra are constant beyond their nodes.
+_ENDS = 100.0, 10000.0
+
+
 def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     """Return a number over wavelength as a texture, constant beyond its nodes (nm).
 
@@ -72,7 +79,7 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
         value = float(np.interp(wavelength, nodes, values))
         return mi.load_dict({"type": "uniform", "value": value})
     # Mitsuba has 0 beyond
-    ends = np.union1d(nodes, [x for x in (SHORTEST, LONGEST) if not nodes[0] <= x <= nodes[-1]])
+    ends = np.union1d(nodes, [x for x in _ENDS if not nodes[0] <= x <= nodes[-1]])
     extended = np.interp(ends, nodes, values)
     if mi.is_spectral:
         lists = (", ".join(map(str, numbers.tolist())) for numbers in (ends, extended))
@@ -96,9 +103,9 @@ def _table(material: str, name: str) -> Array:
         index = tissue.index(tissue.nodes)
         return np.stack([tissue.nodes, index.real if name == "eta" else index.imag])
     what = "wavelengths in nm and values"
-    return read_columns(_file(material, name)).finite((0, 1), what).T
+    return read_columns(_folder() / f"{material}.{name}.spd").finite((0, 1), what).T
 
 
-def _file(material: str, name: str) -> Path:
-    """Return the path of Mitsuba's table of a part of a material's index."""
-    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))
+def _folder() -> Path:
+    """Return the folder of Mitsuba's own tables of optical constants."""
+    return installed.folder() / "data" / "ior"

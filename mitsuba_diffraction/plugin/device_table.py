@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.layout import Record
+from ..tables.layout import BinRecord
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
@@ -25,7 +25,7 @@ from .loops import sum_of
 from .memory import index_between, once_a_table, packet_size, read_packets, upload, zero_packets
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
-from .window_positions import Window
+from .window_positions import PlacedWindow
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
@@ -49,7 +49,7 @@ class DeviceTable:
         self.expansion, self.grid = table.expansion, table.grid
         self.spacing, self.limited = table.spacing, table.limited
         self.radii, self.q_limit = table.frequency_limit, table.q_limit
-        self.record = Record.aligned(*table.coefficients.shape[3:])
+        self.record = BinRecord.aligned(*table.coefficients.shape[3:])
         self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
         # order 0's lobe is that of a window `order_0_ratio` times as large in area
@@ -66,10 +66,19 @@ class DeviceTable:
         self.series = series_of(table)
         self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
-    def window_sum(
-        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[Window] = ()
-    ) -> Float:
-        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
+    def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
+        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
+        others, zeroth, *cosine = self.window_sums(qx, qy, kappa)
+        return (
+            others + zeroth + sum(2.0 * each * dr.sqrt(others) * dr.sqrt(zeroth) for each in cosine)
+        )
+
+    def window_sums(
+        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[PlacedWindow] = ()
+    ) -> list[Float]:
+        """Return the sum under the window of all orders but 0, and of order 0 (`window_sum`).
+
+        Where amplitudes add up, a third value is the cosine of the phase between both.
 
         qx, qy, kappa : mi.Float, rad/µm. Frequencies that light cannot probe give NaN; those
             beyond the `frequency_limit` of a table give 0.
@@ -86,34 +95,38 @@ class DeviceTable:
         if self._ratio != 1.0:
             lobe *= self._ratio
 
-        if windows:
-            total = self._over_windows(first, across, along, weights, windows)
-            parts = [
-                dr.fma(lobe, c, part * self._inverse_scale)
-                for c, part in zip(order_0, total, strict=True)
-            ]
-            result = dr.square(parts[0]) + dr.square(parts[1])
-        elif self.record.components == 2 and not grid.coherent:
-            nothing = [mi.Float(0.0)]
-            total = self._over_taps(first, across, along, nothing, self._squares, weights)[0]
-            power = sum((dr.square(c) for c in order_0), mi.Float(0.0))
-            result = dr.fma(lobe, power, total * self._inverse_scale**2)
-        else:
-            nothing = zero_packets(self.record.numbers)
-            packets = self._over_taps(first, across, along, nothing, lambda packets, _: packets, [])
-            parts = [
-                dr.fma(lobe, c, inner(part, weights) * self._inverse_scale)
-                for c, part in zip(order_0, self._components(packets), strict=True)
-            ]
-            if grid.coherent:
-                result = dr.square(parts[0]) + dr.square(parts[1])
+        if windows or grid.coherent:
+            if windows:
+                total = self._over_windows(first, across, along, weights, windows)
             else:
-                result = maximum(parts[0], 0.0)  # a cut series may dip below zero by its error
+                packets = self._summed_packets(first, across, along)
+                total = [inner(part, weights) for part in self._components(packets)]
+            centre = [lobe * c for c in order_0]
+            rest = [part * self._inverse_scale for part in total]
+            others, zeroth = (dr.square(x) + dr.square(y) for x, y in (rest, centre))
+            both = rest[0] * centre[0] + rest[1] * centre[1]
+            lengths = [dr.rsqrt(maximum(each, 1e-30)) for each in (others, zeroth)]
+            cosine = [both * lengths[0] * lengths[1]]
+        else:
+            if self.record.components == 2:
+                nothing = [mi.Float(0.0)]
+                total = self._over_taps(first, across, along, nothing, self._squares, weights)
+                others = total[0] * self._inverse_scale**2
+            else:
+                (terms,) = self._components(self._summed_packets(first, across, along))
+                others = inner(terms, weights) * self._inverse_scale
+                others = maximum(others, 0.0)  # a cut series may dip below zero by its error
+            zeroth, cosine = lobe * self._order_0_power(order_0), []
         outside = dr.nan
         if self.limited:
             outside = dr.select(within(qx, qy, (self.q_limit, self.q_limit)), 0.0, dr.nan)
             outside = dr.select(kappa <= expansion.kappa_max * (1 + 1e-6), outside, dr.nan)
-        return dr.select(inside, result, outside)
+        return [dr.select(inside, others, outside), dr.select(inside, zeroth, 0.0), *cosine]
+
+    def _summed_packets(self, first: Index, across: Gaussians, along: Gaussians) -> list[Packet]:
+        """Return the terms of all taps, summed with their weights."""
+        nothing = zero_packets(self.record.numbers)
+        return self._over_taps(first, across, along, nothing, lambda packets, _: packets, [])
 
     def first_bin(self, qx: Float, qy: Float, kappa: Float) -> Index:
         """Index of the first bin that `window_sum` reads (for benchmarks)."""
@@ -124,12 +137,11 @@ class DeviceTable:
         """Numbers of the bin with this index, in packets."""
         return read_packets(self._coefficients, index, self.record.numbers)
 
-    def order_0(self, kappa: Float) -> Float:
-        """|a_0(κ)|², the power of order 0."""
-        parts = self.series.at(kappa).order_0
+    def _order_0_power(self, order_0: list[Float]) -> Float:
+        """Return |a_0|² from the series' values."""
         if self.record.components == 2:
-            return dr.square(parts[0]) + dr.square(parts[1])
-        return maximum(parts[0], 0.0)
+            return dr.square(order_0[0]) + dr.square(order_0[1])
+        return maximum(order_0[0], 0.0)
 
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
         """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
@@ -170,7 +182,7 @@ class DeviceTable:
         across: Gaussians,
         along: Gaussians,
         weights: list[Float],
-        windows: Sequence[Window],
+        windows: Sequence[PlacedWindow],
     ) -> list[Float]:
         """Σ over windows and taps of amplitudes turned by exp(−i q·x): real, imaginary part.
 
@@ -282,7 +294,7 @@ class Phases:
     weight: list[Float]
 
     @classmethod
-    def of(cls, windows: Sequence[Window], across: Gaussians, along: Gaussians) -> Phases:
+    def of(cls, windows: Sequence[PlacedWindow], across: Gaussians, along: Gaussians) -> Phases:
         """Make the phases of windows, for taps along both axes."""
         return cls(
             along,

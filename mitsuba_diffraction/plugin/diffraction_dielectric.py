@@ -73,12 +73,13 @@ from .energy import EnergyModel, dielectric_of
 from .materials import Dielectric, Inside
 from .properties import flag
 from .sampling import EVEN, direction_of, with_even_share
-from .surface import DiffractingSurface
+from .surface import DiffractingSurface, interfering
 from .types import (
     Context,
     Float,
     Interaction,
     Mask,
+    Powers,
     Properties,
     Spectrum,
     Vector2f,
@@ -192,7 +193,7 @@ class DiffractionDielectric(DiffractingSurface):
         """Return f cosθo and density of light that stays above the surface."""
         si = site.si
         pair = Pair(si, wo, site.frame, lit)
-        power = self.geometry(pair) * self.power.power(pair, site.scale, si)
+        power = self.power.power(pair, site.scale, si)
         value = self.lobe(ctx, site, pair, self.boundary, power, lit)
         if self.thin:
             value += self._returned(site, pair)
@@ -204,12 +205,12 @@ class DiffractionDielectric(DiffractingSurface):
         if self.thin:
             outer = Turned(si, wo, site.frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            power = self.geometry(pair) * self.power.power(pair, site.scale, si)
+            power = self.power.power(pair, site.scale, si)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
             value += self.face(ctx, site, outer, self.mirror, lit)
             return value, self.power.density(outer, site.scale * n, si)
         inner = Turned(si, wo, site.frame, lit, n)
-        power = self.geometry(inner) * self.power.power(inner.place, site.scale, si)
+        power = self.power.power(inner.place, site.scale, si)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
         value = self.lobe(ctx, site, inner, self.inner_boundary, power, lit) * dr.square(n)
@@ -228,7 +229,8 @@ class DiffractionDielectric(DiffractingSurface):
         power = self.power.power(point, site.scale, site.si)
         ends_factor = dr.safe_sqrt(returned[0] * returned[1])
         factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
-        return mi.depolarizer(power * factor)
+        others, zeroth = (mi.depolarizer(each * factor) for each in power[:2])
+        return interfering(others, zeroth, power.cosine)
 
     # ------------------------------------------------------------------ transmission
 
@@ -237,16 +239,17 @@ class DiffractionDielectric(DiffractingSurface):
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        si, scale, point = site.si, site.scale, crossing.place
-        power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
-        # speckle may be dark where the ensemble's order 0 is not
-        zeroth = dr.minimum(zeroth, power)
+        si, point = site.si, crossing.place
+        power = self.power.power(point, site.scale, si)
+        if mi.is_rgb:  # a channel out of gamut stays finite where w → 0
+            zeroth = dr.minimum(power.zeroth, power.others + power.zeroth)
+            power = Powers(power.others + power.zeroth - zeroth, zeroth)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
-        value = mi.Spectrum((power - zeroth) * per_w) * others
-        value += mi.Spectrum(zeroth) * flat
+        rest, mirror = mi.Spectrum(power.others * per_w) * others, mi.Spectrum(power.zeroth) * flat
+        value = interfering(rest, mirror, power.cosine)
         outside = mi.Float(self.area_factor * crossing.frame.area)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo

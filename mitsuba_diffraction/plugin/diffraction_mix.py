@@ -34,12 +34,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..errors import DiffractionError
 from .base import ALL_COMPONENTS, PluginBSDF, ask
-from .depth_weights import DEPTH, DepthWeights
 from .description import Mix
-from .properties import number
-from .textures import is_attribute, uv_square
 from .types import (
     BSDF,
     Callback,
@@ -53,11 +49,7 @@ from .types import (
     Vector2f,
     Vector3f,
 )
-from .varying import Varying
-
-_PREFIX = "weight_"
-#: A sum of such weights is far from the largest number there is.
-_MOST_WEIGHT = 1e6
+from .weights import weights_of
 
 #: Function that asks a surface, in a context for it, for values and densities where a mask is true.
 Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
@@ -70,13 +62,11 @@ class DiffractionMix(PluginBSDF):
 
     def __init__(self, props: Properties) -> None:
         super().__init__(props)
-        objects = dict(props.objects())
-        self.bsdfs = {name: bsdf for name, bsdf in objects.items() if isinstance(bsdf, mi.BSDF)}
-        self.depths = _depths(props, self.bsdfs)
-        self.weights = {} if self.depths else _weights(props, list(self.bsdfs), objects)
-        # where `dr.freeze` finds them
-        self._held, self._varied = list(self.bsdfs.values()), self._numbers()
-        self.parameters = [each for weight in self._varied for each in weight.changeable]
+        objects = props.objects()
+        self.bsdfs = {name: bsdf for name, bsdf in objects if isinstance(bsdf, mi.BSDF)}
+        self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
+        self.weights = weights_of(props, self.bsdfs)
+        self.parameters = [each for weight in self.weights.varied for each in weight.changeable]
         self.ready()
         for surface in self._held:
             if hasattr(surface, "mix"):
@@ -92,7 +82,7 @@ class DiffractionMix(PluginBSDF):
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask, kinds: str
     ) -> Sequence[Any]:
         """See `PluginBSDF.answers`."""
-        weights = self.weights_at(si, _wide(active, si, wo.z))
+        weights = self.weights.at(si, _wide(active, si, wo.z))
         asked: Ask = lambda bsdf, context, on: ask(bsdf, context, si, wo, on, kinds)  # noqa: E731
         return self._sum(ctx, weights, asked, kinds)
 
@@ -108,7 +98,7 @@ class DiffractionMix(PluginBSDF):
 
         Lobes of one direction are that surface's alone.
         """
-        weights = self.weights_at(si, _wide(active, si, sample1, sample2.x))
+        weights = self.weights.at(si, _wide(active, si, sample1, sample2.x))
         shares = self._shares(ctx, weights)
         result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
         chosen, weight, share = mi.UInt32(ALL_COMPONENTS), mi.Float(0.0), mi.Float(0.0)
@@ -139,7 +129,7 @@ class DiffractionMix(PluginBSDF):
 
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
         """Return the weighted reflectances of the surfaces, for denoisers."""
-        weights = self.weights_at(si, _wide(active, si))
+        weights = self.weights.at(si, _wide(active, si))
         asked: Ask = lambda bsdf, context, on: [bsdf.eval_diffuse_reflectance(si, on)]  # noqa: E731
         return self._sum(mi.BSDFContext(), weights, asked, "v")[0]
 
@@ -156,47 +146,20 @@ class DiffractionMix(PluginBSDF):
 
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
-        for weight in self._varied:
+        for weight in self.weights.varied:
             yield weight.refusal()
-        if not self.depths:
-            yield self._sum_refusal()
+        yield self.weights.refusal()
 
     def describe(self) -> Mix:
         """Return the description of the surfaces and weights (`description.describe`)."""
-        textures = [weight.texture for weight in self._varied if weight.texture is not None]
-        return Mix(self.bsdfs, textures, lambda si: self.weights_at(si, mi.Mask(True)))
+        weights = self.weights
+        return Mix(self.bsdfs, weights.textures, lambda si: weights.at(si, mi.Mask(True)))
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
-        if self.depths:
-            return {**self.bsdfs, DEPTH: self.depths.depth}
-        rest = "the rest"
-        weights = {_PREFIX + name: weight or rest for name, weight in self.weights.items()}
-        return {**self.bsdfs, **weights}
+        return {**self.bsdfs, **self.weights.shown}
 
     # ------------------------------------------------------------------ the weights
-
-    def _numbers(self) -> list[Varying]:
-        """Return the weights that a scene gives, or the depth."""
-        if self.depths:
-            return [self.depths.depth]
-        return [weight for weight in self.weights.values() if weight is not None]
-
-    def weights_at(self, si: Interaction, active: Mask) -> list[Float]:
-        """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
-        if self.depths:
-            return [
-                dr.select(active, weight, 0.0) for weight in self.depths.at(si, mi.Mask(active))
-            ]
-        explicit = [
-            None if weight is None else weight.at(si, active) for weight in self.weights.values()
-        ]
-        rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
-        weights = [rest if weight is None else weight for weight in explicit]
-        total: Float = sum(weights, mi.Float(0.0))
-        some = mi.Mask(active) & (total > 0.0)
-        scale = dr.select(some, dr.rcp(dr.select(some, total, 1.0)), 0.0)
-        return [weight * scale for weight in weights]
 
     def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
         """Return shares of the samples: the weights; for a component of one surface, all."""
@@ -236,17 +199,6 @@ class DiffractionMix(PluginBSDF):
             ]
         return totals
 
-    def _sum_refusal(self) -> str | None:
-        """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
-        textures = [weight.texture for weight in self._varied if weight.texture is not None]
-        if None in self.weights.values() or any(map(is_attribute, textures)):
-            return None
-        totals = [sum(self.weights_at(si, True), mi.Float(0.0)) for si in uv_square()]
-        if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
-            return None
-        names = ", ".join(_PREFIX + name for name in self.weights)
-        return f"{names} are all 0 somewhere; leave out that of a surface, which gets the rest"
-
 
 def _wide(active: Mask, si: Interaction, *arrays: Float) -> Mask:
     """Return a mask as wide as the arrays of its branch; otherwise Dr.Jit ends the process."""
@@ -271,48 +223,6 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
         return tuple(type(by)(answer) for by, answer in zip(otherwise, answers, strict=True))
 
     return dr.if_stmt((), on, lambda: typed(ask(on)), lambda: typed(otherwise))
-
-
-def _depths(props: Properties, bsdfs: dict[str, BSDF]) -> DepthWeights | None:
-    """Return the weights by depth; None without this parameter."""
-    if DEPTH not in props or DEPTH in bsdfs:
-        return None
-    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
-        if name not in (*bsdfs, DEPTH, "id"):
-            raise DiffractionError(
-                f"{name}: diffraction_mix takes no weights beside {DEPTH}; leave one out"
-            )
-    return DepthWeights(props, bsdfs)
-
-
-def _weights(
-    props: Properties, names: list[str], objects: dict[str, Any]
-) -> dict[str, Varying | None]:
-    """Return the weight of each surface; None for the surface that gets the rest.
-
-    Raises a DiffractionError for names that do not fit, and for invalid weights.
-    """
-    if len(names) < 2:
-        raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")
-    weighted = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
-    known = [_PREFIX + name for name in names]
-    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
-        if name not in (*known, *names, "id"):
-            raise DiffractionError(
-                f"unknown parameter '{name}' of diffraction_mix; its surfaces are "
-                f"{', '.join(names)}, and their weights {', '.join(known)}, or {DEPTH}"
-            )
-    if len(weighted) < len(names) - 1:
-        missing = ", ".join(name for name in known if name not in weighted)
-        raise DiffractionError(f"give weights for all surfaces but one; there is no {missing}")
-    return {name: _weight(props, _PREFIX + name, objects) for name in names}
-
-
-def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Varying | None:
-    if name not in props:
-        return None
-    value = objects[name] if name in objects else number(props, name, 0.0)
-    return Varying(name, value, 0.0, _MOST_WEIGHT)
 
 
 mi.register_bsdf("diffraction_mix", DiffractionMix)

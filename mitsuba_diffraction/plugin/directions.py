@@ -69,16 +69,23 @@ class Site:
 
     Attributes
     ----------
-    si : the interaction.
+    si : the interaction, its wavelengths within those that are looked up.
     frame : the patch as it lies there.
     scale : factor on the heights.
     wavenumbers : 2π/λ of each channel, rad/µm.
+    given : the interaction as it is given, for a nested BSDF; None if it is `si`.
     """
 
     si: Interaction
     frame: PatchFrame
     scale: Float = 1.0
     wavenumbers: list[Float] = field(default_factory=list)
+    given: Interaction | None = None
+
+    @property
+    def nested_si(self) -> Interaction:
+        """The interaction for a nested BSDF."""
+        return self.si if self.given is None else self.given
 
 
 class Pair:
@@ -93,9 +100,11 @@ class Pair:
     w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
     above : whether light stays above the surface; else both directions are mirrored from below.
+    medium : optical index of the medium that `outer` is in, over that above the surface.
     """
 
     above = True
+    medium: Float = 1.0
 
     def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
         self.wi, self.wo, self.frame = si.wi, wo, frame
@@ -169,6 +178,7 @@ class Turned(Pair):
         turned = mi.SurfaceInteraction3f(si)
         turned.wi = si.wi * side
         super().__init__(turned, wo * side, frame, active)
+        self.medium = n
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property

@@ -41,7 +41,7 @@ FILM_PHASE = 0.02
 MOST_RATIO = 2.0
 
 #: Material of a surface, from the factor on its lengths (`ScaleRange.centre`) and wavelengths, nm.
-MaterialOf = Callable[[float, tuple[float, float]], conserved.Reflector | conserved.Dielectric]
+MaterialOf = Callable[[float, tuple[float, float]], conserved.Reflector | conserved.Transmitter]
 #: Function of direction in a `Conservation`, by side; None where it is 1 everywhere.
 SidesOf = Callable[[Conservation], list[DirectionalTable] | None]
 
@@ -82,7 +82,7 @@ class EnergyModel:
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
         material = self._material_of(factors.centre, self._range)
-        self._both_sides = isinstance(material, conserved.Dielectric)
+        self._both_sides = isinstance(material, conserved.Transmitter)
         self._energy = Energy(self._table, material, wavelengths, factors.least)
         nodes = factors.nodes(self._energy) if self.conserving or self.beneath else []
         energies = [self._energy.at(node) for node in nodes]
@@ -115,13 +115,13 @@ class EnergyModel:
 
     def factor(self, site: Site, wo: Vector3f) -> Colour:
         """Return s(ωi) s(ωo) per channel, less at the horizon."""
-        product = mi.UnpolarizedSpectrum(1.0)
+        product, horizon = mi.UnpolarizedSpectrum(1.0), mi.Float(1.0)
         for direction in (site.si.wi, wo):
             if self._scale.present:
                 product *= mi.UnpolarizedSpectrum(self._scale.at(direction, site))
             cosine = mi.Frame3f.cos_theta(direction)
-            product *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
-        return product
+            horizon *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
+        return product * horizon
 
     def reflected(self, direction: Vector3f, site: Site) -> Colour:
         """Return a(ω) over the flat interface's reflectance, per channel; 1 without `beneath`."""
@@ -172,10 +172,10 @@ def dielectric_of(
     thin: bool,
     centre: float,
     wavelength_range: tuple[float, float],
-) -> conserved.Dielectric:
+) -> conserved.Transmitter:
     """Return the material of an interface or a thin sheet (`MaterialOf`)."""
     index = float(rounded_index(plain(material.eta), DIELECTRIC_STEP))
-    return conserved.Dielectric(index, boundary.model.name, thin)
+    return conserved.Transmitter(index, boundary.model.name, thin)
 
 
 def _rounded_indices(

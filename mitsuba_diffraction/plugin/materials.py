@@ -38,7 +38,7 @@ _REQUIRED = (400.0, 700.0)
 
 
 class Material:
-    """What a surface reflects with: an index in each channel, and what follows from it.
+    """Material of a surface: an index in each channel, its reflectance, tint and absorption.
 
     Attributes
     ----------
@@ -237,7 +237,9 @@ class Conductor(Material):
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
         """The complex index n + ik of each channel, relative to the medium above."""
-        eta, k = self.eta.eval(si, active), self.k.eval(si, active)
+        # Mitsuba's spectra are 0 beyond their data, which is no index: such light is reflected
+        eta = dr.maximum(self.eta.eval(si, active), INDICES[0])
+        k = self.k.eval(si, active)
         if self.medium is not None:
             above = self.medium.eta
             if self.dispersion is not None:

@@ -28,7 +28,7 @@ Further = ParamSpec("Further")
 def once_a_table(
     make: Callable[Concatenate[Table, Further], Shared],
 ) -> Callable[Concatenate[Table, Further], Shared]:
-    """Let all BSDFs of a table share what a function makes of it, in each variant's memory."""
+    """Let all BSDFs of a table share the result of a function, in each variant's memory."""
     made: weakref.WeakKeyDictionary[Any, dict[str, Shared]] = weakref.WeakKeyDictionary()
 
     @functools.wraps(make)

@@ -10,9 +10,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
 from ..files import GLTF, readable_file
+from ..gltf import load_gltf
+from ..images import FORMATS
+from ..limits import check_content
 from ..optics.colour import decode_srgb
 from ..text_spectra import SPECTRA, choice_of, read_shares
 from .types import BSDF
@@ -104,7 +107,9 @@ def _base_colour(file: Path) -> dict[str, Any]:
     """
     trimesh = optional("trimesh", f"pigment='{file}'")
     try:
-        meshes = trimesh.load_scene(file, process=False).geometry.values()
+        meshes = load_gltf(file, f"pigment='{file}'", materials=True).geometry.values()
+    except DiffractionError:
+        raise
     except Exception as error:  # whatever the package makes of damaged files
         raise DiffractionError(f"pigment='{file}': cannot be read as glTF") from error
     materials = {id(m): m for mesh in meshes if (m := getattr(mesh.visual, "material", None))}
@@ -119,7 +124,19 @@ def _base_colour(file: Path) -> dict[str, Any]:
     picture = own[0].baseColorTexture
     if picture is None:
         return {"type": "rgb", "value": factor.tolist()}
-    linear = decode_srgb(np.asarray(picture.convert("RGB")) / 255.0) * factor
+    if picture.format not in FORMATS:
+        raise DiffractionError(
+            f"pigment='{file}': its picture is none of {', '.join(FORMATS)}; save it as PNG"
+        )
+    shown = f"pigment='{file}'"
+    check_content(24.0 * picture.width * picture.height, file.stat().st_size, shown)
+    try:
+        levels = np.asarray(picture.convert("RGB"))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise DiffractionError(
+            f"{shown}: its picture is damaged: {one_line(str(error))}"
+        ) from error
+    linear = decode_srgb(levels / 255.0) * factor
     return {"type": "bitmap", "bitmap": mi.Bitmap(linear.astype(np.float32))}
 
 

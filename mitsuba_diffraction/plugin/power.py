@@ -7,7 +7,7 @@ wavelengths, `rgb_power` those with colours.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -18,14 +18,18 @@ from .device_table import device_table
 from .directions import Crossing, Pair, TablePoint
 from .rgb import rgb_power
 from .sampling import order_sampler
-from .types import Colour, Float, Index, Interaction, Mask, Vector2f
-from .window_positions import Window, WindowPositions
+from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
+from .window_positions import PlacedWindow, WindowPositions
+
+#: Light up to so many times a table's longest wavelength is looked up; longer waves have the values
+#: of this one, shorter ones than the table's are not reflected.
+INFRARED = 4.0
 
 
 class PowerModel(Protocol):
     """Diffracted power in the variant's channels, and a density to draw directions from."""
 
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
@@ -33,22 +37,29 @@ class PowerModel(Protocol):
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
-    ) -> tuple[Colour, Float]:
+    ) -> tuple[Powers, Float]:
         """`power` at `height_scale`, and `density` at `drawing_scale`, outside of a coat."""
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
 
+    def bounded(self, si: Interaction) -> Interaction:
+        """Interaction whose wavelengths are among those that are looked up."""
+
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """`power` of a flat surface."""
-
-    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
-        """Contribution of order 0 to `power` of an ensemble."""
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
         """(u, v) of an ωi + ωo in the coordinates of the table, from three uniform numbers."""
+
+
+class PerWavenumber(NamedTuple):
+    """A function of 2π/λ, rad/µm, that returns a number of `values`."""
+
+    values: int
+    of: Callable[[Float], list[Float]]
 
 
 class SpectralPower:
@@ -69,16 +80,17 @@ class SpectralPower:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
-        #: Least and largest 2π/λ that the table serves, rad/µm, to rounding.
-        longest, shortest = (float(wavenumber(lam)) for lam in reversed(table.wavelength_range))
-        self._served = longest * (1.0 - 1e-5), shortest * (1.0 + 1e-5)
+        # To rounding. The table holds the low frequencies of infrared light, too
+        shortest, longest = table.wavelength_range
+        self._served = float(wavenumber(shortest)) * (1.0 + 1e-5)
+        self._bounds = shortest * (1.0 - 2e-5), longest * INFRARED
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
         """See `PowerModel.power`."""
         functions = [self._power(pair, height_scale, si)]
-        return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
+        return _powers(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean over all wavelengths."""
@@ -87,37 +99,39 @@ class SpectralPower:
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
-    ) -> tuple[Colour, Float]:
+    ) -> tuple[Powers, Float]:
         """See `PowerModel.both`.
 
         The density is computed first: the look-up of power evicts its small tables from the cache.
         """
         functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
         densities, powers = self._each(functions, si, pair, height_scale)
-        return mi.UnpolarizedSpectrum(powers), _mean(densities)
+        return _powers(powers), _mean(densities)
 
     def _power(
         self, pair: Pair | TablePoint, height_scale: Float, si: Interaction
-    ) -> Callable[[Float], Float]:
+    ) -> PerWavenumber:
         scaled_w = pair.w * height_scale
         if self._places is None or not isinstance(pair, Pair):
-            windows: Sequence[Window] = ()
+            windows: Sequence[PlacedWindow] = ()
         else:
             windows = self._places.at(si, pair.frame)
 
-        def of_wavelength(k: Float) -> Float:
-            total = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
-            return dr.select(self._serves(k), total * dr.square(k * (0.5 / dr.pi)), 0.0)
+        def of_wavelength(k: Float) -> list[Float]:
+            sums = self.device.window_sums(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
+            unit, serves = dr.square(k * (0.5 / dr.pi)), self._serves(k)
+            return [*(dr.select(serves, each * unit, 0.0) for each in sums[:2]), *sums[2:]]
 
-        return of_wavelength
+        interferes = bool(windows) or self.device.grid.coherent
+        return PerWavenumber(3 if interferes else 2, of_wavelength)
 
-    def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
-        def of_wavelength(k: Float) -> Float:
+    def _density(self, pair: Pair | Crossing, height_scale: Float) -> PerWavenumber:
+        def of_wavelength(k: Float) -> list[Float]:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
             density = self._sampler.density(k * pair.uv, strategy)
-            return density * pair.cos_o * pair.frame.area * dr.square(k)
+            return [density * pair.cos_o * pair.frame.area * dr.square(k)]
 
-        return of_wavelength
+        return PerWavenumber(1, of_wavelength)
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -137,12 +151,6 @@ class SpectralPower:
         """See `PowerModel.wavenumbers`."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
 
-    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
-        """See `PowerModel.zeroth`."""
-        scaled_w = pair.w * height_scale
-        powers = [self.device.order_0(k * scaled_w) for k in self.wavenumbers(si)]
-        return self.flat(pair, si) * mi.UnpolarizedSpectrum(powers)
-
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """See `PowerModel.flat`: (σ₀/σ)² exp(−σ₀²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma_0**2) * dr.squared_norm(pair.uv)
@@ -152,9 +160,17 @@ class SpectralPower:
             [dr.exp(apart * square) * (square * peak) for square in squares]
         )
 
+    def bounded(self, si: Interaction) -> Interaction:
+        """See `PowerModel.bounded`; light of shorter wavelengths has no power."""
+        if not mi.is_spectral:
+            return si
+        known = mi.SurfaceInteraction3f(si)
+        known.wavelengths = dr.clip(si.wavelengths, *self._bounds)
+        return known
+
     def _serves(self, k: Float) -> Mask:
         """Whether the table is of light of this 2π/λ."""
-        return (k >= self._served[0]) & (k <= self._served[1])
+        return k <= self._served
 
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if not mi.is_spectral:
@@ -163,11 +179,11 @@ class SpectralPower:
 
     def _each(
         self,
-        functions: Sequence[Callable[[Float], Float]],
+        functions: Sequence[PerWavenumber],
         si: Interaction,
         pair: Pair | TablePoint | Crossing,
         scale: Float,
-    ) -> list[list[Float]]:
+    ) -> list[list[list[Float]]]:
         """Evaluate each function of k at each wavelength.
 
         A loop over wavelengths makes a smaller and faster kernel. It is unrolled where derivatives
@@ -177,24 +193,32 @@ class SpectralPower:
         count = len(wavenumbers)
         differentiable = dr.grad_enabled(pair.uv, pair.w, pair.cos_i, pair.cos_o, scale)
         if differentiable or count == 1 or not dr.is_jit_v(mi.Float):
-            return [[function(k) for k in wavenumbers] for function in functions]
+            return [[function.of(k) for k in wavenumbers] for function in functions]
 
         def body(
-            n: Index, inputs: list[Float], values: list[list[Float]]
-        ) -> tuple[Index, list[Float], list[list[Float]]]:
+            n: Index, inputs: list[Float], values: list[list[list[Float]]]
+        ) -> tuple[Index, list[Float], list[list[list[Float]]]]:
             added = [
-                [*earlier[1:], function(inputs[0])]
+                [*earlier[1:], function.of(inputs[0])]
                 for earlier, function in zip(values, functions, strict=True)
             ]
             return n + 1, [*inputs[1:], inputs[0]], added
 
-        nothing = [[mi.Float(0.0) for _ in wavenumbers] for _ in functions]
+        nothing = [
+            [[mi.Float(0.0) for _ in range(function.values)] for _ in wavenumbers]
+            for function in functions
+        ]
         state = (mi.UInt32(0), wavenumbers, nothing)
         return [list(values) for values in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
 
 
-def _mean(values: list[Float]) -> Float:
-    return sum(values[1:], values[0]) * (1.0 / len(values))
+def _powers(values: list[list[Float]]) -> Powers:
+    return Powers(*(mi.UnpolarizedSpectrum(list(part)) for part in zip(*values, strict=True)))
+
+
+def _mean(values: list[list[Float]]) -> Float:
+    densities = [density for (density,) in values]
+    return sum(densities[1:], densities[0]) * (1.0 / len(densities))
 
 
 def power_model(

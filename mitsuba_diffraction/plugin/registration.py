@@ -11,7 +11,7 @@ import sys
 
 import mitsuba as mi
 
-from . import arithmetic
+from . import arithmetic, installed
 
 # Base classes first
 _MODULES = (
@@ -33,7 +33,12 @@ def register(old: str | None, new: str | None) -> None:
 
 
 def register_in_all() -> None:
-    """Register the plugins in the current variant, and in every one that is set later."""
+    """Register the plugins in the current variant, and in every one that is set later.
+
+    Mitsuba then looks for files in its own folder first (`installed`).
+    """
+    installed.search_first()
+    installed.reserve_names()
     arithmetic.register()
     mi.detail.add_variant_callback(register)
     if mi.variant() is not None:

@@ -23,7 +23,7 @@ from .directions import Crossing, Pair, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
-from .types import Buffer, Colour, Float, Index, Interaction, Vector2f
+from .types import Buffer, Colour, Float, Index, Interaction, Powers, Vector2f
 
 
 class PolarCoordinates:
@@ -64,10 +64,9 @@ class ColourLookup:
         self._coefficients = upload(mi.Float16, table.coefficients)
         self._order_0 = upload(mi.Float, table.order_0)
 
-    def colour(self, uv: Vector2f, z: Float) -> Colour:
-        """RGB in 1/µm², mi.Color3f, signed. z must not be beyond the table's."""
-        others = self._other_orders(uv, dr.squared_norm(uv), z)
-        return mi.Color3f(*others) + self.zeroth(uv, z)
+    def others(self, uv: Vector2f, z: Float) -> Colour:
+        """Return the RGB of all orders but 0 in 1/µm², signed; z must not be beyond the table's."""
+        return mi.Color3f(*self._other_orders(uv, dr.squared_norm(uv), z))
 
     def zeroth(self, uv: Vector2f, z: Float) -> Colour:
         """Return the RGB of order 0."""
@@ -120,9 +119,13 @@ def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
 
 
 class RGBPower:
-    """The `power.PowerModel` of variants without wavelengths, which are summed."""
+    """The `power.PowerModel` of variants without wavelengths, which are summed.
 
-    def __init__(self, table: ColourTable) -> None:
+    coherent : whether orders interfere.
+    """
+
+    def __init__(self, table: ColourTable, coherent: bool) -> None:
+        self._coherent = coherent
         self._lookup = ColourLookup(table)
         self._coordinates = self._lookup.coordinates
         self._z_max = table.z_max
@@ -138,9 +141,15 @@ class RGBPower:
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma_0 / lam) ** 2 for lam in LOBES]
 
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
         """See `PowerModel.power`."""
-        return self._lookup.colour(pair.uv, pair.w * height_scale)
+        z = pair.w * height_scale
+        others, zeroth = self._lookup.others(pair.uv, z), self._lookup.zeroth(pair.uv, z)
+        if self._coherent:  # order 0 has its own power, or less where speckle is darker
+            total = others + zeroth
+            zeroth = dr.clip(total, dr.minimum(zeroth, 0.0), dr.maximum(zeroth, 0.0))
+            others = total - zeroth
+        return Powers(others, zeroth)
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`."""
@@ -149,10 +158,14 @@ class RGBPower:
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
-    ) -> tuple[Colour, Float]:
+    ) -> tuple[Powers, Float]:
         """See `PowerModel.both`."""
         density = self.density(pair.outer, drawing_scale, si)
         return self.power(pair, height_scale, si), density
+
+    def bounded(self, si: Interaction) -> Interaction:
+        """See `PowerModel.bounded`; colours have no bounds."""
+        return si
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
@@ -161,10 +174,6 @@ class RGBPower:
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """See `PowerModel.flat`: of order 0 where no phase tells heights apart."""
         return self._lookup.zeroth(pair.uv, mi.Float(0.0))
-
-    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
-        """See `PowerModel.zeroth`."""
-        return self._lookup.zeroth(pair.uv, pair.w * height_scale)
 
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""
@@ -235,4 +244,4 @@ class RGBPower:
 @once_a_table
 def rgb_power(table: DiffractionTable) -> RGBPower:
     """Return the colours in the current variant's memory."""
-    return RGBPower(cached_colours(table))
+    return RGBPower(cached_colours(table), table.grid.coherent)

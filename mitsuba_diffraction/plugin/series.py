@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..tables.expansion import Expansion
-from ..tables.layout import Record, cells_of, functions_at
+from ..tables.layout import BinRecord, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from .arithmetic import clip, index_of, minimum
 from .memory import PACKET, index_between, read_record, upload
@@ -45,7 +45,7 @@ class Recurrence:
 
     def __init__(self, table: DiffractionTable) -> None:
         self._expansion = table.expansion
-        self._record = Record.aligned(*table.order_0.shape[1:])
+        self._record = BinRecord.aligned(*table.order_0.shape[1:])
         self._order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
 
     def at(self, kappa: Float) -> SeriesValue:
@@ -66,7 +66,7 @@ class Tabulated:
         expansion = table.expansion
         self._expansion = expansion
         self._components = table.order_0.shape[1]
-        self._missing = Record.aligned(1, expansion.terms).stored - expansion.terms
+        self._missing = BinRecord.aligned(1, expansion.terms).stored - expansion.terms
         self._cells = cells_of(expansion, (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3))
         # Chebyshev's three nodes of every cell, and the parabola a + t (b + t c) through them
         t = 0.5 + 0.5 * np.cos(np.pi * (np.arange(3) + 0.5) / 3)
@@ -78,7 +78,7 @@ class Tabulated:
         functions = functions_at(expansion, kappa), table.order_0_at(kappa)
         numbers = np.einsum("pn,cnt->cpt", parabola, np.concatenate(functions, axis=-1))
         numbers = numbers.reshape(len(start), 1, -1)
-        self._record = Record.of(1, numbers.shape[2], unit=PACKET)
+        self._record = BinRecord.of(1, numbers.shape[2], unit=PACKET)
         self._parabolas = upload(mi.Float, self._record.pack(numbers.astype(np.float32)))
 
     def at(self, kappa: Float) -> SeriesValue:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import count_between, number_between
+from ..limits import MOST_LAYERS, check_count
 from ..optics.colour import linear_srgb, response
 from ..optics.materials import PERFECT, TISSUES, material_named
 from ..optics.stack import Stacked, mean_powers, nodes, packed, path_of
@@ -28,8 +29,8 @@ from .types import Float, Interaction, Mask, Number
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Longest path there and back, 2 Σ n d, nm, and layers at most.
-MOST_PATH, MOST_LAYERS = 24e3, 1000
+#: Longest path there and back, 2 Σ n d, nm.
+MOST_PATH = 24e3
 _KEYS = ("layers", "repeat", "spread")
 # Wavelengths that RGB variants sum, nm
 _VISIBLE = np.arange(390.0, 711.0, 2.0)
@@ -94,16 +95,17 @@ def read_layers(path: Path) -> Layers:
         )
     repeat = count_between(content.get("repeat", 1), f"{shown}: repeat", 1, MOST_LAYERS)
     spread = number_between(content.get("spread", 0.0), f"{shown}: spread", 0.0, 0.3)
+    check_count(len(pairs) * repeat, MOST_LAYERS, shown, "layers")
     materials = []
     for number, (material, thickness) in enumerate(pairs, 1):
         where = f"{shown}, layer {number}"
         micrometres = number_between(thickness, f"{where}: thickness", 1e-4, 100.0, " µm")
         materials.append((_index_of(material, where), 1e3 * micrometres))
     layers = Layers(tuple(materials) * repeat, spread, path.name)
-    if len(layers.materials) > MOST_LAYERS or layers.path > MOST_PATH:
+    if layers.path > MOST_PATH:
         raise DiffractionError(
             f"{shown}: {len(layers.materials)} layers with 2 Σ n d = {1e-3 * layers.path:.3g} µm; "
-            f"at most {MOST_LAYERS} layers and {1e-3 * MOST_PATH:g} µm interfere"
+            f"at most {1e-3 * MOST_PATH:g} µm interfere"
         )
     return layers
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -23,7 +22,17 @@ from .materials import Material, tinted
 from .power import power_model
 from .properties import flag
 from .sources import read_patch
-from .types import BSDF, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
+from .types import (
+    BSDF,
+    Colour,
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Powers,
+    Properties,
+    Spectrum,
+)
 from .varying import LEAST_SCALE, MOST_SCALE, LateralScale, Varying, largest_of
 
 
@@ -115,22 +124,43 @@ class DiffractingSurface(SurfaceBSDF):
         site: Site,
         pair: Pair,
         boundary: Boundary,
-        power: Colour,
+        power: Powers,
         active: Mask,
+        shadowing: Float = 1.0,
     ) -> Spectrum:
-        """Return f cosθo of a boundary.
+        """Return f cosθo of a boundary, eq. 4 to 10.
 
-        power : `geometry` times ⟨|P|²⟩ / (4π²σ⁴ λ²), per channel.
+        shadowing : of all orders but 0.
         """
         factor = boundary.factor(pair, site.scale, site.wavenumbers, site.si, active, ctx.mode)
-        return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
+        level = mi.Spectrum(power.others * (self.geometry(pair) * shadowing))
+        others = dr.select(active, tinted(level * factor, boundary.material), 0.0)
+        mirror = self.mirrored(ctx, site, pair, boundary, power.zeroth, active)
+        return interfering(others, mirror, power.cosine)
+
+    def mirrored(
+        self,
+        ctx: Context,
+        site: Site,
+        pair: Pair,
+        boundary: Boundary,
+        zeroth: Colour,
+        active: Mask,
+    ) -> Spectrum:
+        """Return f cosθo of order 0, eq. 10.
+
+        zeroth : ⟨|P_0|²⟩ / (4π²σ⁴ λ²), per channel.
+        """
+        width = self.table.sigma_0 * pair.frame.stretch
+        factor = boundary.mirror(pair, site.wavenumbers, width, site.si, active, ctx.mode)
+        level = zeroth * (self.area_factor * pair.frame.area * pair.outer.cos_o)
+        return dr.select(active, tinted(mi.Spectrum(level) * factor, boundary.material), 0.0)
 
     def face(
         self, ctx: Context, site: Site, pair: Pair, mirror: Boundary, active: Mask
     ) -> Spectrum:
-        """Return f cosθo of a flat face: the lobe of a flat patch."""
-        power = self.geometry(pair) * self.power.flat(pair, site.si)
-        return self.lobe(ctx, replace(site, scale=mi.Float(0.0)), pair, mirror, power, active)
+        """Return f cosθo of a flat face."""
+        return self.mirrored(ctx, site, pair, mirror, self.power.flat(pair, site.si), active)
 
     def reflected_share(self, site: Site, active: Mask) -> Colour:
         """See `SurfaceBSDF.reflected_share`."""
@@ -143,7 +173,8 @@ class DiffractingSurface(SurfaceBSDF):
     def site_at(self, si: Interaction, active: Mask) -> Site:
         """See `SurfaceBSDF.site_at`."""
         scale = self.height_scale.at(si, active)
-        return Site(si, self.frame_at(si, active), scale, self.power.wavenumbers(si))
+        known = self.power.bounded(si)
+        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known), si)
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the patch as it lies at points of the surface."""
@@ -242,3 +273,19 @@ class DiffractingSurface(SurfaceBSDF):
             "orientation": self.orientation,
             "lateral_scale": self.lateral_scale,
         }
+
+
+def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Spectrum:
+    """Return the sum of f of all orders but 0 and of order 0.
+
+    Under one window Mueller matrices add up as powers do, and have the interference of unpolarised
+    light.
+
+    cosine : of the phase between both, per channel; None in an ensemble.
+    """
+    total = others + mirror
+    if cosine is None:
+        return total
+    a, b = (dr.maximum(mi.unpolarized_spectrum(f), 0.0) for f in (others, mirror))
+    beats = 2.0 * cosine * dr.sqrt(a) * dr.sqrt(b) * dr.rcp(dr.maximum(a + b, 1e-30))
+    return total * mi.Spectrum(1.0 + beats)

@@ -6,7 +6,7 @@ plain number.
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 Float: TypeAlias = Any
 """`mi.Float`: an angle's cosine, a frequency (rad/µm), a random number, a density (1/sr)."""
@@ -64,3 +64,17 @@ Packet: TypeAlias = Any
 
 Rotation: TypeAlias = tuple[Float, Float]
 """(cos, sin) of the angle from the first tangent to the patch's x axis."""
+
+
+class Powers(NamedTuple):
+    """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm² per channel.
+
+    Attributes
+    ----------
+    others, zeroth : of all orders but 0, and of order 0.
+    cosine : of the phase between both under one window; None where powers add up.
+    """
+
+    others: Colour
+    zeroth: Colour
+    cosine: Colour | None = None

@@ -25,7 +25,7 @@ LEAST_SCALE = 1e-30
 
 
 class Varying:
-    """One number, or a texture's or mesh attribute's number at each point.
+    """Parameter that is a number, or a texture's or mesh attribute's number at each point.
 
     Parameters
     ----------
@@ -54,14 +54,19 @@ class Varying:
         unit: str = "",
         advice: str = "",
     ) -> None:
-        self.name, self.low, self.high = name, low, high
-        self._unit, self._advice = unit, advice
+        self.name, self.low, self.high, self._unit = name, low, high, unit
         self._least = LEAST_SCALE if positive and low == 0.0 else low
         self.texture = value if isinstance(value, mi.Texture) else None
         self.changeable: tuple[Changeable, ...]
         if self.texture is None:
+            least = "above 0" if self._least > low else f"at least {low:g}{unit}"
+            bounds = f"{least} and at most {high:g}{unit}{advice}"
+
+            def message(value: float) -> str:  # a method would be a cycle of references
+                return f"{name}={value:g}{unit} must be {bounds}"
+
             # to single precision, as bounds are
-            bounded = Bounded(name, float(np.float32(value)), self._least, high, self._message)
+            bounded = Bounded(name, float(np.float32(value)), self._least, high, message)
             self._number, self.changeable = bounded.value, (bounded,)
             refused = bounded.refusal()
         else:
@@ -112,11 +117,6 @@ class Varying:
             f"they must be between {self.low:g} and {self.high:g}{self._unit}"
         )
 
-    def _message(self, value: float) -> str:
-        low = "above 0" if self._least > self.low else f"at least {self.low:g}{self._unit}"
-        bounds = f"{low} and at most {self.high:g}{self._unit}{self._advice}"
-        return f"{self.name}={value:g}{self._unit} must be {bounds}"
-
     def __str__(self) -> str:
         if self.texture is None:
             return f"{self.number:g}{self._unit}"
@@ -141,21 +141,21 @@ def largest_of(props: Properties, name: str, least: float, most: float) -> tuple
     largest = number(props, f"{name}_max", 1.0) if f"{name}_max" in props else None
     if not isinstance(value, mi.Texture):
         value = number(props, name, 1.0)
-        described, found = name, value
+        described, found = f"{name}={value:g}", value
     elif is_bitmap(value) and largest is None:
         known = range_of(value)
         assert known is not None
-        described, found = f"{name}: its largest factor,", known[1]
+        described, found = f"{name}: its largest factor, {known[1]:g},", known[1]
     elif largest is None:
         raise DiffractionError(
             f"{name} of a texture other than a bitmap, or of a mesh attribute, needs {name}_max, "
             "the largest factor that it has"
         )
     else:
-        described, found = f"{name}_max", largest
+        described, found = f"{name}_max={largest:g}", largest
     if not least <= found <= most:  # also refuses NaN
         low = "above 0" if least == LEAST_SCALE else f"at least {least:g}"
-        raise DiffractionError(f"{described}={found:g} must be {low} and at most {most:g}")
+        raise DiffractionError(f"{described} must be {low} and at most {most:g}")
     return value, found
 
 

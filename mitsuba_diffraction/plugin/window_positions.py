@@ -33,7 +33,7 @@ _MOST_CORNERS = 2.0**22
 
 
 @dataclass(frozen=True)
-class Window:
+class PlacedWindow:
     """A window at a point of the surface, by the phases that it gives to orders.
 
     Attributes
@@ -48,7 +48,7 @@ class Window:
     weight: Float
 
     @classmethod
-    def of(cls, turn: Vector2f, weight: Float) -> Window:
+    def of(cls, turn: Vector2f, weight: Float) -> PlacedWindow:
         """Make the window of a turn of any size."""
         turn = turn - dr.round(turn)
         x, y = (dr.sincos(2.0 * dr.pi * part)[::-1] for part in turn)
@@ -77,7 +77,7 @@ class WindowPositions:
         self._patches = mi.Vector2f(1.0 / extent[0], 1.0 / extent[1])  # a µm
         dr.make_opaque(self._scale, self._patches)
 
-    def at(self, si: Interaction, frame: PatchFrame) -> list[Window]:
+    def at(self, si: Interaction, frame: PatchFrame) -> list[PlacedWindow]:
         """Return the windows at points of the surface, one or three."""
         position = self._position(si)
         if not self._random:
@@ -100,9 +100,9 @@ class WindowPositions:
 
     def _window(
         self, position: Vector2f, frame: PatchFrame, shift: Vector2f, weight: Float
-    ) -> Window:
+    ) -> PlacedWindow:
         """Return the window at a position (µm), shifted by so many patches."""
-        return Window.of(frame.position(position) * self._patches + shift - 0.5, weight)
+        return PlacedWindow.of(frame.position(position) * self._patches + shift - 0.5, weight)
 
     def __str__(self) -> str:
         return self._name

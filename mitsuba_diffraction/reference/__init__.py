@@ -9,8 +9,10 @@ model         the default model in one file: the equations, numbered as in docs/
 bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
 coat          wrapper of the model
 fresnel, boundary, through  float64 judges of the formulas of the same names in `optics`
+mirror        the correction of order 0 at the horizon, by its equation
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders
+scan          windows of a scan, whose screens fade towards their edges
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
 arguments     checks of the arguments
 """

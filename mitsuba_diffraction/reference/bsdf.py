@@ -24,7 +24,8 @@ from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
-from .integral import window_power
+from .integral import window_powers
+from .mirror import horizon_correction, interfering
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -34,7 +35,7 @@ Measure = Callable[[Complex], Real]
 
 
 @dataclass(frozen=True)
-class Material:
+class SurfaceMaterial:
     """Material of a surface, and the model of its boundary.
 
     Attributes
@@ -97,8 +98,11 @@ def brdf(
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     material = _material(model, index_of(eta, k, light.wavelength, film), coat)
     if material.index is None:
-        power = window_power(field, *light, *window)
-        return kirchhoff_factor(*light, window.sigmas.orders) * power
+        others, zeroth, cosine = window_powers(field, *light, *window)
+        others *= kirchhoff_factor(*light, window.sigmas.orders)
+        zeroth *= horizon_correction(light, window.sigmas.zeroth, None)
+        area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
+        return interfering(others, zeroth / area, cosine)
     return _reflected(boundary.unpolarised, field, light, material, window)
 
 
@@ -130,7 +134,9 @@ def mueller(
     return _reflected(boundary.mueller, field, light, material, window)
 
 
-def _material(model: str | None, index: Complex | Filmed | None, coat: float | None) -> Material:
+def _material(
+    model: str | None, index: Complex | Filmed | None, coat: float | None
+) -> SurfaceMaterial:
     """Check what goes together."""
     if coat is not None:
         if index is None:
@@ -141,11 +147,11 @@ def _material(model: str | None, index: Complex | Filmed | None, coat: float | N
             )
         if not (np.isfinite(coat) and coat >= 1.0):
             raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    return Material(model_of(model, index), index, coat)
+    return SurfaceMaterial(model_of(model, index), index, coat)
 
 
 def _reflected(
-    measure: Measure, field: HeightField, light: Light, material: Material, window: Window
+    measure: Measure, field: HeightField, light: Light, material: SurfaceMaterial, window: Window
 ) -> Real:
     """Measured light where both directions are above the surface, 0 elsewhere."""
     assert material.index is not None
@@ -163,7 +169,7 @@ def _lit(
     field: HeightField,
     light: Light,
     index: Complex | Filmed,
-    material: Material,
+    material: SurfaceMaterial,
     window: Window,
 ) -> Real:
     """Measured light of directions above the surface."""
@@ -171,14 +177,18 @@ def _lit(
         assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, material.coat), index / material.coat
         jones = _matrices(field, inside, relative, material.model)
-        power = window_power(field, *inside, *window)
-        return coats.reflected(light, window.sigmas, material.coat, relative, power, jones, measure)
+        powers = window_powers(field, *inside, *window)
+        return coats.reflected(
+            light, window.sigmas, material.coat, relative, powers, jones, measure
+        )
     averaged = window.coherence == COHERENCES[0]
     if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
         return models.default_brdf(field, light, index, window.sigmas, measure)
     jones = _matrices(field, light, index, material.model)
-    power = window_power(field, *light, *window)
-    return models.reflected(light, window.sigmas.orders, power, jones, measure)
+    others, zeroth, cosine = window_powers(field, *light, *window)
+    rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
+    mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
+    return interfering(rest, mirror, cosine)
 
 
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:

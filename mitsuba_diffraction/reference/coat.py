@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics.geometry import wavenumber
 from . import model
 from .fresnel import amplitudes
+from .mirror import horizon_correction, interfering
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -26,7 +27,7 @@ def reflected(
     sigmas: model.Sigmas,
     coat: float,
     index: Complex,
-    power: Real,
+    powers: Real,
     jones: Complex,
     measure: Callable[[Complex], Real],
 ) -> Real:
@@ -36,18 +37,23 @@ def reflected(
     ----------
     light : outside of the coat.
     index : of the structure relative to the coat.
-    power, jones : ⟨|P|²⟩ and J of the structure in the coat.
+    powers : ⟨|P|²⟩ of the structure in the coat (`integral.window_powers`).
+    jones : J of the structure in the coat.
     """
     inside = refracted_light(light, coat)
-    outside = transmitted(jones, light.wi, light.wo, coat, index)
-    sigma, sigma_0 = sigmas
-    structure = model.reflected(inside, sigma, power / coat**2, outside, measure)
+    ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
+    others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
+    mirror = transmitted(model.facets(inside, index)[0], *ends)
+    visible = horizon_correction(light, sigma_0, index, bare=False)
+    area = (light.wavelength * 1e-3) ** 2 * np.pi * sigma**2
+    zeroth = (visible * powers[1] / area * measure(mirror).T).T
     # The face is a mirror: ⟨|P|²⟩ of a flat patch
     tangential = (light.wi + light.wo)[:, :2]
     lobe = np.exp(-((sigma_0 * wavenumber(light.wavelength)) ** 2) * np.sum(tangential**2, axis=1))
-    face = model.kirchhoff(light, np.asarray(coat, complex))
     flat = 4 * np.pi**2 * sigma**2 * sigma_0**2 * lobe
-    return structure + model.reflected(light, sigma, flat, face, measure)
+    face = np.full(len(flat), coat, complex)
+    structure = interfering(others, zeroth, powers[2])
+    return structure + model.mirrored(light, sigmas, flat, face, measure)
 
 
 def refracted(direction: ArrayLike, n: float) -> Real:

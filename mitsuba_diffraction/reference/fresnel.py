@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Face:
+class InterfaceFields:
     """Fields at one interface for light that comes down with unit amplitude, over twice its cosine.
 
     Attributes
@@ -35,7 +35,7 @@ class Face:
     p: Complex
 
 
-def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Face]:
+def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[InterfaceFields]:
     """Return fields at the interface of a material, or at both interfaces of its film.
 
     Films follow Born and Wolf, Principles of Optics, section 1.6.4.
@@ -46,14 +46,16 @@ def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Face
         epsilon = n * n
         inside = decaying_root(epsilon - square)
         p = 1.0 / (epsilon * q + inside)
-        return [Face(epsilon - 1.0, epsilon, 1.0 / (q + inside), inside * p, p)]
+        return [InterfaceFields(epsilon - 1.0, epsilon, 1.0 / (q + inside), inside * p, p)]
     epsilon, film, within, once, back_s, back_p = _film(square, index)
     there_s, there_p = back_s * once * once, back_p * once * once
     s = 1.0 / (q + within + (q - within) * there_s)
     p = 1.0 / (film * q + within + (film * q - within) * there_p)
     return [
-        Face(film - 1.0, film, s * (1 + there_s), within * p * (1 - there_p), p * (1 + there_p)),
-        Face(
+        InterfaceFields(
+            film - 1.0, film, s * (1 + there_s), within * p * (1 - there_p), p * (1 + there_p)
+        ),
+        InterfaceFields(
             epsilon - film,
             film / epsilon,
             s * once * (1 + back_s),

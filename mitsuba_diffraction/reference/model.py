@@ -6,23 +6,26 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
 
     (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
     a_j(κ) = mean of exp(iκh) exp(i q_j·r) over the pixels                                      (2)
-    ⟨|P|²⟩ = 4π²σ² Σ_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²),   σ_j = σ for j ≠ 0                   (3)
-    f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩,   A = πσ²                                         (4)
+    ⟨|P_j|²⟩ = 4π²σ² |a_j|² σ_j² exp(−σ_j²|q − q_j|²),   σ_j = σ for j ≠ 0                      (3)
+    f = 4 cosθi cosθo N / (λ² A w²) · Σ_j≠0 ⟨|P_j|²⟩ + f_0,   A = πσ²                           (4)
     N = ½ Σ |J|² over the four entries of J                                                     (5)
     J = (1 − s) K + s B                                                                         (6)
     K = (1 + ωi·ωo) / (2 cosθi cosθo) · U(ωo) diag(r_s, r_p) U(ωi)                              (7)
     B = (ε − 1) · [the four entries in `small_slope`],   ε = n²                                 (8)
     s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),   R₀ = |(n − 1)/(n + 1)|²                                (9)
     σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),   h_q' the heights' spectrum
+    f_0 = N_0 C(X_i) C(X_o) / (λ² A) · ⟨|P_0|²⟩,   N_0 of J_0 = U(ωo) diag(r_s, r_p) U(ωi)     (10)
+    C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) e^(−βY/2) C(Y) = e^(−βX/2),   X = √(kσ₀) cosθ         (11)
 
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
-window has the light's σ₀; a small scan limits σ of other orders alone. K is Kirchhoff's tangent
-plane: Fresnel's r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|,
-p = d×s of light along d. Rows and columns of J are s and p, outgoing and incoming. B is first-order
-small slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py
-and transmission.py wrap this.
+window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
+orders alone. C makes up for the part of its lobe beyond the horizon, with the reflectance exp(−βX)
+near it. K is Kirchhoff's tangent plane: Fresnel's r_s, r_p at the half vector; U turns between the
+facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along d. Rows and columns of J are s and p of the
+outgoing and the incoming light. B is first-order small slope (Rice 1951; Voronovich 1985). Indices
+and results are arrays (n,) as in `Light`. coat.py and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -36,8 +39,10 @@ from numpy.typing import NDArray
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Index
-from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
-from .fresnel import amplitudes, decaying_root, reflectance
+from . import boundary, scan
+from .boundary import facet_axis, jones_matrix, mixed, polarisation_axes, turn, unpolarised
+from .fresnel import amplitudes, decaying_root
+from .mirror import horizon_correction
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -52,15 +57,14 @@ class Light(NamedTuple):
 
 
 class Sigmas(NamedTuple):
-    """σ of the window of all orders but 0, and σ₀ of order 0's, the light's; both in µm."""
+    """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
+
+    `windows`: a scan's, which does not tile the plane.
+    """
 
     orders: float
     zeroth: float
-
-    @classmethod
-    def same(cls, sigma: float) -> Sigmas:
-        """Return one width for all orders."""
-        return cls(sigma, sigma)
+    windows: scan.ScanWindows | None = None
 
 
 def default_brdf(
@@ -71,29 +75,40 @@ def default_brdf(
     measure: Callable[[Complex], Real] = unpolarised,
 ) -> Real:
     """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
-    s = share(field, light, index)
-    jones = blended(kirchhoff(light, index), small_slope(light, index), s)
-    return reflected(light, sigmas.orders, ensemble_power(field, light, sigmas), jones, measure)
+    jones = mixed(kirchhoff(light, index), small_slope(light, index), share(field, light, index))
+    others, zeroth = ensemble_power(field, light, sigmas)
+    rest = reflected(light, sigmas.orders, others, jones, measure)
+    return rest + mirrored(light, sigmas, zeroth, index, measure)
 
 
 def reflected(
     light: Light, sigma: float, power: Real, jones: Complex, measure: Callable[[Complex], Real]
 ) -> Real:
-    """f of (4) from ⟨|P|²⟩ and J."""
-    cos_i, cos_o = light.wi[:, 2], light.wo[:, 2]
-    lam, w = light.wavelength * 1e-3, cos_i + cos_o
-    factor = 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2)
+    """f of (4) without f_0, from Σ_j≠0 ⟨|P_j|²⟩ and J."""
+    (cos_i, cos_o), lam = (light.wi[:, 2], light.wo[:, 2]), light.wavelength * 1e-3
+    factor = 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * (cos_i + cos_o) ** 2)
     return (factor * power * measure(jones).T).T
 
 
+def mirrored(
+    light: Light, sigmas: Sigmas, power: Real, index: Index, measure: Callable[[Complex], Real]
+) -> Real:
+    """f_0 of (10) from ⟨|P_0|²⟩."""
+    visible = horizon_correction(light, sigmas.zeroth, index)
+    factor = visible * power / ((light.wavelength * 1e-3) ** 2 * np.pi * sigmas.orders**2)
+    return (factor * measure(facets(light, index)[0]).T).T
+
+
 def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
-    """⟨|P|²⟩ of (3) in µm⁴."""
-    k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
+    """Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ of (3) in µm⁴, (2, n)."""
+    k, powers = 2e3 * np.pi / light.wavelength, np.zeros((2, len(light.wavelength)))
+    parts, tapers = scan.parts(field, sigmas.windows), scan.tapers(field, sigmas.windows)
     for n, (u, v, w) in enumerate(light.wi + light.wo):
         q, kappa = (k[n] * u, k[n] * v), k[n] * w  # (1): frequency q, and phase per height κ
-        screen = np.exp(1j * kappa * field.heights)
-        power[n] = window_sum(orders_near(q, sigmas.orders, screen, field.pixel_size), q, sigmas)
-    return power
+        screens = (np.exp(1j * kappa * part) for part in parts)
+        orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
+        powers[:, n] = np.mean([window_sums(each, q, sigmas) for each in orders], axis=0)
+    return powers
 
 
 class Orders(NamedTuple):
@@ -107,13 +122,17 @@ class Orders(NamedTuple):
 
 
 def orders_near(
-    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float]
-) -> Orders:
-    """Orders (2) of a screen (ny, nx) that the window about q reaches."""
-    ny, nx = screen.shape
-    qx, waves_x = plane_waves(nx, pixel_size[0], q[0], sigma)
-    qy, waves_y = plane_waves(ny, pixel_size[1], q[1], sigma)
-    return Orders(qx, qy, waves_x, waves_y, waves_y @ screen @ waves_x.T / (nx * ny))
+    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float],
+    tapers: scan.Tapers | None = None,
+) -> Orders:  # fmt: skip
+    """Orders (2) of a screen (ny, nx), or of a faded one, that the window about q reaches."""
+    (ny, nx), (screen, mean) = screen.shape, scan.faded(screen, tapers)
+    qx, waves_x = plane_waves(screen.shape[1], pixel_size[0], q[0], sigma)
+    qy, waves_y = plane_waves(screen.shape[0], pixel_size[1], q[1], sigma)
+    a = waves_y @ screen @ waves_x.T / screen.size
+    if mean is not None:
+        a[np.ix_(qy == 0, qx == 0)] = mean
+    return Orders(qx, qy, waves_x[:, :nx], waves_y[:, :ny], a)
 
 
 def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
@@ -127,21 +146,14 @@ def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Com
     return j * spacing, np.exp(2j * np.pi / n * turns)
 
 
-def window_sum(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> float:
-    """4π²σ² Σ_j |a_j|² σ_j² exp(−σ_j²|q − q_j|²) of (3)."""
+def window_sums(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> tuple[float, float]:
+    """Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ of (3)."""
     sigma, ratio = sigmas.orders, (sigmas.zeroth / sigmas.orders) ** 2
-    window_x = np.exp(-0.5 * (sigma * (q[0] - orders.qx)) ** 2)
-    window_y = np.exp(-0.5 * (sigma * (q[1] - orders.qy)) ** 2)
-    powers = np.abs(orders.a) ** 2
-    total = window_y**2 @ powers @ window_x**2
-    lobe = np.exp(-(sigma**2) * (q[0] ** 2 + q[1] ** 2))  # of order 0, with σ₀ in place of σ:
-    total += (ratio * lobe**ratio - lobe) * powers[orders.qy == 0][:, orders.qx == 0].sum()
-    return float(4 * np.pi**2 * sigma**4 * total)
-
-
-def blended(tangent_plane: Complex, gentle: Complex, s: Real) -> Complex:
-    """J of (6) from K and B."""
-    return (1 - s[:, None, None]) * tangent_plane + s[:, None, None] * gentle
+    window_x, window_y = (np.exp(-((sigma * d) ** 2)) for d in (q[0] - orders.qx, q[1] - orders.qy))
+    powers, mirror = np.abs(orders.a) ** 2, np.ix_(orders.qy == 0, orders.qx == 0)
+    zeroth, powers[mirror] = powers[mirror].sum(), 0.0
+    lobe, unit = np.exp(-(sigmas.zeroth**2) * (q[0] ** 2 + q[1] ** 2)), 4 * np.pi**2 * sigma**4
+    return float(unit * (window_y @ powers @ window_x)), float(unit * ratio * lobe * zeroth)
 
 
 def share(field: HeightField, light: Light, index: Index) -> Real:
@@ -149,12 +161,17 @@ def share(field: HeightField, light: Light, index: Index) -> Real:
     total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
     q = k * np.hypot(total[:, 0], total[:, 1])
     variance = ScaleRoughness.from_heights(field.heights, field.pixel_size).at(q)
-    roughness = np.square(k * total[:, 2]) * variance  # (κσ_q)²
-    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
+    return boundary.small_slope_weight(k * total[:, 2], variance, index)
 
 
 def kirchhoff(light: Light, index: Complex) -> Complex:
     """K of (7), (n, 2, 2)."""
+    jones, one_plus_dot = facets(light, index)
+    return (one_plus_dot / (2 * light.wi[:, 2] * light.wo[:, 2]))[:, None, None] * jones
+
+
+def facets(light: Light, index: Index) -> tuple[Complex, Real]:
+    """U(ωo) diag(r_s, r_p) U(ωi) at the half vector, (n, 2, 2), and 1 + ωi·ωo."""
     wi, wo, _ = light
     s_in, s_out = polarisation_axes(wi, wo)
     axis, half = facet_axis(wi, wo, s_in), wi + wo
@@ -162,8 +179,7 @@ def kirchhoff(light: Light, index: Complex) -> Complex:
     one_plus_dot = 0.5 * np.sum(half * half, axis=1)
     r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
     facet = jones_matrix(ss=r_s, sp=0.0, ps=0.0, pp=r_p)
-    turned = turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi)
-    return (one_plus_dot / (2 * wi[:, 2] * wo[:, 2]))[:, None, None] * turned
+    return turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi), one_plus_dot
 
 
 def small_slope(light: Light, index: Complex) -> Complex:

@@ -32,7 +32,7 @@ _FEET = 0.02
 _CLEARLY = 2.0
 
 
-class Fit(NamedTuple):
+class MeshPlacement(NamedTuple):
     """Rotation, scale and shift that put a mesh on the stage.
 
     Attributes
@@ -59,7 +59,7 @@ class Fit(NamedTuple):
         }
 
 
-def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
+def fit_of(positions: Floats, file: Path, up: str = "auto") -> MeshPlacement:
     """Compute how a mesh is put on the stage.
 
     Raises a DiffractionError if `up` is not one of these, a vertex is not finite, or the mesh has
@@ -94,7 +94,7 @@ def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
     radius = float(np.hypot(*(turned - middle)[:, :2].T).max())
     scale = min(STAGE_RADIUS / radius, STAGE_HEIGHT / float(high[2] - low[2]))
     shift = -scale * np.array([middle[0], middle[1], low[2]])
-    return Fit(up, rotation, scale, shift, scale * (high - low))
+    return MeshPlacement(up, rotation, scale, shift, scale * (high - low))
 
 
 def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMesh:

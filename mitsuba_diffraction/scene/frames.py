@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -135,13 +136,13 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
 
     Raises a DiffractionError if the film cannot be written.
     """
-    from PIL import Image
+    from ..images import open_image
 
     if film.suffix.lower() == ".mp4":
         _write_mp4(frames, film, fps)
         return
     # not as open files, of which there may be too many
-    pictures = [Image.open(io.BytesIO(path.read_bytes())) for path in frames]
+    pictures = [open_image(io.BytesIO(path.read_bytes()), ("PNG",)) for path in frames]
     try:
         with atomic_path(film) as temporary:
             pictures[0].save(
@@ -164,10 +165,10 @@ def check_film(film: Path) -> None:
 
 def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
     """Join PNG files to an MP4; pictures of odd size lose a row or a column, as H.264 requires."""
-    from PIL import Image
+    from ..images import open_image
 
     ffmpeg = optional("imageio_ffmpeg")
-    with Image.open(frames[0]) as first:
+    with open_image(frames[0], ("PNG",)) as first:
         width, height = (max(2, length - length % 2) for length in first.size)
     # matrix and tags of sRGB's primaries, without which players guess by the size of the picture
     colours = ["-vf", "scale=out_color_matrix=bt709", "-colorspace", "bt709"]
@@ -180,9 +181,15 @@ def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
             )  # fmt: skip
             writer.send(None)
             for path in frames:
-                with Image.open(path) as picture:
+                with open_image(path, ("PNG",)) as picture:
                     writer.send(picture.convert("RGB").crop((0, 0, width, height)).tobytes())
             writer.close()
+            # it loses the error of a full disk
+            written, _ = ffmpeg.count_frames_and_secs(str(temporary))
+            if written != len(frames):
+                raise OSError(
+                    errno.ENOSPC, f"it has {written} of {len(frames)} frames; is the disk full?"
+                )
     except (OSError, RuntimeError) as error:
         raise DiffractionError(f"cannot write '{film}': {error}") from error
 
@@ -198,10 +205,10 @@ def digest_of(scene: Path, values: Mapping[str, str]) -> str:
 
 def _settings_in(png: Path) -> dict[str, Any] | None:
     """Read the settings that a frame was written with; None for files of another kind."""
-    from PIL import Image
+    from ..images import open_image
 
     try:
-        with Image.open(png) as image:
+        with open_image(png, ("PNG",)) as image:
             text = getattr(image, "text", {}).get(_KEY, "")
         settings = json.loads(text[1:-1])  # Mitsuba puts it into quotes
     except (OSError, ValueError, SyntaxError):

@@ -20,6 +20,7 @@ from PIL import Image
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
+from ..images import open_image
 from ..tables.exr import write_channels
 
 Floats = NDArray[np.float32]
@@ -38,6 +39,12 @@ class Files(NamedTuple):
     orientation: Path
     lateral_scale: Path
     weight: Path
+
+    @classmethod
+    def called(cls, folder: Path, stem: str) -> Files:
+        """Return the paths in a folder, of names that begin with the stem."""
+        names = "orientation.exr", "lateral_scale.exr", "weight.png"
+        return cls(*(folder / f"{stem}_{name}" for name in names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +89,7 @@ class Hologram:
 
         Raises a DiffractionError if the folder does not exist or cannot be written to.
         """
-        names = "orientation.exr", "lateral_scale.exr", "weight.png"
-        files = Files(*(Path(folder) / f"{stem}_{name}" for name in names))
+        files = Files.called(Path(folder), stem)
         parts = np.moveaxis(self.orientation.astype(np.float16), -1, 0)
         write_channels(files.orientation, dict(zip("RGB", parts, strict=True)))
         write_channels(files.lateral_scale, {"Y": self.lateral_scale.astype(np.float16)})
@@ -183,7 +189,7 @@ def _picture(image: ArrayLike | str | os.PathLike[str]) -> tuple[NDArray[Any], f
 def _read(path: Path) -> NDArray[Any]:
     readable_file(path)
     try:
-        with Image.open(path) as picture:
+        with open_image(path) as picture:
             mode, values = picture.mode, np.array(picture)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         reason = one_line(str(error))

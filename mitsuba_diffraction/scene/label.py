@@ -17,6 +17,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
+from .hologram import Files
 from .logo import HUES, Areas, logo, wavelengths_of
 from .orientation.mesh_files import load_mesh
 from .stage import STUDIO
@@ -27,6 +28,10 @@ Floats = NDArray[np.float64]
 TANGENTIAL = 0.448
 #: Period of the patch that the scene stretches, µm: `precompute/hologram.toml`.
 PERIOD = 1.3
+#: Files of a label's folder; the first words of the names of the textures.
+STEM, AROUND, GRATING, RING, SCENE = (
+    "label", "label_around.png", "grating.toml", "ring.xml", "label.xml",
+)  # fmt: skip
 # The scene's camera: elevation, degrees, distance and height of the point it looks at, cm; so far
 # that colours change little over the label
 _CAMERA, _FAR, _MIDDLE = 8.0, 400.0, 3.0
@@ -43,7 +48,7 @@ _TURNS = tuple(sign * turn for turn in range(15, 181, 15) for sign in (1, -1))
 _STRETCH = (0.4, 1.5)
 
 
-class Place(NamedTuple):
+class LabelPlace(NamedTuple):
     """Place of a label on a surface.
 
     Attributes
@@ -60,16 +65,24 @@ class Place(NamedTuple):
     cut: bool = False
 
 
-def card(aspect: float) -> Place:
+def files_in(folder: Path) -> list[Path]:
+    """List the files that a label has in its folder, beside a copy of its mesh."""
+    return [
+        *Files.called(folder, STEM),
+        *(folder / name for name in (AROUND, GRATING, RING, SCENE)),
+    ]
+
+
+def card(aspect: float) -> LabelPlace:
     """Return the place of a picture, of this width over height, that fills an upright card."""
     width, height = 2 * _CARD * min(1.0, aspect), 2 * _CARD * min(1.0, 1.0 / aspect)
     matrix = np.array([[width, 0.0, -width / 2], [0.0, height, -height / 2]])
-    return Place(matrix, (width, height), np.zeros(1))
+    return LabelPlace(matrix, (width, height), np.zeros(1))
 
 
 def front(
     file: Path, aspect: float, *, width: float, height: float, up: str = "auto", turn: float = 0.0
-) -> Place:
+) -> LabelPlace:
     """Return the place of a label on the front of a mesh, upright and not mirrored.
 
     The texture coordinates of the triangle in the label's middle are continued over the label.
@@ -94,7 +107,7 @@ def front(
     mesh = fitted_mesh(file, up=up)
     uv = own.uv[own.faces]
 
-    def place_at(turn: float) -> Place:
+    def place_at(turn: float) -> LabelPlace:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         corners = (mesh.positions @ rotation.T)[mesh.faces]
@@ -124,7 +137,7 @@ def front(
 
 def _place(
     corners: Floats, normals: Floats, uv: Floats, wide: float, z: float, aspect: float
-) -> Place:
+) -> LabelPlace:
     """Return the place of a label on the side that looks to −y.
 
     Raises a DiffractionError if that side's normals point away from −y, or its texture coordinates
@@ -160,7 +173,7 @@ def _place(
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
     elevations = np.degrees(np.arcsin(np.clip(steep, -1.0, 1.0)))
-    place = Place(np.column_stack([linear, shift]), (wide, high), elevations)
+    place = LabelPlace(np.column_stack([linear, shift]), (wide, high), elevations)
     for x in np.linspace(-0.5, 0.5, _COLUMNS):
         for y in np.linspace(-0.5, 0.5, _ROWS):
             number, weights, hit = _in_front(corners, x * wide, z + y * rise, facing)
@@ -220,7 +233,7 @@ def geometry(elevations: Floats) -> tuple[float, Floats]:
     return ring, np.clip(tangential, low, high)
 
 
-def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values: str) -> Path:
+def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **values: str) -> Path:
     """Write textures, patch, light and scene into a folder; return the scene.
 
     Parameters
@@ -241,15 +254,17 @@ def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values:
     # degrees from the first tangent, in the label's plane, to the label's upward direction
     orientation = 90.0 - math.degrees(math.atan2(linear[1, 0], linear[0, 0]))
     foil = logo(parts, tangential=tangential, orientation=orientation, period=PERIOD)
-    names = foil.write(folder, "label")
+    names = foil.write(folder, STEM)
     around = np.full(foil.weight.shape, 255, np.uint8)
     around[1:-1, 1:-1] = 0
-    with atomic_path(folder / "label_around.png") as temporary:
+    with atomic_path(folder / AROUND) as temporary:
         Image.fromarray(around).save(temporary, optimize=True)
-    copies = {"grating.toml": PATCHES / "hologram.toml", "ring.xml": STUDIO.parent / "ring.xml"}
+    copies = {GRATING: PATCHES / "hologram.toml", RING: STUDIO.parent / RING}
     if mesh is not None:
         copies[mesh.name] = mesh
     for name, source in copies.items():
+        if (folder / name).exists() and source.samefile(folder / name):
+            continue  # the mesh lies in the folder
         with atomic_path(folder / name) as temporary:
             shutil.copyfile(source, temporary)
     ny, nx = foil.weight.shape
@@ -261,7 +276,7 @@ def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values:
     low, high = (_DISTANCE * math.sin(math.radians(ring + side)) for side in (-1, 1))
     seen = max(place.size[1], place.size[0] / _PICTURE) / 2 / _FILLED  # half of the picture
     given = {
-        "patch": "grating.toml", "around": "label_around.png",
+        "patch": GRATING, "around": AROUND,
         **{name: path.name for name, path in names._asdict().items()},
         "to_uv": " ".join(f"{x:.9g}" for x in (a, b, 0, c, d, e, 0, f, 0, 0, 1, 0, 0, 0, 0, 1)),
         "fov": f"{2 * math.degrees(math.atan(seen / _FAR)):.6g}" if mesh is None else "1",
@@ -271,7 +286,7 @@ def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values:
         "ring_radius": f"{_DISTANCE * math.cos(math.radians(ring)):.6g}",
         "ring_low": f"{_MIDDLE + low:.6g}", "ring_high": f"{_MIDDLE + high:.6g}",
     }  # fmt: skip
-    scene = folder / "label.xml"
+    scene = folder / SCENE
     _write_scene(scene, given | values, lamp, mesh)
     return scene
 

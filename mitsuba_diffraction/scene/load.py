@@ -13,21 +13,23 @@ from __future__ import annotations
 import contextlib
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..inputs import note_input
 from ..llvm import require_llvm
+from ..plugin import installed
 from ..system import memory
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
-from .parameters import check_parameters, files_of, parameters_of
+from .parameters import check_includes, check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
-    from .bands import Bands
+    from .bands import SensorBands
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -89,7 +91,7 @@ def load_scene(
     parameters: Mapping[str, Any],
     *,
     box_filter: bool = False,
-    bands: Bands | None = None,
+    bands: SensorBands | None = None,
 ) -> Any:
     """Load an XML scene in the variant that is set.
 
@@ -106,14 +108,16 @@ def load_scene(
 
     readable_file(file)
     values = split_values(parameters, parameters_of(file, parameters) or ())
-    files_of(file, values.parameters, with_sources=False)  # refuses pipes
+    known = files_of(file, values.parameters, with_sources=False)
+    for each in known:
+        note_input(each)
     check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         with contextlib.nullcontext() if bands is None else wider_tables(bands.first):
-            scene = _instantiated(file, values, box_filter, bands)
+            scene = _instantiated(file, known, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -133,8 +137,17 @@ def load_scene(
     return scene
 
 
-def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Bands | None) -> Any:
-    """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects."""
+def _instantiated(
+    file: Path,
+    known: Sequence[Path],
+    values: SceneValues,
+    box_filter: bool,
+    bands: SensorBands | None,
+) -> Any:
+    """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects.
+
+    known : files that the scene may include.
+    """
     import mitsuba as mi
 
     from .additions import (
@@ -146,6 +159,7 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
     )
     from .bands import put_bands
     from .clamping import put_clamp
+    from .nodes import check_nodes
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -158,11 +172,16 @@ def _instantiated(file: Path, values: SceneValues, box_filter: bool, bands: Band
     try:
         with tempfile.TemporaryDirectory() as folder:
             state = mi.parser.parse_file(config, str(file), **values.parameters)
+            check_includes([Path(str(path)) for path in state.files], known)
+            installed.check_plugins(state)
+            installed.search_first()  # before the scene's folder
             _check_films(state)
+            _note_files(state)
             fit_meshes(state, Path(folder))
             put_materials(state, values.materials)
             put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
+            check_nodes(state)
             remove_dark_lights(state)
             if values.clamp is not None:
                 put_clamp(state, values.clamp)
@@ -221,6 +240,21 @@ def sensor_of(scene: Any, index: int) -> Any:
             f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
     return sensors[index]
+
+
+def _note_files(state: Any) -> None:
+    """Note the files that a parsed scene names as inputs, where Mitsuba finds them.
+
+    state : `mi.parser.ParserState`.
+    """
+    import mitsuba as mi
+
+    for node in state.nodes:
+        props = node.props
+        for name in list(props.keys()):
+            if props.type(name) == mi.Properties.Type.String and len(text := props[name]) < 1024:
+                note_input(str(mi.file_resolver().resolve(text)))
+                props.mark_queried(name, False)  # Mitsuba refuses what no plugin reads
 
 
 def _check_films(state: Any) -> None:

@@ -18,6 +18,7 @@ from scipy.ndimage import distance_transform_edt, grey_dilation, grey_erosion
 
 from ..errors import DiffractionError, one_line
 from ..files import readable_file
+from ..images import open_image
 from ..optics.colour import decode_srgb, linear_srgb, response
 from .hologram import Hologram, hologram
 
@@ -97,7 +98,7 @@ def _read(file: Path, dots: int) -> NDArray[np.uint8]:
     """Return RGBA (ny, nx, 4) with so many pixels along the longer side."""
     readable_file(file)
     try:
-        with Image.open(file) as picture:
+        with open_image(file) as picture:
             rgba = picture.convert("RGBA")
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         reason = one_line(str(error))

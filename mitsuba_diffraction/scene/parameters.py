@@ -8,18 +8,21 @@ import math
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
+from ..gltf import note_named
+from ..inputs import note_input
+from ..limits import DEEPEST_ELEMENT, DEEPEST_INCLUDE, MOST_INCLUDES, check_count
+from .stage import STUDIO
 
 _REFERENCE = re.compile(r"\$(\w+)")
-# Mitsuba stops at 15 includes within each other.
-_DEEPEST = 15
-# Longest path in characters: longer texts name no file, and asking would be an error.
-_LONGEST = 1024
+# Parameters of Mitsuba's plugins and of this package's whose text is the name of a file.
+_FILES = ("filename", "heightfield", "table", "layers", "pigment")
 
 Numbers = tuple[float, ...]
 
@@ -59,27 +62,48 @@ def parameters_of(
     a whole if a file is missing or no XML.
 
     values : those that are set, which may occur in the names of included files.
+
+    Raises a DiffractionError if an include is a pipe, or outside of the scene's folder.
     """
     defaults: dict[str, str | None] = {}
-    return defaults if _collect(scene, dict(values or {}), defaults, 0) else None
+    try:
+        for element, _ in _elements(_Document.of_scene(scene, values), values or {}, defaults):
+            if element.tag == "default":
+                name = element.get("name", "")
+                if defaults.get(name) is None:  # the first default counts, as in Mitsuba
+                    defaults[name] = element.get("value", "")
+                continue
+            for value in element.attrib.values():
+                for name in _REFERENCE.findall(value):
+                    defaults.setdefault(name, None)
+    except _Unreadable:
+        return None
+    return defaults
 
 
 def files_of(
     scene: Path, values: Mapping[str, str] | None = None, *, with_sources: bool = True
 ) -> list[Path]:
-    """List the scene, its includes, and every file named by one of them or by a recipe they name.
+    """List the scene, its includes, and every file that its plugins or the listed recipes read.
 
-    Raises a DiffractionError if one is a pipe or a device, for which Mitsuba would wait, or a
-    recipe is wrong.
+    Raises a DiffractionError if a file is a pipe or a device, for which Mitsuba would wait; if an
+    include lies outside of the scene's folder; or if a recipe is wrong.
 
     with_sources : whether recipes are read, for the files that they name.
     """
     from ..heights.recipes import Recipe
 
-    defaults = parameters_of(scene, values) or {}
-    known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
     files: dict[Path, None] = {}
     waiting = [scene]
+    if scene.suffix.lower() == ".xml":  # else heights or a recipe
+        defaults = parameters_of(scene, values) or {}
+        known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
+        with contextlib.suppress(_Unreadable):
+            for element, folders in _elements(_Document.of_scene(scene, values), known, {}):
+                if name := _file_named(element, known):
+                    # Mitsuba looks for included files and spectra beside the file that names them
+                    beside = element.tag in ("include", "spectrum")
+                    waiting.append(_found(name, folders if beside else folders[1:]))
     while waiting:
         file = waiting.pop()
         refuse_pipe(file)
@@ -88,41 +112,167 @@ def files_of(
         files[file] = None
         if with_sources and kind_of(file) is FileKind.RECIPE:
             waiting += Recipe.load(file).sources
-        if file.suffix.lower() != ".xml":
-            continue
-        with contextlib.suppress(ElementTree.ParseError, ValueError):
-            for element in ElementTree.parse(file).getroot().iter():
-                for text in element.attrib.values():
-                    named = _with_values(text, known, {})
-                    if named and len(named) < _LONGEST and "\0" not in named:
-                        waiting.append(scene.parent / named)
     return list(files)
 
 
-def _collect(
-    file: Path, values: Mapping[str, str], defaults: dict[str, str | None], depth: int
-) -> bool:
-    """Add the parameters of one file to `found`; whether it and its includes could be read."""
-    if depth > _DEEPEST or not file.is_file():
-        return False
-    try:
-        root = ElementTree.parse(file).getroot()
-    except (OSError, ElementTree.ParseError, ValueError):
-        return False
-    for element in root.iter():
-        if element.tag == "default":
-            name = element.get("name", "")
-            if defaults.get(name) is None:  # the first default counts, as in Mitsuba
-                defaults[name] = element.get("value", "")
-            continue
-        for value in element.attrib.values():
-            for name in _REFERENCE.findall(value):
-                defaults.setdefault(name, None)
-        if element.tag == "include":
-            included = file.parent / _with_values(element.get("filename", ""), values, defaults)
-            if not _collect(included, values, defaults, depth + 1):
-                return False
-    return True
+def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
+    """Note as inputs a file and all that it names, if it is a scene or a recipe.
+
+    A file that is wrong is left to its reader, who refuses it.
+    """
+    note_input(file)
+    with contextlib.suppress(DiffractionError):
+        for named in files_of(file, values):
+            note_input(named)
+            if named.suffix.lower() == ".gltf":
+                note_named(named)
+
+
+def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:
+    """Refuse a scene of which Mitsuba has read other files than `files_of` lists.
+
+    files : scene and includes, as Mitsuba has read them.
+    known : by `files_of`.
+
+    Raises a DiffractionError on XML that Mitsuba reads differently than Python.
+    """
+    expected = {file.resolve() for file in known}
+    for file in files:
+        if file.resolve() not in expected:
+            raise DiffractionError(
+                f"'{file}' is included by malformed XML; write <include "
+                "filename='NAME'/>, without entities of a document type"
+            )
+
+
+class _Unreadable(Exception):
+    """An included file is missing, and Mitsuba says so."""
+
+
+class _Shallow(ElementTree.TreeBuilder):
+    """Builder of a tree that refuses elements too far within each other."""
+
+    def __init__(self, shown: str) -> None:
+        super().__init__()
+        self._shown, self._depth = shown, 0
+
+    def start(self, tag: Any, attrs: Any) -> ElementTree.Element:
+        self._depth += 1
+        check_count(self._depth, DEEPEST_ELEMENT, self._shown, "elements within each other")
+        return super().start(tag, attrs)
+
+    def end(self, tag: Any) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+
+@dataclass(frozen=True)
+class _Document:
+    """A scene, or a file that it includes.
+
+    Attributes
+    ----------
+    file : the file.
+    folders : where Mitsuba looks for a name, after the file's own folder.
+    roots : folders within which includes have to lie.
+    chosen : names of parameters that the user has set: files that they name may lie anywhere.
+    depth : of includes within each other.
+    includes : number of includes of the scene so far, for each of which Mitsuba reads a file.
+    """
+
+    file: Path
+    folders: tuple[Path, ...]
+    roots: tuple[Path, ...]
+    chosen: Collection[str]
+    depth: int = 0
+    includes: list[int] = field(default_factory=lambda: [0])
+
+    @classmethod
+    def of_scene(cls, scene: Path, values: Mapping[str, str] | None) -> _Document:
+        # the package's own scenes may be included from everywhere
+        roots = (scene.parent, STUDIO.parent)
+        return cls(scene, (scene.parent, Path.cwd()), roots, frozenset(values or ()))
+
+    def root(self) -> ElementTree.Element:
+        """Return the outermost element.
+
+        Raises a DiffractionError for pipes, malformed XML, and elements too far within each other.
+        """
+        refuse_pipe(self.file)
+        if self.depth > DEEPEST_INCLUDE or not os.path.isfile(self.file):
+            raise _Unreadable
+        try:
+            parser = ElementTree.XMLParser(target=_Shallow(f"'{self.file}'"))
+            return ElementTree.parse(self.file, parser).getroot()
+        except ElementTree.ParseError as error:
+            raise DiffractionError(
+                f"'{self.file}' is malformed XML ({error}); mend it, since Mitsuba may read it "
+                "differently"
+            ) from error
+        except DiffractionError:
+            raise
+        except (OSError, ValueError) as error:
+            raise _Unreadable from error
+
+    def inner(self, text: str, name: str, folders: tuple[Path, ...]) -> _Document:
+        """Return an include, or the folder of a <path>.
+
+        text, name : its name as it is written, and with the values of parameters.
+
+        Raises a DiffractionError if it lies outside of all roots.
+        """
+        path, roots = _found(name, folders), self.roots
+        if text.startswith("$") and text[1:] in self.chosen:
+            roots = (*roots, path.parent)
+        elif not any(path.resolve().is_relative_to(folder.resolve()) for folder in roots):
+            raise DiffractionError(
+                f"'{self.file}' includes {quoted(name)}, which is outside of the scene's folder; "
+                "copy it there, or make the name a parameter of the scene, and set that by -D"
+            )
+        return replace(self, file=path, folders=folders, roots=roots, depth=self.depth + 1)
+
+
+def _elements(
+    document: _Document, values: Mapping[str, str], defaults: Mapping[str, str | None]
+) -> Iterator[tuple[ElementTree.Element, tuple[Path, ...]]]:
+    """Yield the elements of a scene and of its includes, in Mitsuba's order.
+
+    With each come the folders in which Mitsuba 3.9 looks for a name in it; the first is that of the
+    element's file.
+
+    values, defaults : of parameters that occur in names; the caller may add to `defaults`.
+    """
+    folders = document.folders
+    for element in document.root().iter():
+        around = (document.file.parent, *folders)
+        yield element, around
+        if element.tag in ("include", "path"):
+            text = element.get("filename" if element.tag == "include" else "value", "")
+            inner = document.inner(text, _with_values(text, values, defaults), around)
+            if element.tag == "path":
+                folders = (inner.file, *folders)
+            else:
+                inner.includes[0] += 1
+                check_count(
+                    inner.includes[0], MOST_INCLUDES, f"'{document.file}'", "includes so far"
+                )
+                yield from _elements(inner, values, defaults)
+
+
+def _file_named(element: ElementTree.Element, values: Mapping[str, str]) -> str:
+    """Return the name of a file that an element makes Mitsuba or a plugin read, or nothing."""
+    text = ""
+    if element.tag == "string" and element.get("name") in _FILES:
+        text = element.get("value", "")
+    elif element.tag in ("include", "spectrum"):
+        text = element.get("filename", "")
+    return _with_values(text, values, {})
+
+
+def _found(name: str, folders: Sequence[Path]) -> Path:
+    """Return the first path of this name that exists, or that in the first folder."""
+    paths = [folder / name for folder in folders]
+    return next((path for path in paths if os.path.lexists(path)), paths[0])
 
 
 def _with_values(text: str, values: Mapping[str, str], defaults: Mapping[str, str | None]) -> str:

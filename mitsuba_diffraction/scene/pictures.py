@@ -132,11 +132,10 @@ def count_bad(bitmap: Any) -> int:
 
 
 def _write(bitmap: Any, path: Path) -> None:
+    import mitsuba as mi
+
+    formats = mi.Bitmap.FileFormat
+    stream = mi.MemoryStream()  # Mitsuba's files lose the error of a full disk when they close
+    bitmap.write(stream, formats.PNG if path.suffix.lower() == ".png" else formats.OpenEXR)
     with atomic_path(path) as temporary:
-        try:
-            bitmap.write(str(temporary))
-        except RuntimeError as error:  # Mitsuba's exception for a full disk
-            reason = one_line(str(error)).rpartition(": ")[2]
-            raise DiffractionError(
-                f"cannot write '{path}': {reason}; no file was left behind"
-            ) from error
+        temporary.write_bytes(stream.raw_buffer())

@@ -19,7 +19,7 @@ WORST = 4.0
 SAMPLES = 128
 
 
-class Measured(NamedTuple):
+class InterpolationError(NamedTuple):
     """Error of interpolation, over random directions and wavelengths.
 
     mean : of the light in all orders but 0, which the table has too much or too little in an order.
@@ -40,7 +40,7 @@ class Measured(NamedTuple):
         return mean <= tolerance and self.most <= WORST * tolerance
 
 
-def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
+def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> InterpolationError:
     """Compare a table with solutions at random directions and wavelengths.
 
     Directions are sampled as in diffuse light within the superstrate, or a block, wavelengths
@@ -70,7 +70,7 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Measured:
             matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
             error = matrices - mueller_of(solved[place])[0, j]
             turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
-    return Measured(
+    return InterpolationError(
         *missed_shares(missed, light),
         np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
         float(turned / light.sum()) if table.polarised else None,

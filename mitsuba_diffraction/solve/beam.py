@@ -19,7 +19,7 @@ from ..tables.orders.polarised import mueller_of
 from ..tables.orders.table import check_outline
 from .efficiencies import Efficiencies, check_light
 from .films import Layers, Substance, structure_of
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .jobs import Jobs, problem_of
 from .measured import table_of
 from .nodes import places_at
@@ -34,7 +34,7 @@ _COMPARED, _MOST = 5, 100_000
 
 def solve_beam(
     profile: Profile,
-    material: str | float | complex | Material = "Al",
+    material: str | float | complex | TabulatedIndex = "Al",
     *,
     theta: ArrayLike,
     phi: ArrayLike = 0.0,

@@ -16,7 +16,7 @@ from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.blocks import even_nodes, factors
 from ..tables.orders.table import Counts, check_outline
 from .accuracy import measured_error, powers
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .jobs import AUTO, Jobs, problem_of
 from .nodes import Place, at_nodes, kinds_of, places_of
 from .orders import (
@@ -41,7 +41,7 @@ _MOST_VALUES = 1 << 25
 
 def solve_block(
     profile: Profile,
-    material: str | float | complex | Material,
+    material: str | float | complex | TabulatedIndex,
     *,
     settings: Settings | None = None,
     jobs: Jobs | None = None,

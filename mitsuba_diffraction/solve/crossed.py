@@ -22,7 +22,7 @@ from ..progress import Progress, silent
 from ..tables.orders import CrossedTable
 from ..tables.orders.crossed import all_orders, most_orders
 from .efficiencies import Efficiencies
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .jobs import Jobs, Solved, digest_of
 from .measured_crossed import crossed_table
 from .samples import missed_shares
@@ -48,14 +48,14 @@ class UnitCell:
     """
 
     field: HeightField
-    material: Material
+    material: TabulatedIndex
     harmonics: tuple[int, int]
     slices: int
 
 
 def solve_crossed(
     field: HeightField,
-    material: str | float | complex | Material = 1.5,
+    material: str | float | complex | TabulatedIndex = 1.5,
     *,
     wavelengths: tuple[float, float] = (380.0, 780.0),
     step: float = 20.0,

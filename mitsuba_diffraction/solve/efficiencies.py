@@ -33,8 +33,9 @@ from scipy.io import netcdf_file
 from ..columns import read_columns
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
-from ..files import FileKind, kind_of, read_bytes
-from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, MOST_NUMBERS, WAVELENGTHS
+from ..files import FileKind, beginning, kind_of, read_bytes
+from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
+from ..tables.orders.table import LARGEST_SUM, MOST_BANDS, WAVELENGTHS
 from .stations import Real
 
 AXES = ("wavelength", "theta", "phi", "order")
@@ -91,7 +92,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     unit, a hole in its grid, an order twice, or numbers out of range.
     """
     shown = repr(os.fspath(path))
-    head = read_bytes(path)[: len(_BEGINS_HDF5)]
+    head = beginning(path, len(_BEGINS_HDF5))
     if kind_of(path) is FileKind.ORDERS:
         raise DiffractionError(f"{shown} is a table of orders already; use it as it is")
     if head.startswith(b"CDF") or head == _BEGINS_HDF5:
@@ -242,14 +243,14 @@ def _classic(path: str | os.PathLike[str]) -> dict[str, Variable]:
 def _hdf5(path: str | os.PathLike[str]) -> dict[str, Variable]:
     """Read the variables of a NetCDF file of version 4."""
     h5py = optional("h5py", repr(os.fspath(path)))
-    variables = {}
-    with h5py.File(path, "r") as file:
+    variables, claimed, shown = {}, 0.0, repr(os.fspath(path))
+    with bounded_memory(size := os.path.getsize(path), shown), h5py.File(path, "r") as file:
         for name in (*AXES, *REFLECTED, *TRANSMITTED):
             if name not in file:
                 continue
             data = file[name]
-            if data.size > MOST_NUMBERS:
-                raise ValueError(f"{name} claims {data.size} numbers")
+            claimed += 8.0 * data.size
+            check_content(claimed, size, shown)
             scales = [dimension[0].name.rpartition("/")[2] for dimension in data.dims if dimension]
             dimensions = [name] if data.is_scale else scales
             variables[name] = _variable(dimensions, data[()], data.attrs)
@@ -305,10 +306,10 @@ def _check_all(name: str, numbers: Real, allowed: NDArray[np.bool_], hint: str, 
 def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:
     """Refuse grids that are too large, or empty."""
     size = np.prod(shape, dtype=float) * kinds
-    if not 0 < size <= MOST_NUMBERS:
+    if not 0 < size <= MOST_EFFICIENCIES:
         raise DiffractionError(
             f"{shown} has {' x '.join(map(str, shape))} wavelengths, theta, phi and orders; a "
-            f"table may be made of 1 to {MOST_NUMBERS} efficiencies: list fewer"
+            f"table may be made of 1 to {MOST_EFFICIENCIES} efficiencies: list fewer"
         )
 
 

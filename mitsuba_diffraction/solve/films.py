@@ -10,22 +10,21 @@ from typing import Any
 from ..errors import DiffractionError, check_keys, one_line, quoted
 from ..files import read_text
 from ..heights.lengths import count_between, number_between
-from .grating_index import Material, material_of
+from ..limits import MOST_LAYERS, check_count
+from .grating_index import TabulatedIndex, material_of
 from .profiles import Profile
 from .stations import Grating
-from .structure import Film, Part, Slice, Structure
+from .structure import Part, ProfileFilm, Slice, Structure
 
-Substance = str | float | complex | Material
+Substance = str | float | complex | TabulatedIndex
 #: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
 #: thickness and parts, of a material and the x in µm at which it begins and ends.
 Layers = Sequence[tuple[Any, ...]]
-#: Layers at most, of a file.
-MOST_LAYERS = 1000
 
 
 def structure_of(
     profile: Profile,
-    substance: Material,
+    substance: TabulatedIndex,
     wavelengths: tuple[float, float],
     *,
     layers: Layers = (),
@@ -79,10 +78,11 @@ def read_layers(path: str | os.PathLike[str]) -> Layers:
         raise DiffractionError(f"{shown} is not TOML: {one_line(str(error))}") from error
     check_keys(shown, content, ("layers", "repeat"))
     repeat = count_between(content.get("repeat", 1), f"{shown}: repeat", 1, MOST_LAYERS)
-    layers = list(checked_layers(content.get("layers"), f"{shown}: layers")) * repeat
-    if not 0 < len(layers) <= MOST_LAYERS:
-        raise DiffractionError(f"{shown}: {len(layers)} layers; expected 1 to {MOST_LAYERS}")
-    return tuple(layers)
+    layers = checked_layers(content.get("layers"), f"{shown}: layers")
+    if not layers:
+        raise DiffractionError(f"{shown}: 0 layers; expected 1 to {MOST_LAYERS}")
+    check_count(len(layers) * repeat, MOST_LAYERS, shown, "layers")
+    return tuple(layers) * repeat
 
 
 def checked_layers(value: Any, shown: str) -> Layers:
@@ -115,14 +115,14 @@ def material_text(grating: Grating) -> str:
     return " on ".join([*films, *own, *lower, *([lowest.name] if lowest else [])])
 
 
-def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> Film:
+def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> ProfileFilm:
     """Return a layer, (material, thickness), on a profile."""
     if len(layer) != 2 or not isinstance(layer[1], float | int):
         raise DiffractionError(
             f"{where}: expected a material and a thickness in µm, got {quoted(layer)}; slices lie "
             "beneath a profile"
         )
-    return Film(_index(layer[0], where, wavelengths), _thickness(layer[1], where))
+    return ProfileFilm(_index(layer[0], where, wavelengths), _thickness(layer[1], where))
 
 
 def _slice(
@@ -161,10 +161,10 @@ def _check_parts(parts: Iterable[Part], where: str, period: float) -> None:
             )
 
 
-def _index(material: Any, where: str, wavelengths: tuple[float, float]) -> Material:
+def _index(material: Any, where: str, wavelengths: tuple[float, float]) -> TabulatedIndex:
     """Return a material that has an index."""
     try:
-        if not isinstance(material, str | int | float | complex | Material):
+        if not isinstance(material, str | int | float | complex | TabulatedIndex):
             raise DiffractionError(f"expected a material, got {quoted(material)}")
         known = material_of(material, wavelengths)
     except DiffractionError as error:

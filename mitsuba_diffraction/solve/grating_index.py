@@ -13,7 +13,7 @@ from ..plugin.conductors import tabulated_index
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class TabulatedIndex:
     """Complex index n + ik, linear in between, constant beyond.
 
     Attributes
@@ -36,8 +36,8 @@ class Material:
 
 
 def material_of(
-    material: str | float | complex | Material, wavelengths: tuple[float, float]
-) -> Material:
+    material: str | float | complex | TabulatedIndex, wavelengths: tuple[float, float]
+) -> TabulatedIndex:
     """Return a material from a name of `optics.materials`, an index, or "none" (R = 1).
 
     Raises a DiffractionError if the name is unknown, the index impossible, or its table ends within
@@ -48,11 +48,11 @@ def material_of(
     material : name such as "Al", number such as 1.5 or 0.6+5.6j, or their text.
     wavelengths : shortest and longest, nm, for which the index must be known.
     """
-    if isinstance(material, Material):
+    if isinstance(material, TabulatedIndex):
         return material
     number = material_named(material)
     if number == PERFECT:
-        return Material("perfect conductor", np.array([0.0]), None)
+        return TabulatedIndex("perfect conductor", np.array([0.0]), None)
     if isinstance(number, str):
         nodes, values = tabulated_index(number)
         low, high = wavelengths
@@ -62,5 +62,7 @@ def material_of(
                 f"and the wavelengths are {low:g} to {high:g} nm; choose wavelengths within, or "
                 "give the index as a number"
             )
-        return Material(number, nodes, values)
-    return Material(f"index {number.real:g}+{number.imag:g}i", np.array([0.0]), np.array([number]))
+        return TabulatedIndex(number, nodes, values)
+    return TabulatedIndex(
+        f"index {number.real:g}+{number.imag:g}i", np.array([0.0]), np.array([number])
+    )

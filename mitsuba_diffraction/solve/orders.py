@@ -14,9 +14,9 @@ from ..heights.lengths import count_between, number_between
 from ..tables.orders import Band, OrderTable, cells
 from ..tables.orders.polarised import ODD, mueller_of
 from ..tables.orders.table import MOST_NODES, Counts, check_outline
-from .accuracy import WORST, Measured, diffuse_light, measured_error, powers
+from .accuracy import WORST, InterpolationError, diffuse_light, measured_error, powers
 from .films import Layers, Substance, material_text, structure_of
-from .grating_index import Material, material_of
+from .grating_index import TabulatedIndex, material_of
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, problem_of, solver_of
 from .nodes import (
     MAX_NODES,
@@ -92,7 +92,7 @@ class Settings:
 
 def solve_orders(
     profile: Profile,
-    material: str | float | complex | Material = "Al",
+    material: str | float | complex | TabulatedIndex = "Al",
     *,
     superstrate: float = 1.0,
     thin: bool = False,
@@ -184,7 +184,7 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
     }
 
 
-def conclude(header: dict[str, Any], error: Measured, how: Settings, jobs: Jobs) -> None:
+def conclude(header: dict[str, Any], error: InterpolationError, how: Settings, jobs: Jobs) -> None:
     """Add a table's error to its header; warn if it is above the tolerance."""
     header |= {"error_mean": error.mean, "error_worst": error.most}
     header["processor_seconds"] = round(jobs.processor_seconds, 1)

@@ -22,7 +22,7 @@ from scipy.linalg import block_diag
 from ..errors import DiffractionError
 from ..optics import fresnel
 from ..tables.orders.table import LEAST_BLOCK
-from .grating_index import Material
+from .grating_index import TabulatedIndex
 from .stations import Complex, Real, Station
 
 #: Share of the light that a totally reflecting side sends back: where a channel has no way out, as
@@ -32,7 +32,7 @@ _KEPT = 1.0 - 1e-7
 _LEVEL = 1e-12
 
 
-def check_clear(material: Material, wavelengths: tuple[float, float]) -> None:
+def check_clear(material: TabulatedIndex, wavelengths: tuple[float, float]) -> None:
     """Refuse materials that light does not go through.
 
     wavelengths : shortest and longest, in vacuum, nm.

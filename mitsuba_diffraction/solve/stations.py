@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..tables.orders import cells
-from .grating_index import Material
+from .grating_index import TabulatedIndex
 from .profiles import Profile
 from .structure import Structure
 
@@ -47,7 +47,7 @@ class Grating:
     """
 
     profile: Profile
-    material: Material
+    material: TabulatedIndex
     superstrate: float
     wavelengths: tuple[float, float]
     thin: bool = False

@@ -5,20 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .grating_index import Material
+from .grating_index import TabulatedIndex
 
 
-class Film(NamedTuple):
+class ProfileFilm(NamedTuple):
     """Film on a profile, as thick along z everywhere; thickness in µm."""
 
-    material: Material
+    material: TabulatedIndex
     thickness: float
 
 
 class Part(NamedTuple):
     """Rectangle of a slice, from x = begin to end in µm; end may lie in the next period."""
 
-    material: Material
+    material: TabulatedIndex
     begin: float
     end: float
 
@@ -41,9 +41,9 @@ class Structure:
     substrate : below the slices; None is the profile's material.
     """
 
-    films: tuple[Film, ...] = ()
+    films: tuple[ProfileFilm, ...] = ()
     slices: tuple[Slice, ...] = ()
-    substrate: Material | None = None
+    substrate: TabulatedIndex | None = None
 
     def __bool__(self) -> bool:
         """Whether any medium is added."""
@@ -55,7 +55,7 @@ class Structure:
         return bool(self.slices or self.substrate)
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[TabulatedIndex, ...]:
         """Materials of the films, of the slices' parts, and of the substrate, in this order."""
         parts = (part.material for layer in self.slices for part in layer.parts)
         substrate = () if self.substrate is None else (self.substrate,)

@@ -9,6 +9,7 @@ has the SHA-256 of the rest of the file.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -75,9 +76,31 @@ def write_channels(
     contiguous = {name: np.ascontiguousarray(part) for name, part in channels.items()}
     with atomic_path(path) as temporary:
         try:
-            OpenEXR.File(header, contiguous).write(str(temporary))
+            OpenEXR.File(header, {**contiguous}).write(str(temporary))
         except RuntimeError as error:  # OpenEXR's exception for a full disk
             raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
+        _check_written(temporary, contiguous)
+
+
+def _check_written(file: Path, channels: Mapping[str, NDArray[Any]]) -> None:
+    """Read a file back: OpenEXR loses the error of a full disk when it closes a file.
+
+    Raises an OSError if it does not hold these channels.
+    """
+    single: dict[str, NDArray[Any]] = {}
+    for name, part in channels.items():
+        planes = dict(zip(name, np.moveaxis(part, -1, 0), strict=True)) if part.ndim == 3 else None
+        single |= planes or {name: part}
+    try:
+        found = _read(file)
+        whole = all(
+            np.ascontiguousarray(plane).tobytes() == found[name].pixels.tobytes()
+            for name, plane in single.items()
+        )
+    except (DiffractionError, LookupError):
+        whole = False
+    if not whole:
+        raise OSError(errno.ENOSPC, "the file is cut short; is the disk full?")
 
 
 def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
@@ -97,7 +120,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         ) from error
     if not isinstance(document, dict):
         raise DiffractionError(
-            f"'{path}' is an EXR image but no table; make one of it with the command "
+            f"'{path}' is an EXR image but no table; make a table with the command "
             "'precompute' (DiffractionTable.build), or give it as heightfield"
         )
     version = document.pop("version", None)

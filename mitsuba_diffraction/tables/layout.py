@@ -3,7 +3,7 @@
 Coefficients are an array (intervals, rows, columns, components, terms). Bin (0, 0), the zeroth
 order, is in the middle of (rows, columns), and zero; its series is kept apart (`order_0`). A
 renderer reads the numbers of one bin as a record: one component after the other, the terms of each
-filled up with zeros (`Record`). Functions of κ are sampled on equal cells of every interval,
+filled up with zeros (`BinRecord`). Functions of κ are sampled on equal cells of every interval,
 without the factor they fade with as κ → 0 (`cells_of`).
 """
 
@@ -74,7 +74,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Record:
+class BinRecord:
     """The numbers of one bin in one interval, as renderers store them.
 
     Attributes
@@ -88,12 +88,12 @@ class Record:
     stored: int
 
     @classmethod
-    def of(cls, components: int, terms: int, unit: int = 1) -> Record:
+    def of(cls, components: int, terms: int, unit: int = 1) -> BinRecord:
         """Terms filled up to a multiple of `unit`."""
         return cls(components, terms, -(-terms // unit) * unit)
 
     @classmethod
-    def aligned(cls, components: int, terms: int) -> Record:
+    def aligned(cls, components: int, terms: int) -> BinRecord:
         """Fill up as processors gather best: 1, 2, or a multiple of 4 terms, of 8 from 17 on."""
         return cls.of(components, terms, 1 if terms <= 2 else 4 if terms <= 16 else 8)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
+from ..optics.mirror import horizon_correction
 from .table import DiffractionTable
 from .window import taps_at
 
@@ -46,6 +47,21 @@ def window_sum(
     Array of that shape; NaN beyond κ_max or the reach of the shortest wavelength, since a table
     never extrapolates; 0 beyond the table's `frequency_limit`.
     """
+    others, zeroth, cosine = window_sums(table, qx, qy, kappa, place)
+    return np.asarray(others + zeroth + 2.0 * cosine * np.sqrt(others * zeroth))
+
+
+def window_sums(
+    table: DiffractionTable,
+    qx: ArrayLike,
+    qy: ArrayLike,
+    kappa: ArrayLike,
+    place: ArrayLike | None = None,
+) -> tuple[NDArray[np.float64], ...]:
+    """`window_sum` of all orders but 0, of order 0, and the cosine of the phase between both.
+
+    The cosine is 0 where powers add up.
+    """
     coordinates = [qx, qy, kappa]
     if place is not None:
         if not table.grid.coherent:
@@ -53,11 +69,11 @@ def window_sum(
         coordinates += [np.asarray(place, float)[..., axis] for axis in (0, 1)]
     qx, *rest = np.broadcast_arrays(*(np.asarray(a, float) for a in coordinates))
     flat = [np.ravel(a) for a in (qx, *rest)]
-    result = np.empty(flat[0].size)
-    for start in range(0, result.size, _CHUNK):
+    result = np.empty((3, flat[0].size))
+    for start in range(0, flat[0].size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        result[part] = _window_sum(table, *(a[part] for a in flat))
-    return result.reshape(qx.shape)
+        result[:, part] = _window_sums(table, *(a[part] for a in flat))
+    return tuple(part.reshape(qx.shape) for part in result)
 
 
 def brdf(
@@ -77,25 +93,38 @@ def brdf(
     u, v, w = diffraction_coordinates(wi, wo)
     above = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0)
     u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
-    power = window_sum(table, k * u, k * v, k * w * height_scale, place)
-    power *= 4 * np.pi**2 * table.sigma**4
-    return kirchhoff_factor(wi, wo, wavelength, table.sigma) * power
+    others, zeroth, phase = window_sums(table, k * u, k * v, k * w * height_scale, place)
+    factor = 4 * np.pi**2 * table.sigma**4 * kirchhoff_factor(wi, wo, wavelength, table.sigma)
+    cos_i, cos_o = (np.where(above, np.asarray(each)[..., 2], 1.0) for each in (wi, wo))
+    mirror = k**2 * table.sigma**2 / np.pi * np.where(above, zeroth, 0.0)
+    others *= factor
+    mirror *= horizon_correction(cos_i, cos_o, np.sqrt(k * table.sigma_0), np.zeros_like(k))
+    return np.asarray(others + mirror + 2.0 * phase * np.sqrt(others * mirror))
 
 
-def _window_sum(
+def _window_sums(
     table: DiffractionTable,
     qx: NDArray[np.float64],
     qy: NDArray[np.float64],
     kappa: NDArray[np.float64],
     *place: NDArray[np.float64],
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], ...]:
     grid = table.grid
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
     summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
-    result = np.sum(summed**2, axis=1) if grid.coherent else np.maximum(summed[:, 0], 0.0)
-    result[~table.covers(qx, qy, kappa)] = 0.0
-    result[~table.reachable(qx, qy, kappa)] = np.nan
-    return result
+    order_0 = order_0_sum(table, qx, qy, kappa, kernels)[:, 0]
+    cosine = np.zeros_like(qx)
+    if grid.coherent:
+        rest = summed[:, 0] + 1j * summed[:, 1] - order_0
+        others, zeroth = np.abs(rest) ** 2, np.abs(order_0) ** 2
+        cosine = (rest * np.conj(order_0)).real / np.maximum(np.sqrt(others * zeroth), 1e-300)
+    else:
+        zeroth = order_0
+        others = np.maximum(summed[:, 0] - zeroth, 0.0)
+    for part in (others, zeroth):
+        part[~table.covers(qx, qy, kappa)] = 0.0
+    others[~table.reachable(qx, qy, kappa)] = np.nan
+    return others, zeroth, cosine
 
 
 def weighted_sum(
@@ -137,23 +166,37 @@ def weighted_sum(
         weight_x = weight_x * _phases(column, taps[0], grid.last[0], place[0], table.spacing[0])
         weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])
 
-    def bin_value(values: NDArray[np.float64]) -> NDArray[Any]:
-        if grid.coherent:
-            return values[:, :1] + 1j * values[:, 1:]
-        if expansion.kind == "amplitude":
-            return np.sum(values**2, axis=1, keepdims=True)
-        return values
-
-    ratio = table.order_0_ratio
-    lobe = ratio * (kernels[0](x) * kernels[1](y)) ** ratio
-    total = bin_value(table.order_0_at(kappa)) * lobe[:, None]
+    total = order_0_sum(table, qx, qy, kappa, kernels)
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):
             packet = table.coefficients[interval, row + j, column + i].astype(float)
-            value = bin_value(np.einsum("npt,nt->np", packet, scaled))
+            value = _bin_value(table, np.einsum("npt,nt->np", packet, scaled))
             total += (weight_x[:, i] * weight_y[:, j])[:, None] * value
     return np.concatenate([total.real, total.imag], axis=1) if grid.coherent else total
+
+
+def order_0_sum(
+    table: DiffractionTable,
+    qx: NDArray[np.float64],
+    qy: NDArray[np.float64],
+    kappa: NDArray[np.float64],
+    kernels: tuple[Kernel, Kernel],
+) -> NDArray[Any]:
+    """Return order 0's part of `weighted_sum`, (n, 1); its complex amplitude of `patch`."""
+    ratio = table.order_0_ratio
+    x, y = qx / table.spacing[0], qy / table.spacing[1]
+    lobe = ratio * (kernels[0](x) * kernels[1](y)) ** ratio
+    return np.asarray(_bin_value(table, table.order_0_at(kappa)) * lobe[:, None])
+
+
+def _bin_value(table: DiffractionTable, values: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the power or the complex amplitude, (n, 1), of numbers stored in a table."""
+    if table.grid.coherent:
+        return values[:, :1] + 1j * values[:, 1:]
+    if table.expansion.kind == "amplitude":
+        return np.sum(values**2, axis=1, keepdims=True)
+    return values
 
 
 def _phases(

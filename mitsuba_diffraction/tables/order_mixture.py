@@ -67,8 +67,6 @@ def order_mixture(
     height_scale: float,
     reach: float,
     smoothing: float,
-    *,
-    apart: bool = False,
 ) -> OrderMixture:
     """Sort a table's orders.
 
@@ -78,7 +76,6 @@ def order_mixture(
     height_scale : factor on its heights.
     reach : largest frequency that the light probes, rad/µm, at most `DiffractionTable.q_limit`.
     smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
-    apart : whether order 0 is apart from the density even if its lobe is as wide.
     """
     expansion = table.expansion
     kappa_max = reach * height_scale
@@ -89,7 +86,6 @@ def order_mixture(
     # samples of a window's power have its lobes in them already: as strong orders, with lobes of
     # their own, they are for lobes that are narrow beside the smoothing
     all_smooth = lobe >= (NARROW if table.grid.coherent else 1.0) * smoothing
-    apart = apart or table.order_0_ratio > 1.0
     axes = [_Axis(table, axis, fine=2.0 * lobe > smoothing) for axis in (0, 1)]
     if table.grid.coherent:  # powers between the bins have the lobes in them
         apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)
@@ -105,12 +101,9 @@ def order_mixture(
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     stored = []
-    powers_at = _Powers(table, axes, apart)
+    powers_at = _Powers(table, axes)
     for n, kappa in enumerate(kappas):
         power, central[n] = powers_at(float(kappa))
-        if all_smooth and not apart:  # order 0 then is as wide as any other
-            power[len(power) // 2, power.shape[1] // 2] += central[n]
-            central[n] = 0.0
         np.maximum(strongest, power, out=strongest)
         density[n] = (splats[0] @ (splats[1] @ power).T).T
         stored.append(power if power.nbytes * count < 400e6 else None)
@@ -159,8 +152,8 @@ class _Axis:
 class _Powers:
     """Powers at any κ; keeps the coefficients of the last interval in single precision."""
 
-    def __init__(self, table: DiffractionTable, axes: list[_Axis], apart: bool) -> None:
-        self._table, self._axes, self._apart = table, axes, apart
+    def __init__(self, table: DiffractionTable, axes: list[_Axis]) -> None:
+        self._table, self._axes = table, axes
         self._interval = -1
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
@@ -182,8 +175,6 @@ class _Powers:
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
             weight = axes[0].weight * axes[1].weight
             power = np.abs(field).astype(np.float32) ** 2 * weight
-            if not self._apart:
-                return power, 0.0
             # order 0 is the mean's lobe, or all light where the speckle is darker than that
             x, y = (axis.lobe for axis in axes)
             order_0 = np.minimum(centre * weight * y[:, None] * x, power)

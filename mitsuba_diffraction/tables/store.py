@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
 from ..errors import DiffractionError, one_line, warn
+from ..inputs import note_input
 
 #: Environment variable that moves the cache, e.g. to a larger disk.
 VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
@@ -69,7 +70,7 @@ class Record:
 
 
 class Recorded(Protocol):
-    """What the cache stores."""
+    """Content of the cache: an object that packs itself into a record."""
 
     def to_record(self) -> Record:
         """Return the record of this object."""
@@ -242,6 +243,7 @@ def loaded_once(
         status = os.stat(path)
     except OSError:
         return load(path)  # whose error names the damage
+    note_input(path)
     key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
     value = in_use.get(key)
     return in_use.setdefault(key, load(path)) if value is None else value

@@ -55,7 +55,7 @@ SWEEPS: dict[str, _Kind] = {
 }
 
 
-class Difference(NamedTuple):
+class MapDifference(NamedTuple):
     """Difference of a map from the reference over the pixels that the reference lights.
 
     All values are NaN without a reference.
@@ -77,7 +77,7 @@ class Step:
     label: str  # the value with its unit
     map: BrdfMap
     seconds: float  # time of the map, without that of tables
-    difference: Difference = field(default_factory=Difference)
+    difference: MapDifference = field(default_factory=MapDifference)
 
     def compared(self, reference: BrdfMap) -> Step:
         """Return the step with its difference from the map `reference`."""
@@ -213,14 +213,14 @@ def label_of(kind: str, value: Any) -> str:
     return f"{value}" if kind == "method" else f"{value:g}{SWEEPS[kind].unit}"
 
 
-def _difference(base: BrdfMap, other: BrdfMap) -> Difference:
+def _difference(base: BrdfMap, other: BrdfMap) -> MapDifference:
     """Compare a map with the map `base`."""
     assert base.xyz is not None
     assert other.xyz is not None
     away = base.away_from_mirror()
     luminance = base.luminance.astype(np.float64)
     if not luminance.max() > 0.0:
-        return Difference()
+        return MapDifference()
     # a grating is dark nearly everywhere, so only the pixels that it lights count
     bright = np.percentile(luminance[away], 99.9)
     lit = luminance > _LIT * bright
@@ -230,7 +230,7 @@ def _difference(base: BrdfMap, other: BrdfMap) -> Difference:
     own_exposure = delta_e(first, second * (levels[0] / levels[1] if levels[1] > 0.0 else 1.0))
     shares = [m[away].sum(axis=0, dtype=np.float64) for m in (base.xyz, other.xyz)]
     blue = [share[2] / share[0] if share[0] > 0.0 else np.nan for share in shares]
-    return Difference(
+    return MapDifference(
         delta_e=float(np.nanmean(same_exposure)),
         delta_e_95=float(np.nanpercentile(same_exposure, 95.0)),
         delta_e_own_exposure=float(np.nanmean(own_exposure)),

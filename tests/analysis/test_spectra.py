@@ -19,7 +19,7 @@ from mitsuba_diffraction.analysis.spectra_files import (
     save_errors,
     spectra_figure,
 )
-from mitsuba_diffraction.analysis.spectrometer import STEEPEST, Geometry
+from mitsuba_diffraction.analysis.spectrometer import STEEPEST, MeasurementGeometry
 from tests.support.acceptance import spectra_and_reference
 from tests.support.variants import obstacle
 
@@ -135,7 +135,7 @@ def test_means_have_standard_errors_and_files_have_columns(tmp_path):
 )  # fmt: skip
 def test_geometries_are_measurable_or_refused(light, detectors, azimuth, acceptance):
     try:
-        geometry = Geometry(light, tuple(detectors), azimuth, acceptance)
+        geometry = MeasurementGeometry(light, tuple(detectors), azimuth, acceptance)
     except md.DiffractionError as error:
         assert "\n" not in str(error)
         return

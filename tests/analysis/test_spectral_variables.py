@@ -7,14 +7,14 @@ import pytest
 
 from mitsuba_diffraction.analysis.spectra import Spectra
 from mitsuba_diffraction.analysis.spectral_variables import colours_of
-from mitsuba_diffraction.analysis.spectrometer import Geometry
+from mitsuba_diffraction.analysis.spectrometer import MeasurementGeometry
 
 LAM = np.arange(300.0, 701.0, 1.0)
 
 
 def test_variables_of_a_bell_are_its_closed_forms():
     curve = 0.1 + 0.4 * np.exp(-0.5 * ((LAM - 520.0) / 30.0) ** 2)
-    (row,) = colours_of(Spectra(LAM, curve[:, None], Geometry(30.0, (-10.0,)), "white"))
+    (row,) = colours_of(Spectra(LAM, curve[:, None], MeasurementGeometry(30.0, (-10.0,)), "white"))
     assert row["spectrum"] == "light30_detectorm10"
     mean = 10.0 + 40.0 * 30.0 * np.sqrt(2.0 * np.pi) / 401.0  # the bell ends within the range
     assert (row["B2"], row["B3"], row["H1"]) == pytest.approx((mean, 50.0, 520.0), rel=1e-4)
@@ -26,7 +26,7 @@ def test_variables_of_a_bell_are_its_closed_forms():
 
 
 def test_white_has_no_chroma_and_black_no_colour():
-    geometry = Geometry(30.0, (0.0, 10.0))
+    geometry = MeasurementGeometry(30.0, (0.0, 10.0))
     lam = np.arange(360.0, 831.0, 5.0)
     white, black = colours_of(Spectra(lam, np.tile([1.0, 0.0], (lam.size, 1)), geometry, "white"))
     assert white["chroma"] == pytest.approx(0.2, abs=0.2)  # equal energy is not quite D65

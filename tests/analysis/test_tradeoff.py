@@ -18,7 +18,12 @@ from mitsuba_diffraction.analysis.tradeoff.accuracy import (
     measure_wavelengths,
     taylor_error,
 )
-from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, rows, settings
+from mitsuba_diffraction.analysis.tradeoff.measuring import (
+    MeasuredSetting,
+    TradeoffSetting,
+    rows,
+    settings,
+)
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
 from tests.support.directions import rough_patch
 
@@ -48,9 +53,14 @@ def test_the_error_of_twice_the_power_is_one(sample):
     assert sample.error(2.0 * sample.exact) == pytest.approx((1.0, 1.0), abs=1e-12)
 
 
-def result(name: str, error: float, relative: float, megabytes: float, **arguments) -> Measured:
-    return Measured(
-        Setting("tolerance", name, arguments), error=error, relative=relative, megabytes=megabytes
+def result(
+    name: str, error: float, relative: float, megabytes: float, **arguments
+) -> MeasuredSetting:
+    return MeasuredSetting(
+        TradeoffSetting("tolerance", name, arguments),
+        error=error,
+        relative=relative,
+        megabytes=megabytes,
     )
 
 
@@ -110,7 +120,9 @@ def measured(tmp_path: Path) -> Path:
     document = {
         "patch": "a patch",
         "machine": {"cores": 2, "processor": "Abacus"},
-        "settings": list(rows([*RESULTS, Measured(Setting("basis", "none"), refused="too deep")])),
+        "settings": list(
+            rows([*RESULTS, MeasuredSetting(TradeoffSetting("basis", "none"), refused="too deep")])
+        ),
         "spectral": {"steps": {"5.0": 0.25}, "counts": {"4": 0.75}},
     }
     (tmp_path / "tradeoff.json").write_text(json.dumps(document), "utf-8")
@@ -143,7 +155,10 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
 
     np.save(tmp_path / "heights.npy", PATCH.heights)
     monkeypatch.setattr(command, "QUICK", command.Effort(48, 16, 256, 1, 1))
-    few = (Setting("default", "the defaults"), Setting("tolerance", "1e-2", {"tolerance": 1e-2}))
+    few = (
+        TradeoffSetting("default", "the defaults"),
+        TradeoffSetting("tolerance", "1e-2", {"tolerance": 1e-2}),
+    )
     monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
     heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]
     with warnings.catch_warnings():

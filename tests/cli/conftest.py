@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ import pytest
 
 from tests.support import ROOT
 from tests.support.command_line import Ran
+from tests.support.inputs import write_inputs
 
 
 @pytest.fixture
@@ -60,3 +62,18 @@ def heights(tmp_path: Path) -> Path:
     file.parent.mkdir()
     np.save(file, np.tile(0.02 * np.sin(2 * np.pi * x / 3.0), (75, 1)))
     return file
+
+
+@pytest.fixture(scope="session")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of small inputs of every kind."""
+    folder = tmp_path_factory.mktemp("original")
+    write_inputs(folder)
+    return folder
+
+
+@pytest.fixture
+def world(original: Path, here: Path) -> Path:
+    """A copy of the small inputs, which is the current folder."""
+    shutil.copytree(original, here, dirs_exist_ok=True)
+    return here

@@ -160,7 +160,7 @@ def test_contradictions_are_usage_errors(run, heights, here, options, text):
 def test_the_source_is_not_overwritten(run, heights):
     assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
     line = run("brdf-map", "table.exr", "-o", "table.exr").failed_in_one_line()
-    assert "would overwrite its own source" in line
+    assert "would overwrite" in line
 
 
 def test_a_table_of_lengths_in_air_is_refused_in_water(run, heights):

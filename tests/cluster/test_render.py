@@ -82,6 +82,9 @@ def test_jobs_of_a_queue_are_workers(scene, expected):
 
 
 def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path):
+    (tmp_path / "id_rsa").write_text("private")
+    key = f'<default name="key" value="{tmp_path / "id_rsa"}"/><default name="spp"'
+    scene.write_text(SCENE.replace('<default name="spp"', key))
     address = client.scheduler.address
     ran = run(
         "render", scene, "-m", VARIANT, "-s", SPP, "--seed", 3, "--scheduler", address,
@@ -91,6 +94,7 @@ def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path
     assert "12 tasks in 12 sums" in ran.out
     assert "workers at http://" in ran.err  # Dask's dashboard
     assert "GB of memory" in ran.err
+    assert "files for workers that lack them: room.xml\n" in ran.err
     np.testing.assert_allclose(pixels("a.exr"), expected, atol=1e-3)
     report = json.loads((tmp_path / "a.json").read_text())["workers"]
     assert report["tasks"] == 12

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.field import MAX_PIXELS, HeightField
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.limits import MOST_PIXELS
 
 FLAT = np.zeros((3, 4))
 
@@ -138,7 +139,7 @@ def test_unusable_heights_are_refused(heights, word):
 
 def test_absurd_sizes_are_refused_without_memory():
     huge = np.broadcast_to(np.zeros(1), (2**20, 2**20))
-    with pytest.raises(DiffractionError, match=str(MAX_PIXELS)):
+    with pytest.raises(DiffractionError, match=str(MOST_PIXELS)):
         HeightField(huge, 0.1)
 
 

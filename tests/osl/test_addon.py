@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import tomllib
 import zipfile
 from pathlib import Path
@@ -36,3 +38,38 @@ def test_a_folder_without_an_export_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DiffractionError, match="export-osl"):
         md.osl.make_addon({"grating": tmp_path}, tmp_path / "looks.zip")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["../secret.exr", "{outside}", "link.exr", "pipe.exr", "note.txt"])
+@pytest.mark.parametrize("part", ["shader", "textures"])
+def test_nothing_outside_of_the_folder_is_packed(
+    folder: Path, tmp_path: Path, part: str, name: str
+) -> None:
+    """A document from somebody else might name a private file."""
+    outside = tmp_path / "secret.exr"
+    outside.write_text("private")
+    (folder / "link.exr").symlink_to(outside)
+    (folder / "note.txt").write_text("private")
+    os.mkfifo(folder / "pipe.exr")
+    document = next(folder.glob("*.json"))
+    content = json.loads(document.read_text())
+    named = name.format(outside=outside)
+    if part == "shader":
+        named = named.replace(".exr", ".osl")
+        for file in (outside, folder / "link.exr", folder / "pipe.exr"):
+            file.rename(file.with_suffix(".osl"))
+        (folder / "link.osl").unlink()
+        (folder / "link.osl").symlink_to(outside.with_suffix(".osl"))
+    content[part] = named if part == "shader" else content[part] | {"extra": named}
+    document.write_text(json.dumps(content))
+    with pytest.raises(DiffractionError):
+        md.osl.make_addon({"grating": folder}, tmp_path / "looks.zip")
+    assert not (tmp_path / "looks.zip").exists()
+
+
+def test_a_document_that_is_a_link_is_not_packed(folder: Path, tmp_path: Path) -> None:
+    document = next(folder.glob("*.json"))
+    document.rename(tmp_path / "elsewhere.json")
+    document.symlink_to(tmp_path / "elsewhere.json")
+    with pytest.raises(DiffractionError, match="export-osl"):
+        md.osl.make_addon({"grating": folder}, tmp_path / "looks.zip")

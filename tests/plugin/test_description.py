@@ -30,7 +30,7 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
     pack_surface,
     packed_by,
 )
-from mitsuba_diffraction.realtime.glsl.shader_materials import Material as Drawn
+from mitsuba_diffraction.realtime.glsl.shader_materials import ShaderMaterial as Drawn
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH

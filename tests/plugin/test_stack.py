@@ -61,6 +61,22 @@ def test_one_layer_is_a_film():
         np.testing.assert_allclose([part[n] for part in got], expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("between", [False, True])
+def test_a_gap_of_the_medium_above_is_the_limit_of_its_index(between):
+    """Where an index is that of the next layer, all is 0 at the horizon but the sum."""
+    cosines = np.linspace(0.0, 1.0, 33)
+    layers = [INDICES[0], 1.5 * np.ones(3)] if between else [INDICES[0]]
+
+    def stack(gap):
+        indices = np.stack([*layers, gap * np.ones(3)])
+        return amplitudes(cosines, LAM, indices, THICK[: len(indices) - 1])
+
+    for exact, near in zip(stack(1.0), stack(1.0 + 1e-9), strict=True):
+        assert np.isfinite(exact).all()
+        # the root of 2e-9 at the horizon
+        np.testing.assert_allclose(exact[:, 1:], near[:, 1:], atol=1e-4)
+
+
 @pytest.mark.parametrize("pairs", [0, 1, 4])
 def test_quarter_waves_reflect_as_published(pairs):
     """Zinc sulphide and cryolite on glass: Born and Wolf, section 1.6.5, eq. 95."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mitsuba_diffraction import cluster
-from mitsuba_diffraction.cluster.frames import Film, FrameRequest
+from mitsuba_diffraction.cluster.frames import FrameRequest, FrameSequence
 from mitsuba_diffraction.scene.load import set_variant
 
 VARIANT = "llvm_ad_rgb"
@@ -26,7 +26,7 @@ def rendered(client, scene, **more):
 def film(client, scene, keep, frames=(REQUEST,), warn=pytest.fail):
     """The film of one frame, or of these."""
     set_variant(VARIANT)
-    return Film(client, scene, frames, VARIANT, keep=keep, warn=warn, threads=1)
+    return FrameSequence(client, scene, frames, VARIANT, keep=keep, warn=warn, threads=1)
 
 
 class Recorder:

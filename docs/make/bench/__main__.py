@@ -17,7 +17,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from mitsuba_diffraction.analysis.machine import describe_machine
-from mitsuba_diffraction.cli import Bar, check_writable
+from mitsuba_diffraction.cli import Bar, check_outputs
 from mitsuba_diffraction.cli.console import say_warning
 from mitsuba_diffraction.cli.report import save_json
 from mitsuba_diffraction.errors import DiffractionError
@@ -57,7 +57,7 @@ def _bench(args: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     if args.json is not None:
-        check_writable(args.json)
+        check_outputs([args.json])
     earlier = figures.read_run(args.against) if args.against is not None else None
     parts = (args.only,) if args.only else PARTS
     if not {"snake", "orders", "efficiency", "colours"}.isdisjoint(parts):

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.cluster.frames import Film, FrameRequest
+from mitsuba_diffraction.cluster.frames import FrameRequest, FrameSequence
 from mitsuba_diffraction.cluster.kept import Kept
 from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task, add_sums
 from mitsuba_diffraction.cluster.workers import connect
@@ -77,7 +77,7 @@ def on_workers(client: Any, scene: Path, frames: int) -> Times:
 
     set_variant(VARIANT)
     with tempfile.TemporaryDirectory() as folder:
-        film = Film(
+        film = FrameSequence(
             client, scene, requests(frames), VARIANT, keep=Path(folder, "passes"), warn=warn,
             threads=1,
         )  # fmt: skip

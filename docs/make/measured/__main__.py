@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.cli import check_writable, say_error
+from mitsuba_diffraction.cli import check_outputs, say_error
 from mitsuba_diffraction.errors import DiffractionError
 
 
@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 f"--kaist: '{args.kaist}' has no folder 'output'; clone {outside.REPOSITORY}"
             )
         for path in (written, picture):
-            check_writable(path, make_folder=True)
+            check_outputs([path], make_folder=True)
             path.parent.mkdir(parents=True, exist_ok=True)
         if args.fit:
             cases.write_fits()

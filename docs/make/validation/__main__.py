@@ -17,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.cli import Bar, check_writable, say_error
+from mitsuba_diffraction.cli import Bar, check_outputs, say_error
 from mitsuba_diffraction.errors import DiffractionError
 
 from .cases import MATERIALS
@@ -83,7 +83,7 @@ def _report(args: argparse.Namespace) -> int:
     for name in names:
         if name not in PAGES:
             raise DiffractionError(f"page '{name}' is unknown; choose from {', '.join(PAGES)}")
-        check_writable(page_path(args.output, name), make_folder=True)
+        check_outputs([page_path(args.output, name)], make_folder=True)
     with Bar(args) as bar:
         paths = write_report(args.output, names, quick=args.quick, progress=bar)
     print("\n".join(f"wrote {path}" for path in paths))
@@ -95,7 +95,7 @@ def _solve(args: argparse.Namespace) -> int:
     from .solve import solve_material
 
     path = args.output / file_name(args.material, args.solver)
-    check_writable(path)
+    check_outputs([path])
     with Bar(args, unit=" scans") as bar:
         solutions = solve_material(args.material, args.solver, processes=args.jobs, progress=bar)
     save(solutions, path)
@@ -110,7 +110,7 @@ def _patches(args: argparse.Namespace) -> int:
     from .patch_solutions import patch_file, solve_patches
 
     path = args.output / patch_file(args.material, args.solver)
-    check_writable(path)
+    check_outputs([path])
     with Bar(args, unit=" cases") as bar:
         rows = solve_patches(args.material, args.solver, path, bar)
     print(f"wrote {os.fspath(path)}: {len(rows)} orders")
@@ -131,7 +131,7 @@ def _coated(args: argparse.Namespace) -> int:
     from .coated import SERIES, coated_file, solve_coated
 
     for series in SERIES:
-        check_writable(args.output / coated_file(series))
+        check_outputs([args.output / coated_file(series)])
     with Bar(args, unit=" gratings") as bar:
         by_series = solve_coated(args.output, bar)
     for series, rows in by_series.items():
@@ -143,7 +143,7 @@ def _films(args: argparse.Namespace) -> int:
     from .filmed import STACKS, solve_films
 
     for stack in STACKS:
-        check_writable(args.output / stack.file)
+        check_outputs([args.output / stack.file])
     with Bar(args, unit=" films") as bar:
         for path in solve_films(args.output, bar):
             print(f"wrote {os.fspath(path)}")

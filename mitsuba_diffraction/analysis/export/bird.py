@@ -17,10 +17,10 @@ import numpy as np
 from ...atomic import atomic_path
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Sample, means, unit_vector
+from .cells import Cells, CellSample, ExportGrid, means, unit_vector
 
 #: Default directions to the light, degrees, nodes of θ of the eye, and wavelengths, nm.
-DEFAULT = Grid(
+DEFAULT = ExportGrid(
     np.arange(0.0, 76.0, 15.0), np.arange(0.0, 360.0, 45.0), np.arange(400.0, 701.0, 50.0), 18
 )
 # Nodes of φ of the eye over those of θ.
@@ -32,7 +32,7 @@ _SCHEMA = (
 
 
 def save_bird(
-    bsdf: Any, path: Path, grid: Grid = DEFAULT, text: str = "", progress: Progress = silent
+    bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write f in 1/sr, one value for each wavelength and pair of directions.
 
@@ -51,10 +51,10 @@ def save_bird(
 
     def sample(
         theta_i: Float, phi_i: Float, theta_r: Float, phi_r: Float, a: Float, b: Float
-    ) -> Sample:
+    ) -> CellSample:
         tilted = theta_r + a * size
         wo = unit_vector(tilted, phi_r + b * size)
-        return Sample(unit_vector(theta_i, phi_i), wo, dr.abs(dr.sin(tilted)))
+        return CellSample(unit_vector(theta_i, phi_i), wo, dr.abs(dr.sin(tilted)))
 
     cells = Cells([np.radians(angle) for angle in angles], sample)
     values = means(bsdf, cells, grid.wavelengths, size, False, progress)

@@ -38,7 +38,7 @@ _LAUNCH, _MOST_SAMPLES = 1 << 18, 64
 STEEPEST = 89.0
 
 
-class Grid(NamedTuple):
+class ExportGrid(NamedTuple):
     """Directions to the light, and wavelengths, of a file.
 
     Attributes
@@ -53,7 +53,7 @@ class Grid(NamedTuple):
     wavelengths: Reals
     resolution: int
 
-    def checked(self, values: int) -> Grid:
+    def checked(self, values: int) -> ExportGrid:
         """Return the grid; refuse angles that are out of range, and too large files.
 
         values : in the file, for each direction to the light and wavelength.
@@ -77,7 +77,7 @@ class Grid(NamedTuple):
         return self
 
 
-class Sample(NamedTuple):
+class CellSample(NamedTuple):
     """Directions at one place in each cell, arrays of Dr.Jit.
 
     Attributes
@@ -102,13 +102,13 @@ class Cells(NamedTuple):
     """
 
     nodes: Sequence[Reals]
-    sample: Callable[..., Sample]
+    sample: Callable[..., CellSample]
 
     def part(self, first: int, last: int) -> list[Float]:
         """Return the coordinates of some nodes."""
         return [upload(mi.Float, axis[first:last].astype(np.float32)) for axis in self.nodes]
 
-    def middle(self) -> Sample:
+    def middle(self) -> CellSample:
         """Return the sample at all nodes."""
         return self.sample(*self.part(0, len(self.nodes[0])), 0.0, 0.0)
 
@@ -165,7 +165,7 @@ def means(
 
 def _total(
     bsdf: Any,
-    sample: Callable[..., Sample],
+    sample: Callable[..., CellSample],
     nodes: list[Float],
     places: Buffer,
     count: int,

@@ -8,26 +8,29 @@ to the light. Without `jacobian` and with an even `vndf` the tensors are f cosθ
 from __future__ import annotations
 
 import contextlib
+import errno
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Sample, means, unit_vector
+from .cells import Cells, CellSample, ExportGrid, means, unit_vector
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
-DEFAULT = Grid(
+DEFAULT = ExportGrid(
     np.arange(0.0, 86.0, 8.5), np.linspace(-180.0, 180.0, 25), np.arange(360.0, 831.0, 20.0), 64
 )
 
 
 def save_rgl(
-    bsdf: Any, path: Path, grid: Grid = DEFAULT, text: str = "", progress: Progress = silent
+    bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write a BSDF of the current variant for `measured`.
 
@@ -40,14 +43,16 @@ def save_rgl(
     nodes = np.linspace(0.0, 1.0, n)
     axes = np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
 
-    def sample(azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float) -> Sample:
+    def sample(
+        azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float
+    ) -> CellSample:
         place = dr.minimum(dr.abs(u + a / (n - 1)), 1.0)
         theta_m = 0.5 * np.pi * dr.square(place)
         half = unit_vector(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
         wi = unit_vector(elevation, azimuth)
         cosine = dr.dot(wi, half)
         solid = place * dr.sin(theta_m) * dr.maximum(cosine, 0.0)
-        return Sample(wi, 2.0 * cosine * half - wi, solid)
+        return CellSample(wi, 2.0 * cosine * half - wi, solid)
 
     cells = Cells([axis.ravel() for axis in axes], sample)
     values = means(bsdf, cells, grid.wavelengths, np.pi / (n - 1), True, progress)
@@ -62,8 +67,22 @@ def save_rgl(
         "vndf": np.ones((*shape[:2], 2, 2)), "luminance": density, "spectra": spectra,
     }  # fmt: skip
     numbers = {name: array.astype(np.float32) for name, array in tensors.items()}
-    # Mitsuba's writer prints the file's name
-    with atomic_path(path) as temporary, contextlib.redirect_stdout(None):
-        mi.tensor_io.write(
-            str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
-        )
+    # Mitsuba's writer prints the file's name, and loses the error of a full disk when it closes
+    with atomic_path(path) as temporary:
+        with contextlib.redirect_stdout(None):
+            mi.tensor_io.write(
+                str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
+            )
+        _check_written(temporary, numbers)
+
+
+def _check_written(file: Path, tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Raise an OSError if a file does not hold these tensors."""
+    try:
+        with contextlib.redirect_stdout(None):
+            found = mi.tensor_io.read(str(file))
+        whole = all(np.array_equal(found[name], array) for name, array in tensors.items())
+    except Exception:  # whatever Mitsuba's reader makes of a file that is cut short
+        whole = False
+    if not whole:
+        raise OSError(errno.ENOSPC, "the file is cut short; is the disk full?")

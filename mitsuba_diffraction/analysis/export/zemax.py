@@ -18,17 +18,17 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, Grid, Reals, Sample, means, unit_vector
+from .cells import Cells, CellSample, ExportGrid, Reals, means, unit_vector
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
-DEFAULT = Grid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
+DEFAULT = ExportGrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
 # Nodes of the azimuth; the last is the first.
 _AZIMUTHS = 73
 _REACH = 170.0
 
 
 def save_zemax(
-    bsdf: Any, path: Path, grid: Grid = DEFAULT, text: str = "", progress: Progress = silent
+    bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write the BRDF of one wavelength.
 
@@ -47,14 +47,14 @@ def save_zemax(
 
     def sample(
         rotation: Float, theta: Float, azimuth: Float, radial: Float, a: Float, b: Float
-    ) -> Sample:
+    ) -> CellSample:
         mirror = unit_vector(theta, rotation)
         # from the mirror direction towards the normal, and counter-clockwise from there
         up = -unit_vector(theta + 0.5 * np.pi, rotation)
         turned, away = azimuth + a * steps[0], dr.abs(radial + b * steps[1])
         around = dr.cos(turned) * up + dr.sin(turned) * dr.cross(mirror, up)
         wo = dr.cos(away) * mirror + dr.sin(away) * around
-        return Sample(mi.Vector3f(-mirror.x, -mirror.y, mirror.z), wo, dr.sin(away))
+        return CellSample(mi.Vector3f(-mirror.x, -mirror.y, mirror.z), wo, dr.sin(away))
 
     cells = Cells(nodes, sample)
     values = means(bsdf, cells, grid.wavelengths, float(max(steps)), False, progress)[:, 0]

@@ -26,7 +26,7 @@ from .accuracy import Sample
 
 
 @dataclass(frozen=True)
-class Setting:
+class TradeoffSetting:
     """Table of the trade-off: its label, build arguments, and conversions afterwards."""
 
     group: str  # name of the parameter that varies
@@ -53,29 +53,31 @@ class Setting:
 _ANY = 0.999
 
 
-def settings(quick: bool) -> Iterator[Setting]:
+def settings(quick: bool) -> Iterator[TradeoffSetting]:
     """Yield the settings to measure, the defaults first."""
-    yield Setting("default", "the defaults")
+    yield TradeoffSetting("default", "the defaults")
     for tolerance in (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6):
-        yield Setting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
+        yield TradeoffSetting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
     for basis in ("chebyshev", "taylor"):
         for tolerance in (1e-3,) if quick else (1e-2, 1e-3, 1e-4):
             arguments = {"basis": basis, "tolerance": tolerance}
-            yield Setting("basis", f"{basis}, {tolerance:.0e}", arguments)
+            yield TradeoffSetting("basis", f"{basis}, {tolerance:.0e}", arguments)
     for basis in ("svd", "chebyshev"):
         for terms in (4, 8) if quick else (4, 6, 8, 12):
             arguments = {"basis": basis, "terms": terms}
-            yield Setting(f"terms, {basis}", f"{terms} terms, {basis}", arguments)
+            yield TradeoffSetting(f"terms, {basis}", f"{terms} terms, {basis}", arguments)
     for taps in (2, 3, 4) if quick else (2, 3, 4, 5):
         arguments = {"terms": 12, "taps": taps, "tolerance": _ANY}
-        yield Setting("taps", f"{taps} × {taps} taps", arguments)
+        yield TradeoffSetting("taps", f"{taps} × {taps} taps", arguments)
     for stored in ("half", "single"):
-        yield Setting("precision", f"tolerance 1e-4 in {stored}", {"tolerance": 1e-4}, stored)
+        yield TradeoffSetting(
+            "precision", f"tolerance 1e-4 in {stored}", {"tolerance": 1e-4}, stored
+        )
     for crop in (0.5,) if quick else (0.75, 0.5, 0.35):
-        yield Setting("crop", f"up to {crop:g} of all frequencies", crop=crop)
+        yield TradeoffSetting("crop", f"up to {crop:g} of all frequencies", crop=crop)
     for tolerance in (1e-3,) if quick else (1e-2, 1e-3):
         arguments = {"coherence": "patch", "tolerance": tolerance}
-        yield Setting("coherence", f"patch, {tolerance:.0e}", arguments)
+        yield TradeoffSetting("coherence", f"patch, {tolerance:.0e}", arguments)
 
 
 #: Tolerance of the table with which colours are compared; its error is invisible.
@@ -83,10 +85,10 @@ FINEST = 1e-5
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredSetting:
     """Results of one setting."""
 
-    setting: Setting
+    setting: TradeoffSetting
     refused: str = ""  # error of a table that cannot be built; all other results are then missing
     # Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision
     error: float = float("nan")
@@ -106,14 +108,14 @@ class Measured:
 
 def measure(
     field: HeightField,
-    chosen: Sequence[Setting],
+    chosen: Sequence[TradeoffSetting],
     *,
     coherence_width: float,
     pairs: int = 240,
     lanes: int = 1 << 19,
     rounds: int = 7,
     progress: Progress = silent,
-) -> list[Measured]:
+) -> list[MeasuredSetting]:
     """Measure all settings for one patch, in the current (spectral) variant.
 
     Raises a DiffractionError if the patch is flat, or the first table cannot be built.
@@ -146,7 +148,7 @@ def measure(
         except DiffractionError as error:
             if n == 0:
                 raise
-            results.append(Measured(setting, refused=str(error)))
+            results.append(MeasuredSetting(setting, refused=str(error)))
             continue
         seconds = time.perf_counter() - start
         with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
@@ -158,7 +160,7 @@ def measure(
         loss = power_colour_difference(finest[setting.coherence], table)
         _, _, _, _, terms = table.coefficients.shape
         results.append(
-            Measured(
+            MeasuredSetting(
                 setting,
                 error=max(sample.error(sample.window_sums(table))),
                 error_single=max(sample.error(_by_plugin(bsdf, sample))),
@@ -177,7 +179,9 @@ def measure(
     return [_with_times(result, times, lanes) for result in results]
 
 
-def _table(field: HeightField, setting: Setting, coherence_width: float) -> DiffractionTable:
+def _table(
+    field: HeightField, setting: TradeoffSetting, coherence_width: float
+) -> DiffractionTable:
     """Build the table of a setting, and convert its precision if the setting has one."""
     arguments: dict[str, Any] = dict(setting.arguments)
     if setting.crop is not None:
@@ -201,7 +205,9 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     return np.array(sums, float)
 
 
-def _with_times(result: Measured, times: dict[str, list[float]], lanes: int) -> Measured:
+def _with_times(
+    result: MeasuredSetting, times: dict[str, list[float]], lanes: int
+) -> MeasuredSetting:
     """Add the times of `eval` to a result, unless its table was refused."""
     if result.refused:
         return result
@@ -213,7 +219,7 @@ def _with_times(result: Measured, times: dict[str, list[float]], lanes: int) -> 
     )
 
 
-def rows(results: Sequence[Measured]) -> Iterator[dict[str, Any]]:
+def rows(results: Sequence[MeasuredSetting]) -> Iterator[dict[str, Any]]:
     """Yield one flat record of plain data for each setting."""
     for result in results:
         setting = result.setting

@@ -14,7 +14,7 @@ import numpy as np
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from .accuracy import Depths, Spectral
-from .measuring import Measured, rows
+from .measuring import MeasuredSetting, rows
 
 _ALIKE = 1.1  # factor between equal times: they differ as much from run to run
 
@@ -30,7 +30,7 @@ class Budget:
     megabytes: float | None = None  # largest table
     relative: float | None = None  # longest time of `eval` over that of `roughconductor`
 
-    def allows(self, result: Measured) -> bool:
+    def allows(self, result: MeasuredSetting) -> bool:
         """Return whether a setting stays within the limits."""
         limits = (
             (result.error, self.tolerance),
@@ -40,7 +40,7 @@ class Budget:
         return all(limit is None or value <= limit for value, limit in limits)
 
 
-def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
+def recommended(results: Sequence[MeasuredSetting], budget: Budget) -> MeasuredSetting:
     """Return the fastest setting within the tolerance, or without a tolerance the most exact one.
 
     The smallest of equally fast settings is chosen. Only settings of coherence `ensemble` that
@@ -73,7 +73,7 @@ def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
     return min(as_fast, key=lambda result: result.megabytes)
 
 
-def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
+def plain(results: list[MeasuredSetting], depths: Depths) -> dict[str, Any]:
     """Return all settings and the errors over depth as plain data."""
     return {
         "settings": list(rows(results)),
@@ -98,9 +98,9 @@ def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
 
 
 def lines(
-    results: Sequence[Measured],
+    results: Sequence[MeasuredSetting],
     spectral: Spectral,
-    best: Measured,
+    best: MeasuredSetting,
     budget: Mapping[str, float | None],
 ) -> Iterator[str]:
     """Yield a row for each setting, the errors of sums over the spectrum, the recommendation."""
@@ -132,7 +132,7 @@ def lines(
     )
 
 
-def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
+def draw_trade(results: Sequence[MeasuredSetting], path: Path, title: str) -> None:
     """Draw error against time, with the memory as area of the marks, and the Pareto front."""
     drawn = [r for r in results if not r.refused and r.setting.group != "coherence"]
     axes = _axes(5.0)
@@ -182,9 +182,9 @@ def draw_depths(depths: Depths, path: Path) -> None:
     _save(axes, path)
 
 
-def _front(results: Sequence[Measured]) -> list[Measured]:
+def _front(results: Sequence[MeasuredSetting]) -> list[MeasuredSetting]:
     """Return the Pareto front: settings that no other beats in time and error, fastest first."""
-    front: list[Measured] = []
+    front: list[MeasuredSetting] = []
     for result in sorted(results, key=lambda result: result.relative):
         if not front or result.error < front[-1].error:
             front.append(result)

@@ -13,17 +13,21 @@ import numpy.typing as npt
 
 from ...columns import read_columns
 from ...errors import DiffractionError, quoted
-from ..field import MAX_PIXELS, check_pixel_count
+from ...limits import MOST_PIXELS
+from ..field import check_pixel_count
 from ..lengths import micrometres_of
 from . import RawHeights, first_line
 
 _BLOCK = 1 << 22  # values that are copied at a time
 
 # bytes of a text of so many points, x, y and height
-_LARGEST = 24 * 3 * MAX_PIXELS
+_LARGEST = 24 * 3 * MOST_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
-_SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
-_VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
+# Repetitions are possessive: a line of n characters takes n steps, and not n².
+_SIZE = re.compile(
+    r"[#;%\s]*+(Width|Height)\s*+[:=]\s*+([-+.\deE]++)\s*+(\S++)\s*+$", re.IGNORECASE
+)
+_VALUES = re.compile(r"[#;%\s]*+Value units\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE)
 
 
 def read_npy(path: Path) -> RawHeights:
@@ -91,7 +95,7 @@ def read_text(path: Path) -> RawHeights:
         raise DiffractionError(f"{shown} has no line of numbers; expected heights in µm")
     values = table.with_gaps(range(table.numbers.shape[1]), "a grid of heights in µm")
     ny, nx = values.shape
-    check_pixel_count(ny, nx, shown) if values.size > 3 * MAX_PIXELS else None
+    check_pixel_count(ny, nx, shown) if values.size > 3 * MOST_PIXELS else None
     unit, stated, size = _read_header(table.header.values(), shown)
     points = nx == 3 and ny > 3 and size is None  # a header with sizes belongs to a grid
     if not points:

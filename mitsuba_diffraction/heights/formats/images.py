@@ -13,6 +13,8 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...images import open_image
+from ...limits import check_content
 from ...streams import without_chatter
 from ..field import check_pixel_count
 from . import RawHeights, first_line
@@ -49,7 +51,7 @@ def read_image(path: Path) -> RawHeights:
             # The size is checked below, against a limit of our own and before anything is decoded.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
-            with Image.open(path, formats=("PNG", "BMP", "DIB", "TIFF")) as image:
+            with open_image(path, ("PNG", "BMP", "DIB", "TIFF")) as image:
                 return _heights_of(image, shown)
     except DiffractionError:
         raise
@@ -57,8 +59,6 @@ def read_image(path: Path) -> RawHeights:
         raise DiffractionError(
             f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
         ) from error
-    except Image.DecompressionBombError as error:
-        raise DiffractionError(f"{shown} is too large: {first_line(error)}") from error
     except _DAMAGED as error:
         raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
 
@@ -130,6 +130,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
         check_pixel_count(height, width, shown)
         check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
+        check_content(8 * height * width * len(names), path.stat().st_size, shown)
         chosen = _choose_channel(names, channel, shown)
         with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = file.channels()[chosen].pixels

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...extras import optional
+from ...limits import bounded_memory, check_archive, check_content
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
@@ -44,8 +45,9 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     RawHeights
         Heights in µm, rows upwards as in an image; points without data are NaN.
     """
-    shown = repr(str(path))
-    with warnings.catch_warnings():
+    shown, size = repr(str(path)), path.stat().st_size
+    check_archive(path, shown)
+    with warnings.catch_warnings(), bounded_memory(size, shown):
         # Readers warn of unknown fields and missing optional packages; units and sizes are checked
         # below.
         warnings.simplefilter("ignore")
@@ -61,12 +63,14 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
                 "TIFF, EXR), an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument "
                 "file, undamaged"
             ) from error
+        except MemoryError:
+            raise
         except Exception as error:
             raise DiffractionError(f"{shown} cannot be read: {first_line(error)}") from error
         try:
             chosen, note = _choose(list(reader.channels), channel, shown)
-            raw = _read_channel(reader, chosen, shown)
-        except DiffractionError:
+            raw = _read_channel(reader, chosen, shown, size)
+        except (DiffractionError, MemoryError):
             raise
         except Exception as error:
             raise DiffractionError(
@@ -174,14 +178,15 @@ def _check_map(source: Any, what: str) -> None:
         raise DiffractionError(f"{what} is not on a uniform grid; interpolate it to one first")
 
 
-def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
-    """Read heights, pixel size and unit of one channel."""
+def _read_channel(reader: Any, channel: Any, shown: str, size: int) -> RawHeights:
+    """Read heights, pixel size and unit of one channel of a file of `size` bytes."""
     what = f"{shown}, channel {channel.name!r}"
     _check_map(channel, what)
     sized = channel.physical_sizes is not None
     if channel.nb_grid_pts is not None:
         nx, ny = channel.nb_grid_pts
         check_pixel_count(ny, nx, what)
+        check_content(8.0 * ny * nx, size, what)
     options = {} if sized else {"physical_sizes": (1.0, 1.0)}
     topography = reader.topography(channel_index=channel.index, **options)
     _check_map(topography, what)  # some readers know the grid only after reading

@@ -51,7 +51,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Row:
+class FingerRow:
     """Fingers of one sheet, from left to right around the patch; arrays (n,), µm."""
 
     x: FloatArray  # x of tips, ascending
@@ -61,7 +61,7 @@ class Row:
     rise: FloatArray  # height of the finger above the others
 
 
-def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
+def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[FingerRow]:
     """Draw rows of fingers that fill the patch of `extent` (Lx, Ly), lowest y first."""
     width, height = extent
     n_rows = max(1, round(height / layout.row_pitch))
@@ -84,7 +84,7 @@ def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
         length = np.clip(drop, 0.5 * step, 1.7 * step)
         aside = _around(columns[below][near] - x, width)
         aside[np.abs(aside) > 0.6 * layout.pitch] = 0.0  # the column ends here
-        rows.append(Row(x, tips[r], aside / length, length, rises[r]))
+        rows.append(FingerRow(x, tips[r], aside / length, length, rises[r]))
     return rows
 
 
@@ -179,7 +179,7 @@ class Blade:
 
 
 def overlay(
-    rows: list[Row], extent: Pair, serration: FloatArray, blade: Blade
+    rows: list[FingerRow], extent: Pair, serration: FloatArray, blade: Blade
 ) -> tuple[FloatArray, FloatArray]:
     """Compute the upper envelope of all sheets and the distance of the floor from the fingers.
 
@@ -203,7 +203,7 @@ def overlay(
 def _lay(
     heights: FloatArray,
     distance: FloatArray,
-    row: Row,
+    row: FingerRow,
     x: FloatArray,
     extent: Pair,
     serration: FloatArray,

@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import DiffractionError
+from ...limits import MOST_PIXELS
 from ...settings import USUAL_WIDTH
-from ..field import MAX_PIXELS, HeightField, check_pixel_count
+from ..field import HeightField, check_pixel_count
 from ..lengths import count_between, number_between, pixel_size_of
 
 Axis = Literal["x", "y"]
@@ -43,7 +44,7 @@ def sinusoidal(
     period
         Distance between grooves, µm.
     depth
-        Peak to valley, µm; the amplitude h₀ of the closed form J_m²(κh₀) is half of it.
+        Peak to valley, µm; the amplitude h₀ of the closed form J_m²(κh₀) is half the depth.
     axis
         Direction along which the height changes.
     periods
@@ -128,8 +129,8 @@ def _grating(
     assert pixel is not None  # a number never means "auto"
     if periods is None:
         periods = max(1, round(USUAL_WIDTH / length))
-    along = count_between(periods, f"{kind}: periods", 1, MAX_PIXELS) * profile.size
-    across = along if rows is None else count_between(rows, f"{kind}: rows", 2, MAX_PIXELS)
+    along = count_between(periods, f"{kind}: periods", 1, MOST_PIXELS) * profile.size
+    across = along if rows is None else count_between(rows, f"{kind}: rows", 2, MOST_PIXELS)
     name = f"{kind} grating"
     check_pixel_count(across, along, name)
     line = height * np.tile(profile, along // profile.size)

@@ -17,7 +17,7 @@ import scipy
 
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
-from .fingers import Blade, Layout, Row, lay_out, overlay, ramp
+from .fingers import Blade, FingerRow, Layout, lay_out, overlay, ramp
 from .noise import (
     FloatArray,
     Pair,
@@ -193,7 +193,7 @@ def _patch(
 
 
 def _surface(
-    rng: Rng, extent: Pair, shape: Shape, rows: list[Row], species: Species, roughness: float
+    rng: Rng, extent: Pair, shape: Shape, rows: list[FingerRow], species: Species, roughness: float
 ) -> FloatArray:
     """Draw sheets with frayed edges, streaks and pores of the floor, and noise, (ny, nx) in µm."""
     # scan lines run along x, and the probe meets an edge a little earlier or later on each
@@ -255,7 +255,9 @@ def stamp(
     return result.reshape(shape)
 
 
-def beads(rng: Rng, extent: Pair, shape: Shape, rows: list[Row], density: float) -> FloatArray:
+def beads(
+    rng: Rng, extent: Pair, shape: Shape, rows: list[FingerRow], density: float
+) -> FloatArray:
     """Draw small round beads on the crests of fingers, in swarms; `density` per µm²."""
     names = ("x", "y", "length", "lean")
     tip_x, tip_y, length, lean = (

@@ -16,7 +16,7 @@ from ..arithmetic import float_of, index_of, maximum
 from ..loops import sum_of
 from ..memory import once_a_table, upload
 from ..types import Float, Index, Mask, Vector2f
-from .lobes import REACH, Below, DaylightLobes, Incidence, Window, added, nearest
+from .lobes import REACH, Below, DaylightLobes, Incidence, OrderLobe, added, nearest
 from .order_lookup import RAISED, Drawn, Share, between_corners, corner_weights
 
 
@@ -122,7 +122,7 @@ def _crossed_lookup(table: CrossedTable) -> CrossedLookup:
     return CrossedLookup(table)
 
 
-class CrossedWindow(Window):
+class CrossedWindow(OrderLobe):
     """Lobes in the plane of orders."""
 
     def __init__(self, table: CrossedTable, coherence_width: float) -> None:
@@ -131,12 +131,12 @@ class CrossedWindow(Window):
         self.periods = table.periods
 
     def position(self, uv: Vector2f, wavelength: Float) -> Vector2f:
-        """See `Window.position`."""
+        """See `OrderLobe.position`."""
         d_x, d_y = self.periods
         return mi.Vector2f(uv.x * d_x, uv.y * d_y) * (1e3 * dr.rcp(wavelength))
 
     def orders(self, position: Vector2f) -> list[Any]:
-        """See `Window.orders`."""
+        """See `OrderLobe.orders`."""
         along = [
             nearest(part, 0.25 * (2.0 * math.pi * self.sigma / period) ** 2 < REACH)
             for part, period in zip(position, self.periods, strict=True)
@@ -144,18 +144,18 @@ class CrossedWindow(Window):
         return [mi.Vector2f(m, n) for m in along[0] for n in along[1]]
 
     def lobe(self, position: Vector2f, order: Any) -> Float:
-        """See `Window.lobe`."""
+        """See `OrderLobe.lobe`."""
         d_x, d_y = self.periods
         across, along = position.x - order.x, (position.y - order.y) * (d_x / d_y)
         return order_lobe(across, along, (2.0 * math.pi * self.sigma / d_x) ** 2)
 
     def centre(self, order: Any, wavelength: Float) -> Vector2f:
-        """See `Window.centre`."""
+        """See `OrderLobe.centre`."""
         d_x, d_y = self.periods
         return mi.Vector2f(order.x / d_x, order.y / d_y) * (1e-3 * wavelength)
 
     def mirrored(self) -> Any:
-        """See `Window.mirrored`."""
+        """See `OrderLobe.mirrored`."""
         return mi.Vector2f(0.0, 0.0)
 
 

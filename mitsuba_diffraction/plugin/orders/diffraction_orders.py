@@ -82,7 +82,7 @@ from ..types import (
 )
 from .crossed_lobes import CrossedDaylightLobes, CrossedWindow
 from .grating_parameters import Parameters
-from .lobes import DaylightLobes, Lobes, SpectralLobes, Window
+from .lobes import DaylightLobes, Lobes, OrderLobe, SpectralLobes
 from .polarised_lobes import PolarisedLobes, PolarisedLookup
 
 
@@ -205,10 +205,10 @@ def _lobes_of(read: Parameters) -> Lobes:
             return CrossedDaylightLobes(crossed)
         return SpectralLobes(crossed, read.wavelength)
     if mi.is_rgb:
-        return DaylightLobes(Window(table, width))
+        return DaylightLobes(OrderLobe(table, width))
     if mi.is_polarized and table.polarised:
-        return PolarisedLobes(Window(table, width, PolarisedLookup), read.wavelength)
-    return SpectralLobes(Window(table, width), read.wavelength)
+        return PolarisedLobes(OrderLobe(table, width, PolarisedLookup), read.wavelength)
+    return SpectralLobes(OrderLobe(table, width), read.wavelength)
 
 
 #: Visible wavelengths, nm, that a table should reach: eyes see less than 1 % of daylight beyond.

@@ -107,7 +107,7 @@ class Lobes(Protocol):
         """Return the sum of the orders' efficiencies, of all sides."""
 
 
-class Window:
+class OrderLobe:
     """Lobe of an order under the coherence window, in units of orders.
 
     kind : of the look-up.
@@ -165,13 +165,13 @@ def nearest(position: Float, overlap: bool) -> list[Float]:
     return [order, order + dr.select(position < order, -1.0, 1.0)]
 
 
-class SpectralLobes(Window):
+class SpectralLobes(OrderLobe):
     """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
 
     wavelength : nm, of mono variants.
     """
 
-    def __init__(self, window: Window, wavelength: float) -> None:
+    def __init__(self, window: OrderLobe, wavelength: float) -> None:
         self._window, self.lookup = window, window.lookup
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
@@ -226,10 +226,10 @@ class SpectralLobes(Window):
         return list(si.wavelengths) if mi.is_spectral else [self._fixed]
 
 
-class DaylightLobes(Window):
+class DaylightLobes(OrderLobe):
     """Lobes of RGB variants, summed over daylight (`tables.orders.daylight`)."""
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self, window: OrderLobe) -> None:
         self._window, self.lookup = window, window.lookup
         self.sigma, self.period = window.sigma, window.period
         weights = daylight_weights(self.sigma, self.period)

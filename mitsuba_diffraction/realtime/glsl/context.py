@@ -206,7 +206,7 @@ class Bindings:
             texture.release()
 
 
-class Pass:
+class ShaderPass:
     """Program of a triangle that covers the picture.
 
     fragment, shared, definitions : parameters of `source.plain_source` for the fragment stage.

@@ -21,7 +21,7 @@ from .packing import pack_responses
 from .rewriting import global_names, pruned, renamed, resolved, shader_file
 from .shader_materials import (
     GLSL,
-    Material,
+    ShaderMaterial,
     pack_conservation,
     pack_surface,
     packed_by,
@@ -138,7 +138,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         if method in CONSUMERS:
             CONSUMERS[method].check(described)
     surface = packed_by(described)
-    material = Material(Map(np.zeros(3)), surface)
+    material = ShaderMaterial(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)
     common |= Packed(
         uniforms={"height_scale": described.height_scale.number},

@@ -17,6 +17,7 @@ from ...optics.colour import encoded_colour
 from ...optics.display import shown_colour
 from ...optics.fresnel import reflectance
 from ...optics.geometry import vcavity
+from ...optics.mirror import grazing_slope, horizon_correction
 from ...optics.orders import (
     cell_wavelengths,
     lobe_falloff,
@@ -29,7 +30,7 @@ from ...optics.orders import (
     wavenumber_step,
 )
 from ...shading.dialects import GLSL
-from ...shading.pair_power import Coat, relative_power
+from ...shading.pair_power import Coat, coated_mirror, relative_power
 from ...shading.programs import Program
 from .rewriting import declared_names
 
@@ -40,6 +41,7 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
         order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
     },
     "FACE": {face_transmittance: 2, order_direction: 4},
+    "ORDER_0": {horizon_correction: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
 }  # fmt: skip
@@ -70,6 +72,13 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(refracted, "vector", "float")
     if index is not None:
         program.add(reflectance, "float", index, name="interface_reflectance")
+    if "ORDER_0" in names and "COATED" in names:
+        program.add(grazing_slope, "float", "float", name="face_slope")
+    if "ORDER_0" in names and index is not None:
+        program.add(grazing_slope, index, "float")
+        if "COATED" in names:
+            over = Coat("float", "float", "float")
+            program.add(coated_mirror, "vector", "vector", index, over)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(

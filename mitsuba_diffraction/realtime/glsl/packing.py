@@ -18,7 +18,7 @@ from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
-from ...tables.layout import Record, cells_of, functions_at
+from ...tables.layout import BinRecord, cells_of, functions_at
 from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
@@ -73,8 +73,11 @@ def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
             "glossy_steps": ((radii - 1) / table.radius_end, (zs - 1) / table.z_max),
             "glossy_size": (radii, zs),
             "area_factor": area_factor(table.sigma),
+            "sigma_0": table.sigma_0,
+            "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
         },
-        definitions={"COHERENT": ""} if table.expansion.kind == "amplitude" else {},
+        definitions={"ORDER_0": ""}
+        | ({"COHERENT": ""} if table.expansion.kind == "amplitude" else {}),
     )
 
 
@@ -96,7 +99,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "interfere; use method fast"
         )
     series, _, scale, expansion = power_series(table)
-    record = Record.of(1, expansion.terms, unit=4)
+    record = BinRecord.of(1, expansion.terms, unit=4)
     packed = as_half(record.pack(series[..., None, :]).reshape(-1, 4))
     cells = cells_of(expansion, _CELL)
     share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
@@ -115,13 +118,14 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "spacing": (table.spacing[0], table.spacing[1]),
             "sigma": table.sigma,
             "order_0_ratio": table.order_0_ratio,
+            "inverse_taper": table.inverse_taper,
             "interval_length": expansion.length,
             "intervals": expansion.intervals,
             "cells": cells,
             "inverse_scale": 1.0 / scale,
             "area_factor": area_factor(table.sigma),
         },
-        definitions={"TEXELS": str(record.stored // 4)},
+        definitions={"TEXELS": str(record.stored // 4), "ORDER_0": ""},
     )
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .bounces import pack_bounces
 from .camera import Camera
-from .context import Bindings, Pass, Target, compile_plain, set_uniforms
+from .context import Bindings, ShaderPass, Target, compile_plain, set_uniforms
 from .emitters import Emitters
 from .lights import Lamp
 from .methods import vertex_array
@@ -57,11 +57,11 @@ class Stage:
         self._add_glowing(buffers)
         flats = flat_shapes(mitsuba_scene)
         self._around = self._bound(pack_surroundings(scene, self.emitters, flats))
-        self._background: Pass | None = None
+        self._background: ShaderPass | None = None
         if self.emitters.environment is not None:
             shared = ("library.glsl", "surroundings.glsl")
             self._background = self._register(
-                Pass(context, "background.frag", shared, self._around.definitions)
+                ShaderPass(context, "background.frag", shared, self._around.definitions)
             )
         # bindings of each surface
         self.extras = self._with_lobes([self._around, self._bound(pack_solid(scene, flats))])
@@ -180,9 +180,9 @@ class ProgressiveLight:
         self._counts = [0, 0]
         self._lights: Iterator[Lamp] = iter(())
         self.restart(camera)
-        self._add = Pass(context, "add.frag")
+        self._add = ShaderPass(context, "add.frag")
         shared = ("library.glsl", "formulas")
-        self._mean = Pass(context, "mean.frag", shared, display_definitions(view))
+        self._mean = ShaderPass(context, "mean.frag", shared, display_definitions(view))
 
     @property
     def frames(self) -> int:

@@ -18,7 +18,7 @@ from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .shader_materials import Diffracting, Material, diffracts, read_materials
+from .shader_materials import Diffracting, ShaderMaterial, diffracts, read_materials
 from .source import LIGHTS
 
 Array = NDArray[np.float64]
@@ -161,13 +161,13 @@ _ANALYTIC = {
 
 
 @dataclass(frozen=True)
-class Surface:
+class SceneSurface:
     """A shape that reflects light: triangles and material."""
 
     name: str  # name in messages
     # (n, 17) attributes of `VERTEX`; three consecutive vertices are a triangle
     vertices: NDArray[np.float32]
-    material: Material
+    material: ShaderMaterial
     shape: Any  # shape of Mitsuba
     exact: bool  # whether all of its material is supported
     radiance: Array | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
@@ -185,7 +185,7 @@ class Glow:
 class RealtimeScene:
     """The supported parts of a scene, in world space."""
 
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[SceneSurface, ...]
     camera: Camera
     lighting: Lighting
     low: Array  # (3,) lowest corner of a box around all surfaces
@@ -292,7 +292,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         # the surfaces of a mix share the triangles, and each is drawn where it has a weight
         for material in materials:
             vertices = _vertices(triangles, material, shape)
-            surfaces.append(Surface(name, vertices, material, shape, exact, radiance))
+            surfaces.append(SceneSurface(name, vertices, material, shape, exact, radiance))
     low, high = box_of([s.vertices[:, :3] for s in surfaces])
     lens = ("the lens (shown as a pinhole)",) if camera.lens > 0.0 else ()
     of_light = (*lens, *lighting.omissions)
@@ -318,7 +318,7 @@ def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:
     return low.astype(float), high.astype(float)
 
 
-def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[np.float32]:
+def _vertices(triangles: Triangles, material: ShaderMaterial, shape: Any) -> NDArray[np.float32]:
     """Return the attributes of all vertices, (n, 17), in the order of `VERTEX`."""
     count = len(triangles.positions)
     normals, tangents = triangles.normals, triangles.tangents

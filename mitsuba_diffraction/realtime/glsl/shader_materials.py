@@ -15,7 +15,7 @@ from ...plugin.parameter_changes import children
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
 from .modelled import Modelled, index_spectra
 from .packing import pack_conductor
-from .solved import Solved
+from .solved import SolvedSurface
 from .texels import Packed, Texture, Uniform, as_half, four_channels
 
 _COSINES = 64  # nodes of transmittances
@@ -144,17 +144,17 @@ def _through(bsdf: Any) -> NDArray[np.float64]:
 
 
 #: Table of a surface, packed for shaders.
-Diffracting = Modelled | Solved
+Diffracting = Modelled | SolvedSurface
 
 
 def packed_by(described: Surface) -> Diffracting:
     """Return what packs the table of a surface."""
     orders = described.orders
-    return Modelled(described) if orders is None else Solved(described, orders)
+    return Modelled(described) if orders is None else SolvedSurface(described, orders)
 
 
 @dataclass(frozen=True)
-class Material:
+class ShaderMaterial:
     """Material of one shape."""
 
     pigment: Map  # diffuse reflectance, linear sRGB
@@ -175,7 +175,9 @@ class Material:
         return diffuse and constant and not self.pigment.value.any()
 
 
-def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> list[Material]:
+def read_materials(
+    bsdf: Any, omissions: list[str], name: str, light: Spectrum
+) -> list[ShaderMaterial]:
     """Read the material of a shape, or the materials of a mix.
 
     Unsupported features are appended to `omissions`.
@@ -220,17 +222,17 @@ def read_materials(bsdf: Any, omissions: list[str], name: str, light: Spectrum) 
         pigment = Map(np.zeros(3))
         if (nested := described.nested) is not None:
             pigment = _diffuse(nested, omissions, f"the base beneath {name}", light)
-        material = Material(pigment, packed_by(described), axis=axis_map(described))
+        material = ShaderMaterial(pigment, packed_by(described), axis=axis_map(described))
     elif (gloss := Gloss.read(bsdf)) is not None:
         omissions += [f"{part} of {name}" for part in gloss.omissions]
         pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
-        material = Material(pigment, gloss=gloss)
+        material = ShaderMaterial(pigment, gloss=gloss)
     else:
-        material = Material(_diffuse(bsdf, omissions, name, light))
+        material = ShaderMaterial(_diffuse(bsdf, omissions, name, light))
     return [replace(material, two_sided=two_sided, bumps=bumps, normals=normals)]
 
 
-def pack_surface(material: Material) -> Packed:
+def pack_surface(material: ShaderMaterial) -> Packed:
     """Pack a material without its tables and energy conservation."""
     uniforms: dict[str, Uniform] = {"two_sided": material.two_sided}
     definitions: dict[str, str] = {}
@@ -260,7 +262,7 @@ def pack_surface(material: Material) -> Packed:
     return packed if diffraction is None else packed | diffraction.surface()
 
 
-def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
+def pack_conservation(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) -> Packed:
     """Pack energy conservation and the base's light, at the height scale times each factor."""
     if material.diffraction is None:
         return Packed()

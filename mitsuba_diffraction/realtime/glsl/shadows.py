@@ -24,7 +24,7 @@ from .camera import Camera, box_corners
 from .context import Target, compile_plain, set_uniforms
 from .lights import Lamp
 from .methods import vertex_array
-from .scene import Surface
+from .scene import SceneSurface
 from .texels import Uniform
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class Casters:
     def __init__(
         self,
         context: Any,
-        surfaces: Sequence[Surface],
+        surfaces: Sequence[SceneSurface],
         buffers: Sequence[Any],
         emitting: Sequence[Any] = (),
     ) -> None:

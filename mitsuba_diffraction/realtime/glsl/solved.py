@@ -33,7 +33,7 @@ MOST_WITHIN = 8.0
 _DIRECTIONS, _WAVELENGTHS = 32, 24
 
 
-class Solved:
+class SolvedSurface:
     """Table of solved orders of a surface as textures and constants."""
 
     def __init__(self, described: Surface, table: OrderTable) -> None:

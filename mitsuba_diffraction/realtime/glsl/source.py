@@ -98,6 +98,8 @@ def surface_files(definitions: Mapping[str, str]) -> list[str]:
     files = ["library.glsl", "formulas", "reflectance.glsl", "boundary.glsl", "layers.glsl"]
     if "ORDERS" in definitions:
         return [*files, "orders.glsl"]
+    if "ORDER_0" in definitions:
+        files.append("mirror.glsl")
     return [*files, "pair.glsl"] if "DIFFRACTING" in definitions else files
 
 

@@ -43,7 +43,7 @@ _AT_ONCE, _ENOUGH = 4, 2048  # frames of progressive light per picture, and in a
 def _to_panel(event: str) -> Callable[..., None]:
     """Return a handler that passes an event on to the panel."""
 
-    def handle(self: Viewer, *values: Any) -> None:
+    def handle(self: ViewerWindow, *values: Any) -> None:
         """Pass the event on, if the panel exists."""
         if hasattr(self, "panel"):  # a window may be resized before the panel is created
             getattr(self.panel, event)(*values)
@@ -51,7 +51,7 @@ def _to_panel(event: str) -> Callable[..., None]:
     return handle
 
 
-class Viewer(moderngl_window.WindowConfig):
+class ViewerWindow(moderngl_window.WindowConfig):
     """Window of the viewer; `show` sets the scene and options on a subclass."""
 
     gl_version = (3, 3)
@@ -349,7 +349,7 @@ def show(
         "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops, "view": view,
         "folder": folder, "frames": frames, "window_size": size,
     }  # fmt: skip
-    kind = type("SceneViewer", (Viewer,), settings)
+    kind = type("SceneViewer", (ViewerWindow,), settings)
     arguments = ["--window", window]
     if window == "headless":
         arguments += ["--backend", "egl"]
@@ -358,7 +358,7 @@ def show(
     return viewer.drawn, viewer.frame_ms
 
 
-def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
+def open_viewer(kind: type[ViewerWindow], arguments: list[str]) -> ViewerWindow:
     """Create the window of a viewer, without showing it.
 
     arguments : arguments of moderngl-window's command line.
@@ -366,7 +366,7 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
     Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
     try:
-        viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
+        viewer: ViewerWindow = moderngl_window.create_window_config_instance(kind, args=arguments)
     except DiffractionError:
         raise
     except Exception as error:  # exceptions differ by kind of window

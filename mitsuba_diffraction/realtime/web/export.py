@@ -24,10 +24,10 @@ from ...progress import Progress, silent
 from ..glsl.emitters import Emitters
 from ..glsl.methods import CONSUMERS
 from ..glsl.rewriting import shader_file
-from ..glsl.scene import RealtimeScene, Surface, load, read_scene
+from ..glsl.scene import RealtimeScene, SceneSurface, load, read_scene
 from ..glsl.shader_materials import (
     Diffracting,
-    Material,
+    ShaderMaterial,
     pack_conservation,
     pack_emission,
     pack_surface,
@@ -308,13 +308,13 @@ def _packed(
     return header, data
 
 
-def _coat(material: Material) -> float:
+def _coat(material: ShaderMaterial) -> float:
     """Return the index of a surface's coat, 1 without one."""
     diffraction = material.diffraction
     return (diffraction and diffraction.described.coat) or 1.0
 
 
-def _common(surface: Surface) -> Packed:
+def _common(surface: SceneSurface) -> Packed:
     """Pack a surface without its table; energy conservation at all height scales of the slider."""
     material = surface.material
     packed = pack_surface(material) | pack_emission(surface.radiance)

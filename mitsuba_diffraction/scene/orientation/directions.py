@@ -39,7 +39,7 @@ _SHIFT = 1e-6  # share of the eigenvalues' scale: the Laplacian of a flat sheet 
 
 
 @dataclass(frozen=True)
-class Surface:
+class WeldedMesh:
     """A mesh welded by position, with frames, transport along its edges, weights and areas."""
 
     positions: Floats
@@ -52,7 +52,7 @@ class Surface:
     areas: Floats
 
     @classmethod
-    def weld(cls, positions: Floats, normals: Floats, faces: Ints) -> Surface:
+    def weld(cls, positions: Floats, normals: Floats, faces: Ints) -> WeldedMesh:
         places, welded = np.unique(positions, axis=0, return_inverse=True)
         welded = welded.reshape(-1)
         faces = welded[faces]
@@ -191,7 +191,7 @@ def direction_field(
             f"mesh: the position or normal of vertex {lost[0]} is not finite ({len(lost)} such "
             "vertices); repair the mesh"
         )
-    surface = Surface.weld(positions, normals, faces)
+    surface = WeldedMesh.weld(positions, normals, faces)
     if along == "smooth":
         field = _smoothest(surface)
     else:
@@ -215,7 +215,7 @@ def turned(directions: Floats, normals: Floats, degrees: float) -> Floats:
     return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
 
 
-def _smoothest(surface: Surface) -> Complexes:
+def _smoothest(surface: WeldedMesh) -> Complexes:
     """The lowest eigenvector of L z = λ M z on each connected part, by inverse iteration."""
     count, part = surface.parts()
     laplacian, mass = surface.connection_laplacian(), surface.areas
@@ -230,14 +230,14 @@ def _smoothest(surface: Surface) -> Complexes:
     return field
 
 
-def _following(surface: Surface, guide: Complexes, distance: float) -> Complexes:
+def _following(surface: WeldedMesh, guide: Complexes, distance: float) -> Complexes:
     """The field that follows a guide where it has a length, smooth within a distance."""
     mass = surface.areas / distance**2
     matrix = csc_array(surface.connection_laplacian() + diags_array(mass.astype(np.complex128)))
     return splu(matrix).solve(mass * guide)
 
 
-def _current(surface: Surface) -> Floats:
+def _current(surface: WeldedMesh) -> Floats:
     """Unit vectors along the current from one end of each part to the other, (k, 3)."""
     count, part = surface.parts()
     n = len(surface.positions)

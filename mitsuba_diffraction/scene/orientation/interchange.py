@@ -5,16 +5,20 @@ Texture coordinates are Mitsuba's, whose v runs downwards in a picture, as Mitsu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError, one_line
+from ...errors import DiffractionError, one_line, quoted
 from ...extras import optional
-from ...files import GLTF, USD
+from ...files import GLTF, USD, path_beside, readable_file, refuse_pipe
+from ...gltf import load_gltf
+from ...inputs import note_input
+from ...limits import MOST_PLACED, bounded_memory, check_content, check_count
 from ..meshes import Floats, Ints, MeshArrays
+from .mesh_indices import check_indices
 
 
 def interchange_mesh(file: Path) -> MeshArrays:
@@ -29,9 +33,11 @@ def interchange_mesh(file: Path) -> MeshArrays:
     """
     reader = _gltf_parts if file.suffix.lower() in GLTF else _usd_parts
     package = optional("trimesh" if reader is _gltf_parts else "pxr.UsdGeom", f"mesh '{file}'")
+    shown, size = f"mesh '{file}'", readable_file(file).stat().st_size
     try:
-        parts = [part for part in reader(package, file) if len(part.faces)]
-    except DiffractionError:
+        with bounded_memory(size, shown):
+            parts = list(_checked_parts(reader(package, file), size, shown))
+    except (DiffractionError, MemoryError):
         raise
     except Exception as error:  # whatever the packages make of damaged files
         reason = one_line(str(error))[-200:] or type(error).__name__
@@ -48,6 +54,21 @@ def interchange_mesh(file: Path) -> MeshArrays:
         _joined([part.uv for part in parts]),
         np.concatenate(faces),
     )
+
+
+def _checked_parts(parts: Iterable[MeshArrays], size: int, shown: str) -> Iterator[MeshArrays]:
+    """Yield the parts that have triangles.
+
+    Raises a DiffractionError if a triangle names no vertex, or parts grow beyond the file's limit.
+    """
+    claimed = 0.0
+    for number, part in enumerate(parts, 1):
+        check_count(number, MOST_PLACED, shown, "placed meshes or more")
+        claimed += sum(array.nbytes for array in part if array is not None)
+        check_content(claimed, size, shown)
+        check_indices(part.faces, len(part.positions), shown)
+        if len(part.faces):
+            yield part
 
 
 def stated_up(file: Path) -> str | None:
@@ -80,7 +101,7 @@ def _placed(
 
 def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
     """Yield the meshes of a glTF file; `trimesh` turns v upwards."""
-    scene = trimesh.load_scene(file, process=False)
+    scene = load_gltf(file, f"mesh '{file}'")
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
         mesh = scene.geometry[name]
@@ -100,11 +121,39 @@ def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
 
 def _stage(file: Path) -> Any:
     """Open a USD file."""
-    usd = optional("pxr.Usd", f"mesh '{file}'")
+    usd, sdf = optional("pxr.Usd", f"mesh '{file}'"), optional("pxr.Sdf", f"mesh '{file}'")
     try:
+        _check_layers(sdf, file)
         return usd.Stage.Open(str(file))
+    except DiffractionError:
+        raise
     except Exception as error:  # Tf.ErrorException, over several lines
         raise DiffractionError(f"mesh '{file}': cannot be read as USD") from error
+
+
+def _check_layers(sdf: Any, file: Path) -> None:
+    """Refuse a USD file that is composed of files outside of its folder, before they are opened."""
+    waiting, seen = [file], set()
+    while waiting:
+        layer_file = waiting.pop()
+        if layer_file in seen:
+            continue
+        seen.add(layer_file)
+        note_input(layer_file)
+        refuse_pipe(layer_file)
+        layer = sdf.Layer.FindOrOpen(str(layer_file)) if layer_file.is_file() else None
+        if layer is None:
+            continue  # USD warns of it
+        for name in layer.GetCompositionAssetDependencies():
+            if name.startswith("`"):
+                raise DiffractionError(
+                    f"mesh '{file}': its name of a file {quoted(name)} is an expression; write the "
+                    "name itself"
+                )
+            # a file in an archive: archive.usdz[file.usda]
+            path = layer_file.parent / name.partition("[")[0]
+            path_beside(file, str(path.absolute()))
+            waiting.append(path)
 
 
 def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
@@ -121,13 +170,13 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
         counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
         corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], np.int64)
         points = np.array(mesh.GetPointsAttr().Get() or [], np.float64)
-        starts = np.cumsum(counts) - counts
-        fans = [
-            (start, start + n, start + n + 1)
-            for start, count in zip(starts, counts, strict=True)
-            for n in range(1, count - 1)
-        ]
-        faces = np.array(fans, np.int64).reshape(-1, 3)
+        if (counts < 0).any() or counts.sum() != len(corners):
+            raise DiffractionError(
+                f"mesh '{file}': faceVertexCounts of {prim.GetPath()} are {counts.sum()} corners, "
+                f"and faceVertexIndices {len(corners)}; export the mesh again"
+            )
+        check_indices(corners, len(points.reshape(-1, 3)), f"mesh '{file}'")
+        faces = _fans(counts)
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, ::-1]
         own = geometry.Primvar(mesh.GetNormalsAttr())
@@ -141,6 +190,17 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
             None if uv is None else uv * [1.0, -1.0] + [0.0, 1.0],
             faces,
         )
+
+
+def _fans(counts: Ints) -> Ints:
+    """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
+
+    counts : corners of each polygon.
+    """
+    triangles = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, triangles)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
 def _of_corners(values: Any, interpolation: str, corners: Ints, counts: Ints) -> Floats | None:

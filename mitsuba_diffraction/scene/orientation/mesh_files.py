@@ -15,28 +15,25 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
-from ...files import GLTF, MESHES, USD, read_bytes, readable_file
+from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import MeshArrays, mesh_arrays, mesh_faces
+from ..meshes import MeshArrays, mesh_arrays
 from .interchange import interchange_mesh
+from .mesh_indices import CODES, check_mesh, ply_header
 from .trimesh import TriangleMesh
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
+# Codes of `struct`
+_CODES = {name: np.dtype(code).char for name, code in CODES.items()}
+
 # Lines of normals in an OBJ file, and corners v/t/n or v//n of its faces
 _NORMAL, _CORNER = re.compile(rb"(?m)^vn .*$"), re.compile(rb"(?<= )(\d+)(/\d+)?/{1,2}\d+(?=\s|$)")
-
-_CODES = {
-    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h",
-    "ushort": "H", "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I",
-    "float": "f", "float32": "f", "double": "d", "float64": "d",
-}  # fmt: skip
 
 
 def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
@@ -54,40 +51,14 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         )
     readable_file(file)
     if _is_interchange(file):
-        mesh = interchange_mesh(file)
-        _check_faces(file, len(mesh.positions), mesh.faces)
-        return mesh
+        return interchange_mesh(file)
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")
-    kind = KINDS[file.suffix.lower()]
-    _check_faces(file, *_vertices_and_faces(file, kind))
-    return mesh_arrays(_load(file, kind, face_normals=False))
+    return mesh_arrays(_load(file))
 
 
 def _is_interchange(file: Path) -> bool:
     return file.suffix.lower() in (*GLTF, *USD)
-
-
-def _check_faces(file: Path, vertices: int, faces: Ints) -> None:
-    """Refuse a mesh without triangles, or with a triangle that names no vertex."""
-    if not len(faces):
-        raise DiffractionError(f"mesh '{file}': it has no triangles")
-    if faces.max() >= vertices:
-        raise DiffractionError(
-            f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
-            f"{vertices}; export the mesh again"
-        )
-
-
-def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
-    """Return the number of vertices and the faces (m, 3) of a mesh that is not kept.
-
-    Whoever keeps an error keeps what its traceback has seen, and Dr.Jit compiles kernels for all
-    meshes alive: one without faces would break every later rendering of the process.
-    """
-    # without normals: making them, Mitsuba follows indices that point nowhere
-    mesh = _load(file, kind, face_normals=True)
-    return mesh.vertex_count(), mesh_faces(mesh)
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
@@ -95,33 +66,58 @@ def has_own_normals(path: str | os.PathLike[str]) -> bool:
     file = Path(path)
     if _is_interchange(file):
         return interchange_mesh(file).normals is not None
-    content = read_bytes(file)
     if file.suffix.lower() == ".ply":
-        header = content[: content.find(b"end_header")]
-        return re.search(rb"^property\s+\w+\s+nx\s*$", header, re.MULTILINE) is not None
-    return file.suffix.lower() != ".obj" or re.search(rb"^vn\s", content, re.MULTILINE) is not None
+        header = ply_header(readable_file(file))
+        vertex = [e for e in header.elements if e.name == "vertex"] if header else []
+        return any(words[-1] == "nx" for element in vertex for words in element.properties)
+    return file.suffix.lower() != ".obj" or _any_line_begins(readable_file(file), b"vn")
 
 
-def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
+def _load(file: Path) -> mi.Mesh:
+    kind = KINDS[file.suffix.lower()]
+    _check(file, kind, file)
     try:
-        return _read(file, kind, face_normals)
+        return _read(file, kind)
     except _UNREAD as error:
         triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
         if kind == "obj" and "invalid vertex normal" in str(error):
             warn(f"mesh '{file}': a vertex normal has length 0; all are rebuilt from the triangles")
             triangles = _CORNER.sub(rb"\1\2", _NORMAL.sub(b"", file.read_bytes()))
         if triangles is not None:
-            with tempfile.TemporaryDirectory() as folder, contextlib.suppress(*_UNREAD):
+            with tempfile.TemporaryDirectory() as folder:
                 cut = Path(folder, file.name)
                 cut.write_bytes(triangles)
-                return _read(cut, kind, face_normals)
+                _check(cut, kind, file)
+                with contextlib.suppress(*_UNREAD):
+                    return _read(cut, kind)
         lines = str(error).split(": ", 1)[-1].split()
         reason = " ".join(lines)[-200:] or type(error).__name__
         raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
 
 
-def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
-    return mi.load_dict({"type": kind, "filename": str(file), "face_normals": face_normals})
+def _check(file: Path, kind: str, named: Path) -> None:
+    """Refuse a mesh without triangles, or one that Mitsuba cannot read safely.
+
+    Dr.Jit compiles kernels for all meshes alive, those that the traceback of an error keeps as
+    well: one without triangles would break every later rendering of the process.
+
+    named : the file in messages.
+    """
+    triangles = check_mesh(file, kind, shown=f"mesh '{named}'")
+    if kind == "obj" and not _any_line_begins(file, b"f"):
+        triangles = 0
+    if triangles == 0:
+        raise DiffractionError(f"mesh '{named}': it has no triangles")
+
+
+def _any_line_begins(file: Path, word: bytes) -> bool:
+    """Whether a line of an OBJ file begins with a word."""
+    with file.open("rb") as lines:
+        return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
+
+
+def _read(file: Path, kind: str) -> mi.Mesh:
+    return mi.load_dict({"type": kind, "filename": str(file)})
 
 
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
@@ -129,7 +125,7 @@ def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
     file = readable_file(path)
     if _is_interchange(file):
         return None
-    mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
+    mesh = _load(file)
     if not mesh.has_attribute(ORIENTATION):
         return None
     values = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)

@@ -26,6 +26,7 @@ from ...plugin.types import (
     Float,
     Interaction,
     Mask,
+    Powers,
     Properties,
     Spectrum,
     Vector2f,
@@ -39,7 +40,7 @@ _one_at_a_time = threading.Lock()
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedLookups:
     """Look-ups of one BSDF in one call; lanes without light are left out."""
 
     bsdf: int  # index among the session's BSDFs
@@ -124,7 +125,7 @@ class Session:
         for buffer, column in zip(buffers, columns, strict=True):
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
-    def records(self) -> list[Recorded]:
+    def records(self) -> list[RecordedLookups]:
         """Look-ups since `start`; recording has ended."""
         result = []
         for number, buffers in enumerate(self._buffers):
@@ -132,7 +133,9 @@ class Session:
             values = np.stack(value, axis=1)
             lane = np.flatnonzero(values.max(axis=1) > 0.0)
             if len(lane):
-                result.append(Recorded(number, lane, u[lane], v[lane], w[lane], values[lane]))
+                result.append(
+                    RecordedLookups(number, lane, u[lane], v[lane], w[lane], values[lane])
+                )
         self._buffers = []
         return result
 
@@ -161,7 +164,7 @@ def _kind(session: Session) -> type[BSDF]:
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
         def light(
-            self, ctx: Context, site: Site, pair: Pair, power: Colour, active: Mask
+            self, ctx: Context, site: Site, pair: Pair, power: Powers, active: Mask
         ) -> Spectrum:
             value = super().light(ctx, site, pair, power, active)
             light = mi.unpolarized_spectrum(value)

@@ -25,11 +25,11 @@ from ..fields import check_names, mapping
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, cached, key_of
 from ..table import DiffractionTable
-from .conserved import Dielectric, Reflector
+from .conserved import Reflector, Transmitter
 from .gain import thick
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
-from .transport import Orders, ScatteredLight, Transport
+from .transport import ScatteredLight, ScatteredOrders, Transport
 
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
@@ -81,7 +81,7 @@ _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
 )
 
 
-class Surface:
+class SurfaceEnergy:
     """A table's surface of a material at one height scale.
 
     Parameters
@@ -92,17 +92,17 @@ class Surface:
     def __init__(
         self,
         table: DiffractionTable,
-        material: Reflector | Dielectric,
+        material: Reflector | Transmitter,
         height_scale: float = 1.0,
         wavelength_range: tuple[float, float] | None = None,
     ) -> None:
         self.material, finer = material, 1
         self._settings = settings = energy_settings()
-        self._both_sides = isinstance(material, Dielectric)
+        self._both_sides = isinstance(material, Transmitter)
         if isinstance(material, Reflector):
             finer += thick(material.index(np.array(table.wavelength_range[:1])))
         light = wavelength_range or table.wavelength_range
-        self.orders = Orders(table, light, height_scale, material.densest, finer)
+        self.orders = ScatteredOrders(table, light, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
@@ -226,7 +226,7 @@ class Energy:
     """
 
     table: DiffractionTable
-    material: Reflector | Dielectric
+    material: Reflector | Transmitter
     wavelength_range: tuple[float, float]
     stretch: float = 1.0
 
@@ -254,7 +254,7 @@ class Energy:
 
         def make() -> Conservation:
             light = self.wavelength_range
-            return Surface(self.table, self.material, height_scale, light).conservation(light)
+            return SurfaceEnergy(self.table, self.material, height_scale, light).conservation(light)
 
         versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)

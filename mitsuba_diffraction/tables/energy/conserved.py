@@ -61,7 +61,7 @@ class Reflector:
 
 
 @dataclass(frozen=True)
-class Dielectric:
+class Transmitter:
     """Dielectric that light meets from both sides and that lets light through.
 
     Attributes

@@ -28,7 +28,7 @@ FARTHEST = 2.0
 
 
 @dataclass(frozen=True)
-class Gain:
+class PathGain:
     """G of a path at one wavelength.
 
     Attributes
@@ -68,17 +68,18 @@ class Gain:
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 
-    def order_0(self, cos_i: Real, cos_o: Real, power: Real, turn: Real | float) -> Real:
+    def order_0(
+        self, cos_i: Real, cos_o: Real, power: Real, turn: Real | float, sharpness: float
+    ) -> Real:
         """Return the share of order 0 that goes to directions across its lobe.
 
         power : of order 0 at these directions; turn : azimuths between them, rad.
+        sharpness : √(kσ₀) of the lobe's window.
         """
         if self.path.let_through:
             return self.path.flat_transmittance(cos_i, cos_o) * power
-        share = self.exact(cos_i, cos_o, np.cos(turn)) * power
-        if not self.path.thin:
-            return share
-        return share + self.path.face_reflectance(cos_i, cos_o, np.cos(turn))
+        share, face = self.path.mirrored(cos_i, cos_o, np.cos(turn), sharpness)
+        return share * power + face
 
     @cached_property
     def _table(self) -> Real:

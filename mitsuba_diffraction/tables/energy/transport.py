@@ -30,7 +30,7 @@ from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
 from ..order_mixture import NARROW, order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, Gain
+from .gain import LEAST_COSINE, PathGain
 from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between rings, at least. Orders that
@@ -45,12 +45,11 @@ _WIDE = 0.08
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
-class Orders:
+class ScatteredOrders:
     """Orders of a table at one height scale: order 0, a few strong ones, a density of all others.
 
     wavelength_range : of the light, nm.
-    densest : largest index of the media that light travels in; order 0 of a dielectric is summed
-        apart from the others however wide its lobe is.
+    densest : largest index of the media that light travels in.
     finer : factor on the quadrature's resolution.
     """
 
@@ -74,7 +73,7 @@ class Orders:
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)
-        self.mixture = order_mixture(table, scale, reach, smoothing, apart=densest > 1.0)
+        self.mixture = order_mixture(table, scale, reach, smoothing)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.strong = len(self.mixture.frequency)
@@ -107,7 +106,7 @@ class Transport:
 
     def __init__(
         self,
-        orders: Orders,
+        orders: ScatteredOrders,
         path: Path,
         wavelength: float,
         theta: Real,
@@ -117,7 +116,7 @@ class Transport:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
         above = float(wavenumber(wavelength))
-        self._gain = Gain(path, orders.roughness, above, orders.height_scale)
+        self._gain = PathGain(path, orders.roughness, above, orders.height_scale)
         self._k = above * path.left.index  # where the light goes to
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
@@ -142,7 +141,7 @@ class Transport:
         return np.maximum(np.cos(theta), LEAST_COSINE), sine
 
     def _kappa(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return κ over the height scale and `Orders.densest`."""
+        """Return κ over the height scale and `ScatteredOrders.densest`."""
         return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
 
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
@@ -164,7 +163,7 @@ class Transport:
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
         cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
-        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth)
+        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth, self._width_0**-0.5)
         return np.asarray(lobe * gain, np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
@@ -186,7 +185,8 @@ class Transport:
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
-        parts *= self._gain.order_0(np.broadcast_to(cos_i, cos_o.shape), cos_o, power, np.pi)
+        cos_in = np.broadcast_to(cos_i, cos_o.shape)
+        parts *= self._gain.order_0(cos_in, cos_o, power, np.pi, width**-0.5)
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 

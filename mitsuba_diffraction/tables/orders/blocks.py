@@ -33,7 +33,7 @@ from .table import Band, OrderTable
 _LEAST_WITHIN, _LEAST_ABOVE = 0.04, 0.05
 
 
-class Factors(NamedTuple):
+class PortFactors(NamedTuple):
     """Factors between ports, of channels (…, n).
 
     Attributes
@@ -46,7 +46,7 @@ class Factors(NamedTuple):
     known: NDArray[np.bool_]
 
 
-def factors(x: Array, y: Array, index: float) -> Factors:
+def factors(x: Array, y: Array, index: float) -> PortFactors:
     """Return the factors of channels; x (…, n) and y (…, 1) or (…, n), over 2π/λ."""
     above = 1.0 - x * x - y * y
     within = above + (index**2 - 1.0)
@@ -58,7 +58,7 @@ def factors(x: Array, y: Array, index: float) -> Factors:
     scale[..., lower, lower] = scale[..., upper, upper] = 0.0
     scale[..., lower, upper] = scale[..., upper, lower] = face_transmittance(z_above, index)
     far = np.concatenate([z_within > _LEAST_WITHIN * index, z_above > _LEAST_ABOVE], -1)
-    return Factors(scale, far[..., :, None] & far[..., None, :] & (scale > 0.0))
+    return PortFactors(scale, far[..., :, None] & far[..., None, :] & (scale > 0.0))
 
 
 def even_nodes(count: int) -> Array:

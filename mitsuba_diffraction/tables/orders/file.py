@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
 from ...files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ...limits import MOST_EFFICIENCIES
 from ..fields import mapping
 from .crossed import CrossedTable
-from .table import GROOVES, MOST_NUMBERS, Band, OrderTable
+from .table import GROOVES, Band, OrderTable
 
 #: Raised whenever the meaning of the numbers changes; files of another version are refused.
 FORMAT_VERSION = 1
@@ -194,7 +195,7 @@ def _table(file: Any) -> OrderTable:
     unpacked: dict[tuple[int, str], NDArray[np.float32]] = {}
     for name, variable in file.variables.items():
         first, kind, k = name.split("_")
-        if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+        if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
             raise ValueError(f"{name} claims {variable.shape} numbers")
         key = int(k), kind + (_MUELLER if first == "mueller" else "")
         packed[key] = variable[:]
@@ -248,7 +249,7 @@ def _checksum(outline: dict[str, Any], packed: dict[tuple[int, str], NDArray[np.
 def _crossed(file: Any) -> CrossedTable:
     """Return the table of a crossed grating of an open file."""
     variable = file.variables["efficiency"]
-    if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+    if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
         raise ValueError(f"it claims {variable.shape} numbers")
     if file.sha256 != _crossed_checksum(file, variable[:]).encode():
         raise ValueError("its checksum is of another one")

@@ -28,8 +28,8 @@ LEAST_BLOCK = 1.01
 GROOVES, S_AND_P = "grooves", "s and p"
 #: Octaves beyond its wavelengths within which a table has its nearest efficiencies, and then none.
 MARGIN = 0.1
-#: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
-MOST_BANDS, MOST_NODES, MOST_NUMBERS = 256, 64, 1 << 27
+#: Bands, and nodes along an axis, at most: beyond, no renderer would want it.
+MOST_BANDS, MOST_NODES = 256, 64
 
 
 class Counts(NamedTuple):

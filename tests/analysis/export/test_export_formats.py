@@ -13,7 +13,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.export import bird, rgl, zemax
-from mitsuba_diffraction.analysis.export.cells import Grid
+from mitsuba_diffraction.analysis.export.cells import ExportGrid
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.orders import thin_grating
@@ -69,7 +69,9 @@ def ball(bsdf):
 def test_mitsuba_renders_the_tensors_as_the_surface(tmp_path):
     """ΔE2000 below 2 in the mean, an eye's threshold: lobes cover four cells of half vectors."""
     surface = grating(material="Al")
-    grid = Grid(np.linspace(0, 84, 8), np.linspace(-180, 180, 13), np.arange(380.0, 741, 30), 40)
+    grid = ExportGrid(
+        np.linspace(0, 84, 8), np.linspace(-180, 180, 13), np.arange(380.0, 741, 30), 40
+    )
     rgl.save_rgl(mi.load_dict(surface), tmp_path / "grating.bsdf", grid)
     measured = {"type": "measured", "filename": str(tmp_path / "grating.bsdf")}
     pictures = [
@@ -85,7 +87,9 @@ def test_mitsuba_renders_the_tensors_as_the_surface(tmp_path):
 def test_narrow_orders_keep_their_power_in_tensors(tmp_path):
     """Order 0 of a mirror, 0.3° wide, as a lobe as wide as the cell: 60 % of white light."""
     mirror = OrderTable.mirror(0.6, 0.6)
-    grid = Grid(np.linspace(0, 60, 3), np.linspace(-180, 180, 9), np.array([500.0, 540, 580]), 24)
+    grid = ExportGrid(
+        np.linspace(0, 60, 3), np.linspace(-180, 180, 9), np.array([500.0, 540, 580]), 24
+    )
     rgl.save_rgl(mi.load_dict(md.bsdf_dict(mirror)), tmp_path / "m.bsdf", grid)
     measured = mi.load_dict({"type": "measured", "filename": str(tmp_path / "m.bsdf")})
     random = mi.PCG32(1 << 16)
@@ -125,7 +129,7 @@ def read_zemax(path):
 
 def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
     bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.bsdf"
-    grid = Grid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([550.0]), 171)
+    grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([550.0]), 171)
     zemax.save_zemax(bsdf, file, grid, "Al")
     head, axes, tis, values = read_zemax(file)
     assert (head["ScatterType"], head["Symmetry"]) == ("BRDF", "ASymmetrical4D")
@@ -148,7 +152,7 @@ def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
 
 def test_narrow_orders_keep_their_power_in_zemax_s_file(tmp_path):
     mirror = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6, 0.6)))
-    grid = Grid(np.array([0.0, 30]), np.array([0.0]), np.array([550.0]), 86)
+    grid = ExportGrid(np.array([0.0, 30]), np.array([0.0]), np.array([550.0]), 86)
     zemax.save_zemax(mirror, tmp_path / "m.bsdf", grid)
     tis, values = read_zemax(tmp_path / "m.bsdf")[2:]
     assert tis == pytest.approx(0.6, rel=0.05)  # 64 samples of the lobe
@@ -159,7 +163,7 @@ def test_narrow_orders_keep_their_power_in_zemax_s_file(tmp_path):
 
 def test_bird_s_json_has_f_of_each_pair(tmp_path):
     bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.brdf"
-    grid = Grid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([500.0, 600]), 16)
+    grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([500.0, 600]), 16)
     bird.save_bird(bsdf, file, grid, "Al grating")
     content = json.loads(file.read_text("utf-8"))
     meta, data = content["metadata"], content["data"]

@@ -85,8 +85,8 @@ def test_files_without_heights_say_what_they_have(tmp_path):
 
 
 def test_treatments_are_applied_in_order_and_reported(tmp_path):
-    field = HeightField.load(write(tmp_path), level="lines", clip="2", periodic="taper")
-    words = ["channel", "scan lines", "clipped", "tapered"]
+    field = HeightField.load(write(tmp_path), level="lines", clip="2", periodic="exact")
+    words = ["channel", "scan lines", "clipped", "whole periods"]
     assert len(field.history) == len(words)
     assert all(word in line for word, line in zip(words, field.history, strict=True))
     assert "not levelled" in HeightField.load(write(tmp_path), level="none").history[1]

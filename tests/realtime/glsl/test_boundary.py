@@ -49,6 +49,13 @@ def pairs(n: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     return wi, wo, np.concatenate([(wi + wo) * [1, 1, HEIGHTS], cos_half[:, None]], axis=1)
 
 
+def apart(pair: tuple[NDArray[Any], ...], radius: float) -> tuple[NDArray[Any], ...]:
+    """Pairs of `pairs` whose (u, v) lie beyond order 0's lobe, which is a mirror's."""
+    beyond = np.hypot(*pair[2][:, :2].T) > radius
+    assert beyond.sum() > 30
+    return tuple(part[beyond] for part in pair)
+
+
 def factor(
     table: DiffractionTable, kind: str, wi: NDArray[Any], wo: NDArray[Any], lam: NDArray[Any]
 ) -> NDArray[np.float64]:
@@ -88,8 +95,9 @@ def shaded(
 
 @pytest.mark.parametrize("kind", MATERIALS)
 def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
-    pair = pairs(300)
-    colours = pack_colours(ColourTable.build(table))
+    table_of_colours = ColourTable.build(table)
+    colours = pack_colours(table_of_colours)
+    pair = apart(pairs(600), table_of_colours.radius_end)
     plain = probed(gl, "fast", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
     found = shaded(gl, "fast", table, colours | material, pair)
@@ -131,11 +139,12 @@ def test_lut_has_the_tint_of_a_metal(gl: Any, table: DiffractionTable) -> None:
 def test_exact_has_the_factor_of_each_wavelength(
     gl: Any, table: DiffractionTable, kind: str
 ) -> None:
-    pair = wi, wo, at = pairs(120)
-    parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
-    found = shaded(gl, "exact", table, parts, pair)
     lam = np.arange(376.0, 744.0, 0.5) + 0.25
     k = wavenumber(lam)
+    # exp(−20) of the largest power
+    pair = wi, wo, at = apart(pairs(400), 20**0.5 / (table.sigma_0 * k.min()))
+    parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
+    found = shaded(gl, "exact", table, parts, pair)
     weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2
     powers = table.window_sum(*(at[:, n, None] * k for n in range(3)))
     exact = (powers * factor(table, kind, wi, wo, lam)) @ weights

@@ -94,7 +94,7 @@ def viewer(gl: Any, some_variant: str, table: DiffractionTable, tmp_path: Path) 
         }
     )  # fmt: skip
     settings = {"mitsuba_scene": scene, "folder": tmp_path, "window_size": (96, 64), "spp": 8}
-    kind = type("SceneViewer", (module.Viewer,), settings)
+    kind = type("SceneViewer", (module.ViewerWindow,), settings)
     made = module.open_viewer(kind, ["--window", "headless", "--backend", "egl"])
     # a headless window calls all keys alike
     made.wnd.keys = types.SimpleNamespace(ACTION_PRESS="press", S="s", P="p", R="r")
@@ -188,4 +188,4 @@ def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(window, "create_window_config_instance", fail)
     with pytest.raises(DiffractionError, match=r"no window could be opened \(Cannot connect to"):
-        module.open_viewer(module.Viewer, [])
+        module.open_viewer(module.ViewerWindow, [])

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import EpsImagePlugin, Image
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.plugin.pigment import pigment_bsdf
 from mitsuba_diffraction.scene.fitted_mesh import fit_of
 from mitsuba_diffraction.scene.orientation.mesh_files import has_own_normals, load_mesh
 from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
+from tests.support.hostile import postscript
 
 # a bent sheet, of which no axis and no side looks like another
 U, V = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 3), indexing="ij"))
@@ -133,3 +138,82 @@ def test_a_missing_package_is_named_with_its_extra(
     (tmp_path / "a.glb").write_bytes(b"glTF")
     with pytest.raises(DiffractionError, match="extra gltf"):
         load_mesh(tmp_path / "a.glb")
+
+
+SECRETS = ["../secret.bin", "{outside}/secret.bin", "link.bin", "%2e%2e/secret.bin", "pipe.bin"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a link and a pipe; beside it lies a file that nothing in it may name."""
+    (tmp_path / "secret.bin").write_bytes(bytes(4096))
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
+    os.mkfifo(folder / "pipe.bin")
+    return folder
+
+
+def textured_gltf(folder: Path) -> Path:
+    """Write a sheet with a picture, and a buffer beside it; return its file."""
+    trimesh = pytest.importorskip("trimesh")
+    picture = Image.new("RGB", (2, 2), "red")
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
+    visual = trimesh.visual.TextureVisuals(uv=np.stack([U, V], axis=1), material=material)
+    mesh = trimesh.Trimesh(POSITIONS, FACES, visual=visual, process=False)
+    file = folder / "sheet.gltf"
+    for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(mesh)).items():
+        (file if name.endswith(".gltf") else folder / name).write_bytes(content)
+    return file
+
+
+@pytest.mark.parametrize("name", SECRETS)
+@pytest.mark.parametrize("part", ["buffers", "images"])
+def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name: str) -> None:
+    file = textured_gltf(folder)
+    assert len(load_mesh(file).faces) == len(FACES)
+    document = json.loads(file.read_text())
+    entry = document[part][0]
+    entry.pop("bufferView", None)
+    entry["uri"] = name.format(outside=folder.parent)
+    file.write_text(json.dumps(document))
+    # a mesh needs no pictures, which are read for pigments alone
+    read = load_mesh if part == "buffers" else lambda file: pigment_bsdf(str(file))
+    with pytest.raises(DiffractionError, match=r"outside of its folder|is a pipe"):
+        read(file)
+
+
+def test_pictures_in_gltf_run_no_program(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    monkeypatch.setattr(EpsImagePlugin, "Ghostscript", lambda *a, **k: calls.append(a))
+    postscript(folder / "a.eps")
+    file = textured_gltf(folder)
+    document = json.loads(file.read_text())
+    document["images"][0] = {"uri": "a.eps", "mimeType": "image/png"}
+    file.write_text(json.dumps(document))
+    load_mesh(file)
+    with pytest.raises(DiffractionError, match="none of PNG"):
+        pigment_bsdf(str(file))
+    assert calls == []
+
+
+USD_NAMES = ["../secret.usda", "{outside}/secret.usda", "./link.usda", "./pipe.usda", '`"a"`']
+
+
+@pytest.mark.parametrize("name", USD_NAMES)
+@pytest.mark.parametrize("nested", [False, True])
+def test_usd_reads_files_of_its_own_folder_alone(folder: Path, name: str, nested: bool) -> None:
+    pytest.importorskip("pxr.Usd")
+    write_usd(folder.parent / "secret.usda")
+    (folder / "link.usda").symlink_to(folder.parent / "secret.usda")
+    os.mkfifo(folder / "pipe.usda")
+    write_usd(folder / "part.usda")
+    file = folder / "sheet.usda"
+    layers = "#usda 1.0\n(\n    subLayers = [@{}@]\n)\n"
+    file.write_text(layers.format("./part.usda"))
+    assert len(load_mesh(file).faces) == len(FACES)
+    (folder / "part.usda").write_text(layers.format(name.format(outside=folder.parent)))
+    if not nested:
+        (folder / "part.usda").rename(file)
+    with pytest.raises(DiffractionError, match=r"outside of its folder|is a pipe|an expression"):
+        load_mesh(file)

@@ -9,9 +9,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
+from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
@@ -30,7 +30,7 @@ def tables():
 
 def raw_albedo(table, theta, phi, wavelength, material):
     directions = np.radians([theta]), np.radians([phi])
-    surface = Surface(table, reflector(*MATERIALS[material]))
+    surface = SurfaceEnergy(table, reflector(*MATERIALS[material]))
     return float(surface.albedos(Conservation(), *directions, wavelength)[0][0, 0, 0])
 
 
@@ -78,7 +78,7 @@ def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence)
     patch = rough_patch((40, 40), (0.2, 0.2), 0.12, 1.2)
     table = md.DiffractionTable.build(patch, coherence_width=8.0, coherence=coherence)
     angles, step = np.array([45.0, 75.0]), np.pi / 480
-    found, _ = Surface(table, reflector("kirchhoff", None)).albedos(
+    found, _ = SurfaceEnergy(table, reflector("kirchhoff", None)).albedos(
         Conservation(), np.radians(angles), np.radians([20.0]), 550.0
     )
     theta, phi = np.meshgrid((np.arange(240) + 0.5) * step, (np.arange(240) + 0.5) * (4 * step))
@@ -94,7 +94,7 @@ def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence)
 
 @pytest.mark.parametrize("surface", ["grating", "rough"])
 def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
-    glass = Surface(tables[surface], reflector("small_slope", 1.5))
+    glass = SurfaceEnergy(tables[surface], reflector("small_slope", 1.5))
     found = glass.conservation((400.0, 700.0))
     assert found.scale is None
     assert found.albedo.values.max() < 1.0
@@ -106,7 +106,7 @@ def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
         np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32, periodic=True
     )
     table = md.DiffractionTable.build(gentle)
-    metal = Surface(table, reflector("small_slope", ALUMINIUM))
+    metal = SurfaceEnergy(table, reflector("small_slope", ALUMINIUM))
     found = metal.conservation((550.0, 550.0))
     assert found.scale is None
 
@@ -120,7 +120,7 @@ def conserved(surface, wavelengths, theta, phi):
 
 
 def test_a_rough_surface_keeps_what_it_may(tables):
-    mirror = Surface(tables["rough"], reflector("kirchhoff", None))
+    mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
     theta, phi = np.radians([3.0, 31.0, 52.0, 68.0, 77.0]), np.radians([5.0, 72.0, 201.0, 333.0])
     raw, kept = conserved(mirror, [550.0], theta, phi)
     assert raw.max() > 1.01  # or the test would say little
@@ -133,7 +133,7 @@ def test_a_rough_surface_keeps_what_it_may(tables):
 @pytest.mark.parametrize("material", ["aluminium", "perfect"])
 def test_a_grating_gains_nothing_between_nodes_either(tables, material):
     """Where orders become propagating the albedo has kinks, and without a material spikes."""
-    surface = Surface(tables["grating"], reflector(*MATERIALS[material]))
+    surface = SurfaceEnergy(tables["grating"], reflector(*MATERIALS[material]))
     rng = np.random.default_rng(0)
     theta, phi = np.radians(rng.uniform(0, 80, 30)), np.radians(rng.uniform(0, 360, 20))
     raw, kept = conserved(surface, [520.0, 547.0, 560.0], theta, phi)
@@ -146,7 +146,7 @@ def test_a_grating_gains_nothing_between_nodes_either(tables, material):
 def test_coarser_settings_take_less_work_and_are_another_record(tables):
     before = use_energy_settings(EnergySettings(polar=12, azimuthal=16, wavelengths=2, rings=12))
     try:
-        mirror = Surface(tables["rough"], reflector("kirchhoff", None))
+        mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
         scale = mirror.conservation((400.0, 700.0)).scale
     finally:
         use_energy_settings(before)
@@ -157,7 +157,7 @@ def test_coarser_settings_take_less_work_and_are_another_record(tables):
 @pytest.mark.parametrize("material", MATERIALS)
 def test_the_tabulated_gain_is_the_gain(tables, material):
     model, index = MATERIALS[material]
-    gain = Gain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
+    gain = PathGain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
     rng = np.random.default_rng(0)
     cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
     for cos_i in np.cos(np.radians([[0.0], [33.0], [71.0]])):

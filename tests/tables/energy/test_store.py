@@ -7,7 +7,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.directional import DirectionalTable
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, Surface
+from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.store import VARIABLE
@@ -19,7 +19,7 @@ def computed(monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     made: list[tuple[float, complex]] = []
 
-    def instead(surface: Surface, wavelength_range: tuple[float, float]) -> Conservation:
+    def instead(surface: SurfaceEnergy, wavelength_range: tuple[float, float]) -> Conservation:
         height_scale = surface.orders.height_scale
         assert isinstance(surface.material, Reflector)
         made.append((height_scale, complex(surface.material.index(np.array([500.0]))[0])))
@@ -27,7 +27,7 @@ def computed(monkeypatch, tmp_path):
         found = DirectionalTable(np.array([400.0, 700.0]), values)
         return Conservation(found, found if height_scale > 0.5 else None)
 
-    monkeypatch.setattr(Surface, "conservation", instead)
+    monkeypatch.setattr(SurfaceEnergy, "conservation", instead)
     return made
 
 

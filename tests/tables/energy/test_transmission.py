@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
-from mitsuba_diffraction.tables.energy.conserved import Dielectric
+from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
+from mitsuba_diffraction.tables.energy.conserved import Transmitter
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import rough_patch
 
@@ -48,7 +48,7 @@ def steps() -> HeightField:
 def sums(field, index, width, thin, model="small_slope"):
     """R + T raw and conserved, (2 wavelengths, 2 sides, angles, azimuths)."""
     table = DiffractionTable.build(field, coherence_width=width, height_scale_max=index)
-    surface = Surface(table, Dielectric(index, model, thin))
+    surface = SurfaceEnergy(table, Transmitter(index, model, thin))
     scales = surface.conservation((450.0, 650.0))
     pairs = [surface.albedos(scales, THETA, PHI, wavelength) for wavelength in (450.0, 650.0)]
     return (np.stack(part) for part in zip(*pairs, strict=True))
@@ -101,7 +101,7 @@ def test_steps_send_on_no_more_than_they_get():
     """Without a scale walls 0.3 µm high send on up to 1.05."""
     use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=40))
     table = DiffractionTable.build(steps(), coherence_width=20.0, height_scale_max=2.4)
-    surface = Surface(table, Dielectric(2.4, "small_slope", False))
+    surface = SurfaceEnergy(table, Transmitter(2.4, "small_slope", False))
     scales, angles = surface.conservation((540.0, 540.0)), np.radians(np.arange(1.0, 80.0, 6.0))
     raw, kept = surface.albedos(scales, angles, np.radians(np.arange(4.0, 360.0, 37.0)), 540.0)
     assert raw.max() > 1.05
@@ -113,7 +113,7 @@ def test_the_gain_grows_with_the_square_of_the_heights():
     def total(depth: float) -> float:
         field = gratings.sinusoidal(2.5, depth, periods=4, pixels_per_period=28)
         table = DiffractionTable.build(field, coherence_width=20.0, height_scale_max=1.5)
-        surface = Surface(table, Dielectric(1.5, "small_slope", False))
+        surface = SurfaceEnergy(table, Transmitter(1.5, "small_slope", False))
         directions = np.radians([40.0]), np.zeros(1)
         return float(surface.albedos(Conservation(), *directions, 550.0)[0][0, 0, 0])
 
@@ -123,11 +123,11 @@ def test_the_gain_grows_with_the_square_of_the_heights():
 
 
 def test_heights_that_are_scaled_are_as_others():
-    glass = Dielectric(1.5, "small_slope", True)
+    glass = Transmitter(1.5, "small_slope", True)
     totals = []
     for depth, scale in ((0.03, 1.4), (0.042, 1.0)):
         field = gratings.sinusoidal(2.5, depth, periods=4, pixels_per_period=28)
         table = DiffractionTable.build(field, coherence_width=20.0, height_scale_max=2.2)
-        surface = Surface(table, glass, scale)
+        surface = SurfaceEnergy(table, glass, scale)
         totals.append(surface.albedos(Conservation(), THETA, PHI, 550.0)[0])
     assert totals[0] == pytest.approx(totals[1], abs=1e-4)

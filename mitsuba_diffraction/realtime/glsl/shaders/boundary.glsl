@@ -6,9 +6,6 @@
 
 uniform float coat;               // index of the coat over that of the medium above
 
-// Reflection by the face, relative to the factor `outside` of the structure.
-float face_reflected;
-
 float face_reflectance(float cosine) { return 1.0 - face_transmittance(cosine, coat); }
 
 // Reflectance of a flat coated interface.

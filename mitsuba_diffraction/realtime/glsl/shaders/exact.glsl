@@ -150,11 +150,14 @@ float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
     }
     power *= inverse_scale;
     float apart = sigma * k * r;
-    float mirror = order_0_ratio * exp(-order_0_ratio * apart * apart);  // lobe of order 0
-    power += mirror * specular;
     float reflected = power * boundary_at(cos_half, k, r, z);
+#ifdef ORDER_0
+    float sigma_0 = sigma * sqrt(order_0_ratio);
+    float lobe = order_0_ratio * exp(-order_0_ratio * apart * apart);
+    reflected += lobe * specular * mirror_at(cos_half, k, sigma_0);
 #ifdef COATED
-    reflected += mirror * face_reflected;
+    reflected += lobe * face_at(k, sigma_0);
+#endif
 #endif
     return reflected;
 }

@@ -19,6 +19,7 @@ uniform int intervals;
 uniform float inverse_scale;
 uniform vec2 glossy_steps;      // 1/µm… of radius and z: entries per unit
 uniform ivec2 glossy_size;      // radii, zs
+uniform float sigma_0;          // of order 0's window, µm
 
 void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
 {
@@ -123,10 +124,13 @@ vec3 order_0(float radius, float z)
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
-    vec3 colour = other_orders(uv, r * r, z) + order_0(r, z);
-    colour = tinted(colour * boundary(cos_half, r, z));
-#ifdef COATED
-    colour += face_reflected * order_0(r, 0.0);
+    vec3 colour = other_orders(uv, r * r, z) * boundary(cos_half, r, z);
+#ifdef ORDER_0
+    colour += order_0(r, z) * mirror(cos_half, sigma_0);
+#endif
+    colour = tinted(colour);
+#if defined(ORDER_0) && defined(COATED)
+    colour += order_0(r, 0.0) * face(sigma_0);
 #endif
     return light_colour[light] * colour;
 }

@@ -11,7 +11,7 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     float outside = area * ratio * ratio / wi.z;
     vec2 outer = vec2(wi.z, wo.z);
 #ifdef COATED
-    float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
+    float face = face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     wi = refracted(wi, coat);
     wo = refracted(wo, coat);
     sum = wi + wo;
@@ -21,15 +21,24 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     sum.z *= coat;  // κ is larger by the index of the coat
 #endif
     begin_pair(wi, wo, outer);
+    float mirrored = area * outer.y;  // of order 0, which has no shadowing
 #ifdef ENERGY_CONSERVING
-    outside *= energy_scale(in_patch(wi, rotation), wi.z)
-             * energy_scale(in_patch(wo, rotation), wo.z);
+    float energy = energy_scale(in_patch(wi, rotation), wi.z)
+                 * energy_scale(in_patch(wo, rotation), wo.z);
+    outside *= energy;
+    mirrored *= energy;
 #endif
 #ifdef VCAVITY
     outside *= vcavity(wi.z, wo.z, one_plus_dot);
 #endif
+#ifdef ORDER_0
+    mirror_ends = outer;
+    mirror_share = mirrored / outside;
 #ifdef COATED
-    face_reflected = face / outside;
+    mirror_wi = wi;
+    mirror_wo = wo;
+    face_share = area * outer.y * face / outside;
+#endif
 #endif
     place.zw = vec2(sum.z * height_scale, sqrt(min(0.5 * one_plus_dot, 1.0)));
     return outside;

@@ -1,0 +1,156 @@
+"""glTF files: buffers and pictures come from the file's own folder."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import struct
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from PIL import Image
+
+from .errors import DiffractionError
+from .extras import optional
+from .files import path_beside, read_bytes, refuse_pipe
+from .images import without_programs
+from .inputs import note_input
+from .limits import MOST_PLACED, bounded_memory, check_content, check_count, tree_sizes
+
+# Bytes of a number by the code of its type, and numbers of an item (glTF 2.0, 3.6.2)
+_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+class _Folder:
+    """Resolver of names for `trimesh`, which by itself opens pipes, and before 5.0 any file."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.refused: DiffractionError | None = None  # `trimesh` ignores errors of pictures
+
+    def get(self, name: str) -> bytes:
+        """Return the content of a file beside the glTF file."""
+        try:
+            path = path_beside(self._file, unquote(name))
+            refuse_pipe(path)
+        except DiffractionError as error:
+            self.refused = error
+            raise
+        return read_bytes(path)
+
+    __getitem__ = get
+
+    def size_of(self, document: dict[str, Any]) -> int:
+        """Return the bytes of the files that hold the buffers of a document."""
+        names = {str(buffer.get("uri", "data:")) for buffer in document.get("buffers", [])}
+        return sum(
+            path_beside(self._file, unquote(name)).stat().st_size
+            for name in names
+            if not name.startswith("data:")
+        )
+
+    def keys(self) -> Iterator[str]:
+        """Yield no names: glTF files name all that they need."""
+        return iter(())
+
+
+def note_named(file: Path) -> None:
+    """Note as inputs the buffers and pictures that lie beside a glTF file."""
+    with contextlib.suppress(DiffractionError, ValueError, LookupError, AttributeError):
+        document, _ = _parts(file)
+        for item in (*document.get("buffers", ()), *document.get("images", ())):
+            if not (name := str(item.get("uri", "data:"))).startswith("data:"):
+                note_input(file.parent / unquote(name))
+
+
+def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
+    """Return a glTF file as a scene of `trimesh`; its pictures are not decoded yet.
+
+    wanted_by : option or parameter that names the file, for the message if `trimesh` is missing.
+    materials : keep the materials, for their base colour.
+
+    Raises
+    ------
+    DiffractionError
+        If `trimesh` is not installed, a name is a pipe or leads out of the file's folder, or the
+        file claims to hold more than it may.
+    Exception
+        Whatever `trimesh` makes of damaged files.
+    """
+    trimesh = optional("trimesh", wanted_by)
+    document, rest = _parts(file)
+    size, folder = file.stat().st_size, _Folder(file)
+    _check(document, size + folder.size_of(document), f"'{file}'")
+    if not materials:  # `trimesh` decodes pictures of some, and keeps UV only beside a material
+        document["materials"] = [{} for _ in document.get("materials", ())]
+        document.pop("images", None)
+        document.pop("textures", None)
+    for number, material in enumerate(document.get("materials", ())):
+        material["name"] = str(number)
+    content = json.dumps(document).encode()
+    if rest is not None:
+        content += b" " * (-len(content) % 4)
+        head = struct.pack("<4s2I", b"glTF", 2, 20 + len(content) + len(rest))
+        content = head + struct.pack("<I4s", len(content), b"JSON") + content + rest
+    with without_programs(), bounded_memory(size, f"'{file}'"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # sizes are checked later
+        try:
+            scene = trimesh.load_scene(
+                io.BytesIO(content), file_type=file.suffix[1:].lower(), process=False,
+                resolver=folder,
+            )  # fmt: skip
+        finally:
+            if folder.refused is not None:
+                raise folder.refused
+    for mesh in scene.geometry.values():
+        _check_picture(document, getattr(mesh.visual, "material", None), wanted_by)
+    return scene
+
+
+def _check_picture(document: dict[str, Any], material: Any, wanted_by: str) -> None:
+    """Refuse a material without the picture that the document gives it: `trimesh` leaves it out."""
+    if not str(getattr(material, "name", "")).isdecimal():
+        return
+    base = document["materials"][int(material.name)].get("pbrMetallicRoughness", {})
+    if "baseColorTexture" in base and material.baseColorTexture is None:
+        raise DiffractionError(
+            f"{wanted_by}: its picture cannot be read, or is too large; save it as PNG"
+        )
+
+
+def _parts(file: Path) -> tuple[dict[str, Any], bytes | None]:
+    """Return the document of a glTF file, and the chunks after it if the file is binary.
+
+    Raises a ValueError if the file is damaged.
+    """
+    content, rest = read_bytes(file), None
+    if file.suffix.lower() == ".glb":
+        magic, _, _, length, kind = struct.unpack_from("<4s3I4s", content.ljust(20))
+        if magic != b"glTF" or kind != b"JSON":
+            raise ValueError("its first bytes must be a GLB header")
+        content, rest = content[20 : 20 + length], content[20 + length :]
+    try:
+        document = json.loads(content)
+    except RecursionError as error:
+        raise ValueError("its document nests too much") from error
+    if not isinstance(document, dict):
+        raise ValueError("its document must be an object")
+    return document, rest
+
+
+def _check(document: dict[str, Any], size: int, shown: str) -> None:
+    """Refuse numbers, parts of buffers and placed meshes that are more than a file may hold."""
+    nodes = document.get("nodes", [])
+    check_count(len(nodes), MOST_PLACED, shown, "nodes")
+    placed = max(tree_sizes([node.get("children", []) for node in nodes]), default=0.0)
+    check_count(placed, MOST_PLACED, shown, "nodes below one")
+    claimed = sum(float(view["byteLength"]) for view in document.get("bufferViews", []))
+    for accessor in document.get("accessors", []):
+        item = _BYTES[accessor["componentType"]] * _NUMBERS[accessor["type"]]
+        claimed += float(accessor["count"]) * item
+    check_content(claimed, size, shown)

@@ -1,0 +1,54 @@
+"""Images that users name, opened in formats that Pillow decodes by itself.
+
+Pillow opens more formats than these; for PostScript (EPS) it runs Ghostscript on the content.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from typing import IO
+
+from PIL import EpsImagePlugin, Image, UnidentifiedImageError
+
+from .errors import DiffractionError
+from .limits import check_content
+
+#: Formats of images, in Pillow's names; the content decides, not the suffix.
+FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
+
+
+@contextlib.contextmanager
+def without_programs() -> Iterator[None]:
+    """Keep Pillow from running Ghostscript for packages that open images of every format."""
+    before = EpsImagePlugin.gs_binary
+    EpsImagePlugin.gs_binary = False
+    try:
+        yield
+    finally:
+        EpsImagePlugin.gs_binary = before
+
+
+def open_image(
+    file: str | os.PathLike[str] | IO[bytes], formats: tuple[str, ...] = FORMATS
+) -> Image.Image:
+    """Return an image before its pixels are decoded.
+
+    Raises an UnidentifiedImageError, an OSError, if the content is of another format; a
+    DiffractionError if a file is small, and its pixels as numbers of 8 bytes are many.
+    """
+    name = "an image" if not isinstance(file, str | os.PathLike) else repr(os.fspath(file))
+    try:
+        image = Image.open(file, formats=formats)
+    except UnidentifiedImageError as error:
+        raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
+    except Image.DecompressionBombError as error:
+        raise DiffractionError(f"{name} is too large: {error}") from error
+    if isinstance(file, str | os.PathLike):
+        try:
+            check_content(8.0 * image.width * image.height, os.path.getsize(file), name)
+        except DiffractionError:
+            image.close()
+            raise
+    return image

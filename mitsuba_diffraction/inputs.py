@@ -1,0 +1,80 @@
+"""Files that the running command reads: no output replaces an input.
+
+`files.readable_file`, through which every reader of the package goes, notes its file here; scenes
+note the files that Mitsuba reads. `atomic.atomic_path`, through which every file is written, asks.
+Only commands note: programs that call the library may replace files that they have read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from collections.abc import Iterator
+
+from .errors import DiffractionError
+
+
+class _Noted:
+    """Files by device and inode, by which hard links and other spellings are told, and by path."""
+
+    def __init__(self) -> None:
+        self.read: dict[tuple[int, int], str] = {}
+        self.paths: dict[str, str] = {}
+        self.written: set[str] = set()
+
+
+_noted: _Noted | None = None
+
+
+@contextlib.contextmanager
+def noted() -> Iterator[None]:
+    """Note the files that are read inside, and let no output replace one."""
+    global _noted
+    before, _noted = _noted, _Noted()
+    try:
+        yield
+    finally:
+        _noted = before
+
+
+def note_input(path: str | os.PathLike[str]) -> None:
+    """Note that the command reads a file, unless the command itself has written it."""
+    if _noted is None:
+        return
+    with contextlib.suppress(OSError, ValueError):
+        place, status = os.path.realpath(path), os.stat(path)
+        if stat.S_ISREG(status.st_mode) and place not in _noted.written:
+            _noted.read[status.st_dev, status.st_ino] = place
+            _noted.paths.setdefault(place, os.fspath(path))
+
+
+def note_output(path: str | os.PathLike[str]) -> None:
+    """Note that the command has written a file, which it may read and write again."""
+    if _noted is not None:
+        _noted.written.add(os.path.realpath(path))
+
+
+def input_at(path: str | os.PathLike[str]) -> str | None:
+    """Return the name of the noted file that lies at a path, also under another name; or None."""
+    if _noted is None:
+        return None
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    place = _noted.read.get((status.st_dev, status.st_ino), "")
+    with contextlib.suppress(OSError):
+        # an inode number serves again when its file is gone
+        if place and os.path.samestat(status, os.stat(place)):
+            return _noted.paths[place]
+    return _noted.paths.get(os.path.realpath(path))
+
+
+def refuse_input(output: str | os.PathLike[str]) -> None:
+    """Raise a DiffractionError if an output would replace a file that the command reads."""
+    if (source := input_at(output)) is not None:
+        raise DiffractionError(
+            f"'{output}' would overwrite '{source}', which this command reads; choose another name "
+            "for the output"
+        )

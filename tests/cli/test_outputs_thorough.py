@@ -1,0 +1,73 @@
+"""A fuzz of outputs against inputs: no command replaces a file that it reads."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.support.inputs import HEIGHTS, NAMED, RENDER, SMALL
+
+pytestmark = pytest.mark.thorough
+
+#: A command with each kind of input, and the suffixes of its outputs.
+COMMANDS = [
+    (RENDER, ".exr .png"), (f"{RENDER} --material ball=t.exr", ".exr .png"),
+    (f"{RENDER} --material ball=orders.nc", ".exr"),
+    ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
+    (f"{RENDER} --plan recipe.toml", ".exr"), (f"{RENDER} --frames 1 --turn width", ""),
+    ("plan scale.xml --paths 64", ".toml"), ("brdf-map recipe.toml --resolution 8", ".exr .png"),
+    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
+     "--material keratin", ".exr .png"),
+    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),
+    ("evaluate recipe.toml --windows 0 --step 50 --angle-step 5", ".png .csv .npz"),
+    ("spectrum t.exr --material keratin --pigment pigment.csv --step 50", ".csv .png"),
+    ("spectrum recipe.toml --step 100", ".csv .png"), ("spectrum orders.nc --step 100", ".csv"),
+    ("spectrum h.npy --treatments treatments.toml --step 100 " + SMALL, ".csv"),
+    ("tangents mesh.ply", ".ply"), ("precompute recipe.toml", ".exr"),
+    (f"precompute h.npy {HEIGHTS}", ".exr"),
+    (f"precompute scale.png {HEIGHTS} --max-height 0.1", ".exr"),
+    ("orders orders.nc --theta 0 --wavelength 500", ".csv"), ("tonemap sky.exr", ".png"),
+    (f"sweep light-angle h.npy {HEIGHTS} --resolution 8 --step 100", ".png .csv"),
+    ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
+    ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
+    ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
+    ("solve profile.txt --period 0.6 --resolution 80 --tolerance 0.2 --wavelength-range 590,610",
+     ".nc"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])
+def test_no_output_of_any_name_replaces_an_input(run, original, world, command, suffixes):
+    """Outputs called after each input, with every suffix, in several spellings; then defaults."""
+    words = [word for part in shlex.split(command) for word in part.replace("=", ",").split(",")]
+    first, *others = (word for word in words if (world / word).exists())
+    inputs = {name for word in (first, *others) for name in (word, *NAMED.get(word, ()))}
+    before = {name: (original / name).read_bytes() for name in inputs}
+
+    def check(*options: str) -> list[str]:
+        """Run the command, check its inputs, and tidy up; the names of what it has made."""
+        run(*shlex.split(command), *options)
+        assert {name: (world / name).read_bytes() for name in inputs} == before, options
+        made = [str(f.relative_to(world)) for f in world.rglob("*") if f.is_file()]
+        shutil.rmtree(world)
+        shutil.copytree(original, world)
+        os.chdir(world)
+        return [name for name in made if not (world / name).exists()]
+
+    spellings = itertools.cycle(["{}", "../here/./{}"])
+    for name, suffix in itertools.product(sorted(inputs), suffixes.split()):
+        check("-o", next(spellings).format(f"{Path(name).stem}{suffix}"))
+    # what the command makes by default are links to an input in the next run
+    made = check()
+    for name, link in zip(made, itertools.cycle([os.link, os.symlink]), strict=False):
+        (world / name).parent.mkdir(parents=True, exist_ok=True)
+        link(world / first, world / name)
+    run(*shlex.split(command))
+    for name in made:
+        assert (world / name).samefile(world / first), name
+    check()

@@ -1,0 +1,82 @@
+"""A mirror's lobe: the fit of its correction, and flat mirrors that reflect as Fresnel says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.optics.boundary import geometry, power
+from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.optics.mirror import (
+    MOST_SLOPE,
+    grazing_slope,
+    horizon_correction,
+    log_correction,
+    mirror,
+)
+from mitsuba_diffraction.reference import mirror as judge
+
+#: Widths of windows in µm at 550 nm, as kσ₀.
+SHARPNESS = [2e3 * np.pi / 550.0 * width / 4.0 for width in (6.4, 12.0, 65.0)]
+INDICES = {"perfect": None, "Al": 0.96 + 6.69j, "Au": 0.43 + 2.4j, "glass": 1.5, "water": 1.33}
+
+
+def albedo(sharp: float, degrees: float, index: complex | None) -> float:
+    """∫ f₀ cosθo dωo of a flat mirror under a window of this kσ₀, by quadrature over the lobe."""
+    theta, nodes, reach = np.radians(degrees), 400, 5.0 / sharp
+    sine = np.sin(theta)
+    first = np.sqrt(1.0 - min(sine + reach, 1.0) ** 2)
+    last = np.sqrt(1.0 - max(sine - reach, 0.0) ** 2)
+    places = (np.arange(nodes) + 0.5) / nodes
+    half = min(np.pi, 1.2 * reach / max(sine, 1e-3))
+    cos_o, turn = np.meshgrid(first + (last - first) * places, half * (2.0 * places - 1.0))
+    sin_o = np.sqrt(1.0 - cos_o**2)
+    apart = sin_o**2 + sine**2 - 2.0 * sin_o * sine * np.cos(turn)
+    lobe = sharp**2 / np.pi * np.exp(-(sharp**2) * apart) * cos_o
+    one, slope = np.ones_like(cos_o), np.zeros_like(cos_o)
+    share = one
+    if index is not None:
+        slope = grazing_slope(np.asarray(index), np.sqrt(sharp) * one)
+        dot = np.cos(theta) * cos_o - sine * sin_o * np.cos(turn)
+        share = reflectance(np.sqrt(0.5 * (1.0 + dot)), np.asarray(index))
+    lobe *= share * horizon_correction(np.cos(theta) * one, cos_o, np.sqrt(sharp) * one, slope)
+    return float(lobe.sum() * (last - first) * 2.0 * half / nodes**2)
+
+
+def test_the_fit_is_that_of_the_fixed_point():
+    x = np.linspace(0.0, 12.0, 601)
+    for slope, bound in ((0.0, 1.5e-3), (1.0, 3e-3), (2.0, 5e-3), (MOST_SLOPE, 8e-3)):
+        exact = judge.correction(x, np.ones_like(x), np.full_like(x, slope))
+        fitted = np.exp(log_correction(x, np.full_like(x, slope)))
+        assert np.abs(fitted / exact - 1.0).max() < bound
+
+
+def test_the_solution_is_a_fixed_point():
+    x, slopes, c = judge.solution()
+    kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4.0) / np.sqrt(np.pi) * x * (x[1] - x[0])
+    falls = np.exp(-0.5 * slopes[:, None] * x)
+    inside = x < 6.0
+    # convergence of the iteration
+    np.testing.assert_allclose((c * ((falls * c) @ kernel.T))[:, inside], falls[:, inside], 1e-6)
+
+
+@pytest.mark.parametrize("name", INDICES)
+@pytest.mark.parametrize("sharp", SHARPNESS)
+def test_a_flat_mirror_reflects_what_fresnel_says(name, sharp):
+    index = INDICES[name]
+    for degrees in (0.0, 30.0, 60.0, 70.0, 80.0, 85.0, 88.0):
+        flat = 1.0 if index is None else float(reflectance(np.cos(np.radians(degrees)), index))
+        ratio = albedo(sharp, degrees, index) / flat
+        # the lobe averages R; 1 % above is that average where R bends, never more than is received
+        assert 1.0 - (0.10 if degrees > 85.0 else 0.035) < ratio < 1.02
+        assert ratio * flat < 1.005
+
+
+def test_the_lobe_is_reciprocal_and_that_of_fresnel_in_the_mirror_direction():
+    wi, wo = (0.3, -0.2, np.sqrt(0.87)), (-0.1, 0.5, np.sqrt(0.74))
+    index = 0.2 + 3.1j
+    there, back = (power(mirror(geometry(*pair), index)) for pair in ((wi, wo), (wo, wi)))
+    assert there == pytest.approx(back, rel=1e-12)
+    mirrored = (-wi[0], -wi[1], wi[2])
+    flat = power(mirror(geometry(wi, mirrored), index))
+    assert flat == pytest.approx(float(reflectance(np.float64(wi[2]), index)), rel=1e-12)

@@ -1,0 +1,226 @@
+"""Small files that ask for all memory, all day, or an address that does not exist.
+
+`python -m tests.support.small_scenes FOLDER NAME ...` writes and reads files in one process, and
+prints a line of JSON for each: the refusal, seconds, and the peak memory of the process so far.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import struct
+import sys
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Hostile(NamedTuple):
+    """A hostile file: how it is written into a folder, and what reads it."""
+
+    write: Callable[[Path], Path]
+    read: Callable[[Path], object]
+
+
+FILES: dict[str, Hostile] = {}
+
+
+def hostile(
+    name: str, read: Callable[[Path], object], needs: str = ""
+) -> Callable[..., Callable[[Path], None]]:
+    """Register the function that writes the file `name`, if the package that reads it is there."""
+
+    def register(write: Callable[[Path], None]) -> Callable[[Path], None]:
+        def written(folder: Path) -> Path:
+            path = folder / name
+            write(path)
+            return path
+
+        assert name not in FILES
+        if not needs or importlib.util.find_spec(needs) is not None:
+            FILES[name] = Hostile(written, read)
+        return write
+
+    return register
+
+
+# --- readers -------------------------------------------------------------------------------------
+def heights(path: Path) -> object:
+    import mitsuba_diffraction as md
+
+    return md.HeightField.load(path, pixel_size=0.05, max_height=0.3)
+
+
+def mesh(path: Path) -> object:
+    from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
+
+    return load_mesh(path)
+
+
+def scene(path: Path) -> object:
+    from mitsuba_diffraction.scene.load import load_scene
+
+    return load_scene(path, {})
+
+
+def layers(path: Path) -> object:
+    from mitsuba_diffraction.plugin.stack import read_layers
+
+    return read_layers(path)
+
+
+def solved_layers(path: Path) -> object:
+    from mitsuba_diffraction.solve.films import read_layers
+
+    return read_layers(path)
+
+
+def efficiencies(path: Path) -> object:
+    from mitsuba_diffraction.solve.efficiencies import read_efficiencies
+
+    return read_efficiencies(path)
+
+
+def orders(path: Path) -> object:
+    from mitsuba_diffraction.tables.orders import load_any_orders
+
+    return load_any_orders(path)
+
+
+def pigment(path: Path) -> object:
+    from mitsuba_diffraction.plugin.pigment import pigment_bsdf
+
+    return pigment_bsdf(str(path))
+
+
+def logo(path: Path) -> object:
+    from mitsuba_diffraction.scene.logo import areas
+
+    return areas(path)
+
+
+def table(path: Path) -> object:
+    import mitsuba_diffraction as md
+
+    return md.DiffractionTable.load(path)
+
+
+def zeros(count: int) -> bytes:
+    """Return `count` zeros, deflated: a block of 16 MiB and what repeats it."""
+    block, end = (zlib.compressobj(9, wbits=-15) for _ in range(2))
+    whole, rest = divmod(count, 1 << 24)
+    packed = block.compress(bytes(1 << 24)) + block.flush(zlib.Z_FULL_FLUSH)
+    return packed * whole + end.compress(bytes(rest)) + end.flush()
+
+
+def png(width: int, height: int, bits: int = 8, channels: int = 1) -> bytes:
+    """Return a PNG of zeros, whose checksum is wrong: nobody may come so far."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        checksum = struct.pack(">I", zlib.crc32(kind + data))
+        return struct.pack(">I", len(data)) + kind + data + checksum
+
+    data = b"\x78\x9c" + zeros(height * (1 + (width * bits * channels + 7) // 8)) + bytes(4)
+    head = struct.pack(">IIBBBBB", width, height, bits, {1: 0, 3: 2, 4: 6}[channels], 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+# --- heights -------------------------------------------------------------------------------------
+def archive(*members: tuple[str, int, int]) -> bytes:
+    """Return a ZIP archive of members of zeros: name, bytes, and bytes that the directory states.
+
+    Written by hand, since deflating gigabytes takes minutes.
+    """
+    content = directory = b""
+    for name, size, stated in members:
+        data = zeros(size)
+        head = struct.pack("<5H3I2H", 20, 0, 8, 0, 0x21, 0, len(data), stated, len(name), 0)
+        rest = struct.pack("<3H2I", 0, 0, 0, 0, len(content))
+        directory += b"PK\x01\x02" + struct.pack("<H", 20) + head + rest + name.encode()
+        content += b"PK\x03\x04" + head + name.encode() + data
+    count = len(members)
+    end = struct.pack("<4H2IH", 0, 0, count, count, len(directory), len(content), 0)
+    return content + directory + b"PK\x05\x06" + end
+
+
+@hostile("bomb.x3p", heights)
+def _(path: Path) -> None:
+    path.write_bytes(archive(("main.xml", 1 << 31, 1 << 31)))
+
+
+@hostile("text.x3p", heights)
+def _(path: Path) -> None:
+    path.write_bytes(archive(("main.xml", 1 << 28, 1 << 28)))
+
+
+@hostile("lying.x3p", heights, "SurfaceTopography")
+def _(path: Path) -> None:
+    path.write_bytes(archive(("main.xml", 1 << 31, 10)))
+
+
+@hostile("bomb.plux", heights)
+def _(path: Path) -> None:
+    path.write_bytes(archive(("index.xml", 1 << 24, 1 << 24), ("LAYER_0.raw", 1 << 31, 1 << 31)))
+
+
+@hostile("nmm.zip", heights)
+def _(path: Path) -> None:
+    path.write_bytes(archive(("s.dsc", 1 << 20, 1 << 20), ("s_1_1.dat", 1 << 31, 1 << 31)))
+
+
+@hostile("zeros.npz", heights)
+def _(path: Path) -> None:
+    path.write_bytes(archive(("a.npy", 1 << 31, 1 << 31)))
+
+
+@hostile("zeros.png", heights)
+def _(path: Path) -> None:
+    path.write_bytes(png(12_000, 12_000))
+
+
+@hostile("long_line.csv", heights)
+def _(path: Path) -> None:
+    path.write_text("1," * 2_500_000)
+
+
+@hostile("long_cell.csv", heights)
+def _(path: Path) -> None:
+    path.write_text("1" * 5_000_000)
+
+
+@hostile("layers.toml", layers)
+def _(path: Path) -> None:
+    path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
+
+
+@hostile("solved_layers.toml", solved_layers)
+def _(path: Path) -> None:
+    path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
+
+
+def run(names: list[str], folder: Path) -> None:
+    """Write and read files; print what is said of each."""
+    import resource
+
+    from mitsuba_diffraction.errors import DiffractionError
+    from mitsuba_diffraction.scene.load import set_variant
+
+    set_variant("scalar_rgb")
+    for name in names:
+        path = FILES[name].write(folder)
+        print(name, file=sys.stderr, flush=True)
+        start, refusal = time.monotonic(), None
+        try:
+            FILES[name].read(path)
+        except DiffractionError as error:
+            refusal = str(error)
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        print(
+            json.dumps({
+                "name": name, "seconds": time.monotonic() - start, "peak": peak * 1024,
+                "refusal": refusal, "size": path.stat().st_size,
+            }),
+            flush=True,
+        )  # fmt: skip
