@@ -44,7 +44,8 @@ def central_part(
     """
     (ny, nx), (dx, dy) = values.shape, pixel_size
     whole = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
-    kept = round(size[0] / dx), round(size[1] / dy)
+    # at most one too many: the quotient may be infinite
+    kept = round(min(size[0] / dx, nx + 1)), round(min(size[1] / dy, ny + 1))
     for count, most in zip(kept[::-1], (ny, nx), strict=True):
         if not 2 <= count <= most:
             raise DiffractionError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...extras import optional
-from ...limits import bounded_memory, check_archive, check_content
+from ...files import beginning
+from ...limits import bounded_lines, bounded_memory, check_archive, check_content
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
@@ -47,6 +49,9 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     """
     shown, size = repr(str(path)), path.stat().st_size
     check_archive(path, shown)
+    if b"\0" not in beginning(path, 1 << 16):  # text: some readers take n² steps for long lines
+        with path.open(encoding="latin-1") as stream:
+            deque(bounded_lines(stream, shown), maxlen=0)
     with warnings.catch_warnings(), bounded_memory(size, shown):
         # Readers warn of unknown fields and missing optional packages; units and sizes are checked
         # below.
