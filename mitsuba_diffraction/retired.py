@@ -1,4 +1,4 @@
-"""Parameters of earlier versions: what names one goes on without it, with one line."""
+"""Retired parameters and retired values: they are ignored, with one line."""
 
 from __future__ import annotations
 
@@ -13,6 +13,20 @@ REPLACED = {
     "diffuse_weight": "a nested BSDF gets the light that is not reflected, T(ωi) T(ωo)",
     "accept": "a table that misses its tolerance is written, with its measured error",
 }
+#: Replacements of a parameter's values.
+REPLACED_VALUES = {
+    ("periodic", value): "a scan is seen through windows, which need no treatment of its edges; "
+    "periodic=exact states that it is whole periods of a surface"
+    for value in ("trend", "smooth", "taper", "none")
+}
+
+
+def retired_value(name: str, value: object) -> bool:
+    """Return whether a parameter's value is retired, after a warning about it."""
+    replacement = REPLACED_VALUES.get((name, value)) if isinstance(value, str) else None
+    if replacement is not None:
+        warn(f"{name}={value} is no longer a treatment, and is ignored: {replacement}")
+    return replacement is not None
 
 
 def retired(names: Iterable[str], where: str = "") -> list[str]:

@@ -109,10 +109,12 @@ def _window_width(value: Any) -> float | None:
     return None if value is None else _between(0.0, MAX_COHERENCE_WIDTH)(value)
 
 
-def _windows(value: Any) -> str | float | None:
-    if value is None or value == "none":
-        return None
-    return "auto" if value == "auto" else _between(0.0, math.inf)(value)
+def _taper_width(value: Any) -> float | None:
+    return None if value is None else _between(0.0, math.inf)(value)
+
+
+def _windows(value: Any) -> str | float:
+    return "auto" if value in (None, "auto") else _between(0.0, math.inf)(value)
 
 
 def _choices(*names: str) -> dict[str, Any]:
@@ -140,10 +142,13 @@ class TableSettings:
     height_scale_max : largest factor on the heights that the table serves.
     frequency_limit : half axes along x and y, in rad/µm, of the ellipse of spatial frequencies
         k·(u, v) that are tabulated: the table is dark beyond. None for all that light can probe.
-    windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
-        averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
+    windows : width in µm of the tapered windows that a scan is seen through, whose powers are
+        averaged (`tables.build.windows`); "auto" as `heights.coherence.usual_window` has it.
     window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
         (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
+    taper_width : 4σ of the taper of a scan's phase screen, µm; None for a patch that tiles the
+        plane. The look-up's window is as much wider than `window_width`, so that an order has the
+        lobe of that window. Tables have it; users do not give it.
     """
 
     coherence_width: str | float = _setting(
@@ -180,14 +185,18 @@ class TableSettings:
     frequency_limit: tuple[float, float] | None = _setting(
         None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
     )
-    windows: str | float | None = _setting(
-        None, _windows, "µm, average over overlapping windows of a scan much wider than "
-        "coherence_width; auto is twice that", "auto, none, or a positive number of µm",
-        metavar="auto|W", text="the scan as a whole", type=str,
+    windows: str | float = _setting(
+        "auto", _windows, "µm, width of the windows of a scan, whose powers are averaged; auto: "
+        "the scan's smaller side up to 32 µm, or half the side", "auto, or a positive number of µm",
+        metavar="auto|W", type=str,
     )  # fmt: skip
     window_width: float | None = _setting(
         None, _window_width, "µm, 4σ of the window of all orders but 0",
         "a positive number of µm, at most coherence_width", metavar="W", type=float,
+    )  # fmt: skip
+    taper_width: float | None = _setting(
+        None, _taper_width, "µm, 4σ of the taper of a scan's phase screen",
+        "a positive number of µm, above window_width", metavar="W", type=float,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -205,6 +214,13 @@ class TableSettings:
     def width(self) -> float:
         """Width of the window of all orders but 0, µm, as `heights.coherence.resolved` left it."""
         return self.light_width if self.window_width is None else self.window_width
+
+    @property
+    def lookup_width(self) -> float:
+        """4σ of the window by which orders are looked up, µm: `width` with the taper taken out."""
+        if self.taper_width is None:
+            return self.width
+        return (self.width**-2 - self.taper_width**-2) ** -0.5
 
     @property
     def coherent(self) -> bool:

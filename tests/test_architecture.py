@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from functools import cache
 
 import pytest
@@ -58,3 +59,12 @@ def test_files_exist():
     folders = (ROOT, PACKAGE)
     for name in re.findall(r"`([\w/.]+\.(?:py|md))`", PAGE):
         assert any((folder / name).exists() for folder in folders), name
+
+
+def test_a_class_name_has_one_meaning():
+    found = Counter(
+        name
+        for file in PACKAGE.rglob("*.py")
+        for name in re.findall(r"^class ([A-Z]\w*)", file.read_text("utf-8"), re.M)
+    )
+    assert [name for name, count in found.items() if count > 1] == []

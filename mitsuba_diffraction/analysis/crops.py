@@ -33,7 +33,7 @@ def crops_of(
     side : of square crops, µm, of which as many as fit are returned, spread over the scan; whole
         scans that are narrower. Without, `count` crops share the scan.
     """
-    raw = options.updated(LoadOptions.parse(level="none", periodic="none"))
+    raw = options.updated(LoadOptions.parse(level="none"))
     source = Source.of(path, raw)
     if source.recipe is not None:
         raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")

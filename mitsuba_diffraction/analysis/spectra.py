@@ -65,7 +65,6 @@ class Spectra:
     value : (n, detectors), for unpolarised light; 1 is all of what `relative` names.
     s, p : the same for light polarised across and in the plane of incidence, or None.
     error : standard errors of `value` where it is a mean over several surfaces, or None.
-    band : least and largest values over treatments of the heights, or None.
     angular : `angular_variables` of each surface, or empty.
     geometry : angles.
     relative : one of `RELATIVE`.
@@ -78,7 +77,6 @@ class Spectra:
     s: Reals | None = None
     p: Reals | None = None
     error: Reals | None = None
-    band: tuple[Reals, Reals] | None = None
     angular: tuple[dict[str, float], ...] = ()
 
     def names(self, group: str = "") -> list[str]:

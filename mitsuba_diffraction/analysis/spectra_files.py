@@ -52,9 +52,8 @@ def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, 
     def cut(each: Spectra) -> Spectra:
         kept = np.isin(each.wavelength, common)
         s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
-        band = each.band and (each.band[0][kept], each.band[1][kept])
         value = each.value[kept]
-        return replace(each, wavelength=common, value=value, s=s, p=p, error=error, band=band)
+        return replace(each, wavelength=common, value=value, s=s, p=p, error=error)
 
     return {name: [cut(each) for each in members] for name, members in groups.items()}
 
@@ -139,7 +138,7 @@ def colour_of(spectra: Spectra) -> Reals:
 
 
 def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "") -> Figure:
-    """Draw spectra over wavelength, with bands of one standard error or of treatments.
+    """Draw spectra over wavelength, with bands of one standard error.
 
     Each curve has its own colour; of several groups, each group one. From `MAPPED` detectors on a
     map of angle and wavelength stands beside.
@@ -189,25 +188,14 @@ def _draw(axes: Axes, name: str, spectra: Spectra, colour: Any, first: Spectra) 
         drawn = colours[n] if colour is None else colour
         label = f"{name}, {angle:g}°" if name else f"detector at {angle:g}°"
         axes.plot(lam, values, style, color=drawn, label=label)
-        bands = []
         if spectra.error is not None:
             error = 100.0 * spectra.error[:, n]
-            bands.append((values - error, values + error))
-        if spectra.band is not None:
-            bands.append((100.0 * spectra.band[0][:, n], 100.0 * spectra.band[1][:, n]))
-        for low, high in bands:
-            axes.fill_between(lam, low, high, color=drawn, alpha=0.2, lw=0)
+            axes.fill_between(lam, values - error, values + error, color=drawn, alpha=0.2, lw=0)
 
 
 def _scale(axes: Axes, *spectra: Spectra) -> None:
     """Set the limits of per cent: linear from 0, or logarithmic where curves are far apart."""
-    value = np.concatenate(
-        [
-            each.value if each.band is None else np.maximum(each.value, each.band[1])
-            for each in spectra
-        ],
-        axis=1,
-    )
+    value = np.concatenate([each.value for each in spectra], axis=1)
     highest = 100.0 * np.maximum(value.max(axis=0), 0.0)
     if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
         axes.set_yscale("log")

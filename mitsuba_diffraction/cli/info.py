@@ -130,12 +130,12 @@ def _draw(args: argparse.Namespace) -> None:
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
-    from ..heights.treatment import jumping_lines, treatment_warning
+    from ..heights.validity import jumping_lines
 
     field = source.field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
-    suggested = (treatment_warning(args.file, source.options, field), jumping_lines(field))
+    suggested = (jumping_lines(field),)
     return {
         "kind": "height field",
         **field.summary(),

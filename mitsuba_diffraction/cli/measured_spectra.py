@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from ..tables.orders import OrderTable
     from ..tables.source import TableSource
 
-# Treatments of edges between which a band is drawn.
-_TREATMENTS = ("smooth", "taper", "none")
-
 
 @dataclass
 class Measurement:
@@ -61,7 +58,7 @@ class Measurement:
             crops = crops_of(file, how, self.args.crops)
             return [self._of_heights(TableSource.of(crop), file, how) for crop in crops]
         source = source.read()
-        return [self._with_band(self._of_heights(source, file, how), source, file, how)]
+        return [self._of_heights(source, file, how)]
 
     def say_notes(self) -> None:
         """Print the number of scans with notes, beside the notes of the first scan."""
@@ -75,23 +72,6 @@ class Measurement:
 
         found = treatment_for(file, load_treatments(self.args.treatments))
         return found.updated(Treatment(options.load_options(self.args)))
-
-    def _with_band(self, spectra: Spectra, source: TableSource, file: Path, how: Any) -> Spectra:
-        """Add the band over treatments where treatment removed as much as it kept, and warn."""
-        import numpy as np
-
-        from ..heights.treatment import treatment_warning
-
-        patches = source.fields()
-        line = treatment_warning(file, how, patches[0]) if len(patches) == 1 else ""
-        if not line:
-            return spectra
-        say(f"{line}; the band is over periodic={', '.join(_TREATMENTS)}")
-        values = [spectra.value]
-        for name in _TREATMENTS:
-            treated = type(source).of(file, replace(how, periodic=name)).read()
-            values.append(self._of_heights(treated, file, how, quiet=True).value)
-        return replace(spectra, band=(np.min(values, axis=0), np.max(values, axis=0)))
 
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
@@ -115,9 +95,7 @@ class Measurement:
             lam = lam[lam >= table.wavelength_range[0]]
         return self._spectrum(table, self.geometry, lam, angular=args.iridescence)
 
-    def _of_heights(
-        self, source: TableSource, file: Path, how: Any, *, quiet: bool = False
-    ) -> Spectra:
+    def _of_heights(self, source: TableSource, file: Path, how: Any) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
         from ..analysis.media import in_medium, medium_index
         from ..analysis.scans import table_of
@@ -134,17 +112,16 @@ class Measurement:
         within = in_medium(source, args.ext_ior, first)
         table = table_of(within, settings, self.bar)
         line = notes_line(within.warnings(settings), file, how, TableSettings(**asked))
-        if line and not quiet and args.crops is None:
+        if line and args.crops is None:
             self._say_first(line)
         if table.settings.window_width is not None:
             self._say_once(blur(table.window_width, medium_index(args.ext_ior, first)))
         if args.light_azimuth == "auto":
             gratings = dominant_periods(source.fields()[0])
             geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)
-            if not quiet:
-                found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
-                say(f"{file.name}: azimuth {found}")
-        return self._spectrum(table, geometry, self.lam, angular=args.iridescence and not quiet)
+            found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
+            say(f"{file.name}: azimuth {found}")
+        return self._spectrum(table, geometry, self.lam, angular=args.iridescence)
 
     def _spectrum(
         self, table: Any, geometry: MeasurementGeometry, lam: Any, *, angular: bool

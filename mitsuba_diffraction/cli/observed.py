@@ -44,9 +44,9 @@ def run_observed(args: argparse.Namespace) -> Figures:
     variant = set_variant(args.mode)
     if "_spectral" not in variant:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
-    from ..scene.bands import Bands
+    from ..scene.bands import SensorBands
 
-    bands = Bands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
+    bands = SensorBands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
     with mitsuba_warnings():
         result = scene_options.rendered(
             args,

@@ -71,8 +71,6 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
         output = Path(f"{source.files[0].stem}.exr") if recipe is None else recipe.output
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
-    if (args.workers or args.scheduler) and settings.windows is None:
-        args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
     check_outputs([output], make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
@@ -101,7 +99,7 @@ def _built(
     """Build the table; also return what workers did for it, where they build windows."""
     from ..tables.build.build import build_with
 
-    if settings.windows is None or not on_workers(args):
+    if not on_workers(args):
         return build_with(fields, settings, bar), {}
     from ..cluster.jobs import build_on_workers
 
@@ -128,15 +126,18 @@ def _report(
     if "windows" in table.source:
         windows = table.source["windows"]
         width, height = windows["extent"]
-        error = windows["standard_error"]
-        yield (
-            "",
-            (
-                f"mean of {windows['number']} windows of {width:.4g} x {height:.4g} µm; its "
-                f"standard error is {error['glossy']:.2g} of the light near order 0, and "
-                f"{error['colours']:.2g} of that of all other orders"
-            ),
-        )
+        if windows["number"] == 1:
+            yield "", f"one window of {width:.4g} x {height:.4g} µm, which fades towards its edges"
+        else:
+            error = windows["standard_error"]
+            yield (
+                "",
+                (
+                    f"mean of {windows['number']} windows of {width:.4g} x {height:.4g} µm; its "
+                    f"standard error is {error['glossy']:.2g} of the light near order 0, and "
+                    f"{error['colours']:.2g} of that of all other orders"
+                ),
+            )
     if "variation" in table.source:
         yield "", f"orders vary by {table.source['variation']:.2g} of their mean between patches"
     intervals, ny, nx, _, terms = table.coefficients.shape

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import functools
 import itertools
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import DiffractionError
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -176,7 +176,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     from ..solve.accuracy import WORST
     from ..solve.beam import solve_beam
     from ..solve.block import solve_block
-    from ..solve.jobs import Jobs
+    from ..solve.jobs import Jobs, remove_results
     from ..solve.orders import solve_orders
 
     medium: dict[str, Any] = {
@@ -218,7 +218,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             jobs=Jobs(folder, executor, bar),
             announce=announce,
         )
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_results(folder)
     return table
 
 
@@ -285,7 +285,10 @@ def _layer(text: str) -> Layers:
     if text.endswith(".toml"):
         from ..solve.films import read_layers
 
-        return read_layers(text)
+        try:
+            return read_layers(text)
+        except DiffractionError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
     material, _, thickness = text.rpartition(":")
     try:
         return ((material, float(thickness)),)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,13 +25,14 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
     """Solve a crossed grating."""
     from ..heights.read import LoadOptions, read_heights
     from ..solve.crossed import solve_crossed
+    from ..solve.jobs import remove_results
 
     options.refuse(args, _GROOVES_ONLY, ": not allowed with --crossed")
     if args.period is None:
         args.parser.error("argument --crossed: needs --period, µm")
     cell = read_heights(
         source,
-        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="none"),
+        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="exact"),
     )
     rows, columns = cell.heights.shape
     sizes = args.period / columns, (args.period_y or args.period) / rows
@@ -55,5 +55,5 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
             folder=folder,
             progress=bar,
         )
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_results(folder)
     return table

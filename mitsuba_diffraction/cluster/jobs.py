@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..heights.coherence import resolved
 from ..heights.field import HeightField
 from ..progress import Progress
 from ..settings import TableSettings
@@ -37,16 +38,15 @@ def build(
     adds up in the order of the windows: the table equals `DiffractionTable.build`, to the last
     bit, on such a processor, with any number of workers.
 
-    Raises a DiffractionError if there are no `windows`, a worker is of no use, or the table cannot
-    be built.
+    Raises a DiffractionError if the heights tile the plane, without windows, a worker is of no use,
+    or the table cannot be built.
 
     Parameters
     ----------
     heights : one scan or several.
     client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
     progress : called as progress(done, total, text).
-    settings : of `DiffractionTable.build`, `windows` among them. A scan not wider than a
-        window is built here.
+    settings : of `DiffractionTable.build`.
     """
     return build_on_workers(heights, TableSettings(**settings), client, progress)[0]
 
@@ -58,9 +58,11 @@ def build_on_workers(
     progress: Progress | None = None,
 ) -> tuple[DiffractionTable, OrderedMap]:
     """Build as `build`, and return the table with the map that knows its cost."""
-    if settings.windows is None:
+    scans = [heights] if isinstance(heights, HeightField) else list(heights)
+    if resolved(settings, scans).taper_width is None:
         raise DiffractionError(
-            "workers build tables of windows: set windows=auto, or do without workers"
+            "workers build tables of windows: give a scan (periodic=open), or windows=W, or do "
+            "without workers"
         )
     check_workers(client, None)
     run = OrderedMap(client)

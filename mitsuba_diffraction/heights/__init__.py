@@ -8,10 +8,9 @@ load         a `HeightField` from any file
 read         `LoadOptions`; choice of reader, units and treatments
 formats      readers, by kind of file
 recipes      TOML files that name the source of heights and the settings of their table
-preprocess   treatments of heights: crop, fill, level, clip, make periodic
-treatment    errors that treatment brings, and treatments that heights suggest
-seams        steps of height where the edges of tiled patches meet
+preprocess   treatments of heights: crop, fill, level, clip
 gratings     height fields computed from formulas
+damage       aborted and repeated lines, and the bow of a scanner
 validity     warnings where a patch leaves the model or its own resolution
 spectra      spectrum of heights, and powers of their orders
 coherence    coherence width that a patch allows

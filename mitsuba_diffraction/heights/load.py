@@ -63,10 +63,10 @@ def load(
     clip
         Clip heights to this many robust standard deviations; default not at all.
     periodic
-        "trend", "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the
-        patch is whole periods of a surface that repeats; "none". By default "trend" where seams of
-        waves longer than the patch show (`validity.seam_defects`). The treatments are applied in
-        the order crop, fill, level, clip, periodic, and each leaves a line in `history`.
+        "exact" states that the patch is whole periods of a surface that repeats, "open" that it is
+        a part of a larger surface, which is seen through windows (`tables.build.windows`). Files
+        are open, unless they say otherwise. The treatments are applied in the order crop, fill,
+        level, clip, and each leaves a line in `history`.
     """
     options = LoadOptions.parse(
         pixel_size=pixel_size, max_height=max_height, height_unit=height_unit, channel=channel,

@@ -1,20 +1,13 @@
-"""Treatments of heights before their table is built: crop, fill, level, clip, make periodic.
+"""Treatments of heights before their table is built: crop, fill, level, clip.
 
 Each treatment but filling returns a new `HeightField`, whose `history` has one more line that says
 what changed.
-
-References
-----------
-L. Moisan, Periodic plus smooth image decomposition, Journal of Mathematical Imaging and Vision 39,
-161-179 (2011).
-F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform,
-Proceedings of the IEEE 66, 51-83 (1978): the Tukey (cosine-tapered) window.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +15,6 @@ import scipy
 
 from ..errors import DiffractionError
 from .field import FloatArray, HeightField, blocks
-from .seams import seam_share, seam_step
 
 Size = tuple[float, float]
 
@@ -34,8 +26,6 @@ LARGEST_SHARE = 0.5
 # Makes the median absolute deviation of normally distributed heights their standard deviation:
 # 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
 _MAD_TO_SIGMA = 1.4826
-# Width of the taper on each side, as a share of the patch: Tukey's α is twice this.
-TAPER_SHARE = 0.1
 
 
 def central_part(
@@ -54,7 +44,8 @@ def central_part(
     """
     (ny, nx), (dx, dy) = values.shape, pixel_size
     whole = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
-    kept = round(size[0] / dx), round(size[1] / dy)
+    # at most one too many: the quotient may be infinite
+    kept = round(min(size[0] / dx, nx + 1)), round(min(size[1] / dy, ny + 1))
     for count, most in zip(kept[::-1], (ny, nx), strict=True):
         if not 2 <= count <= most:
             raise DiffractionError(
@@ -185,6 +176,22 @@ def level_plane(field: HeightField) -> HeightField:
     return field.changed(heights, line)
 
 
+def level_quadratic(field: HeightField) -> HeightField:
+    """Subtract the least-squares polynomial of degree 2, a scanner's arc; the mean height stays."""
+    bases = []
+    for count in field.shape:
+        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(2, count - 1))
+        bases.append(np.linalg.qr(powers)[0])  # orthonormal on the pixels
+    along_y, along_x = bases
+    weights = along_y.T @ field.heights @ along_x
+    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 2] = 0.0
+    weights[0, 0] = 0.0
+    arc = along_y @ weights @ along_x.T
+    heights = field.heights - arc
+    line = f"paraboloid removed: it spanned {np.ptp(arc):.3g} µm{rms_change(field, heights)}"
+    return field.changed(heights, line)
+
+
 def level_lines(field: HeightField) -> HeightField:
     """Subtract the median of each row (scan lines run along x), then the remaining plane.
 
@@ -259,106 +266,7 @@ def _centred(field: HeightField) -> tuple[FloatArray, ...]:
     )
 
 
-def periodic_smooth(field: HeightField) -> HeightField:
-    """Keep the periodic component of the heights and drop the smooth one (Moisan 2011).
-
-    The smooth component s has the steps at the seams and is otherwise as smooth as possible: its
-    periodic Laplacian is v, the steps placed on the border pixels (Moisan's equation 11), so
-    ŝ = v̂ / (Laplacian's eigenvalues), with mean 0. Differences along x and y are weighted by
-    1/dx² and 1/dy², so that pixels need not be square.
-    """
-    h = field.heights - _smooth_component(field.heights, field.pixel_size)
-    return _reported(field, h, "made periodic by dropping its smooth component")
-
-
-def periodic_trend(field: HeightField) -> HeightField:
-    """Drop the smooth component (Moisan 2011) of the cubic trend alone.
-
-    Waves longer than the patch then meet at the seams. Structure within the patch stays: the smooth
-    component of ridges that the edge cuts is a ramp across the patch, and would tilt them.
-    """
-    trend = trend_of(field)
-    smooth = _smooth_component(trend.along_y @ trend.weights @ trend.along_x.T, field.pixel_size)
-    what = "made periodic by dropping the smooth component of its cubic trend"
-    return _reported(field, field.heights - smooth, what)
-
-
-class Trend(NamedTuple):
-    """Cubic trend of a patch: along_y @ weights @ along_x.T in µm, with orthonormal polynomials."""
-
-    along_y: FloatArray  # (ny, 4), or fewer of fewer samples
-    weights: FloatArray  # (4, 4)
-    along_x: FloatArray  # (nx, 4)
-
-    def steps(self) -> tuple[FloatArray, FloatArray]:
-        """Return last minus first column (ny,) and last minus first row (nx,), µm."""
-        across = self.along_y @ (self.weights @ (self.along_x[-1] - self.along_x[0]))
-        return across, (self.along_y[-1] - self.along_y[0]) @ self.weights @ self.along_x.T
-
-
-def trend_of(field: HeightField) -> Trend:
-    """Return the least-squares polynomial of x and y of degree 3."""
-    bases = []
-    for count in field.shape:
-        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(3, count - 1))
-        bases.append(np.linalg.qr(powers)[0])
-    along_y, along_x = bases
-    weights = along_y.T @ field.heights @ along_x
-    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 3] = 0.0
-    return Trend(along_y, weights, along_x)
-
-
-def _smooth_component(h: FloatArray, pixel_size: tuple[float, float]) -> FloatArray:
-    """Return Moisan's smooth component of heights, µm; see `periodic_smooth`."""
-    ny, nx = h.shape
-    dx, dy = pixel_size
-    wx, wy = dy / dx, dx / dy  # only their ratio matters
-    v = np.zeros_like(h)
-    step_y = wy * (h[-1] - h[0])
-    v[0] += step_y
-    v[-1] -= step_y
-    step_x = wx * (h[:, -1] - h[:, 0])
-    v[:, 0] += step_x
-    v[:, -1] -= step_x
-    along_y = 2 * np.cos(2 * np.pi * np.fft.fftfreq(ny)) - 2
-    along_x = 2 * np.cos(2 * np.pi * np.fft.rfftfreq(nx)) - 2
-    eigenvalues = wy * along_y[:, None] + wx * along_x
-    eigenvalues[0, 0] = 1  # v has mean 0
-    spectrum = np.fft.rfft2(v) / eigenvalues
-    spectrum[0, 0] = 0
-    return np.fft.irfft2(spectrum, s=(ny, nx))
-
-
-def periodic_taper(field: HeightField) -> HeightField:
-    """Blend the heights into their mean along the borders with a Tukey window.
-
-    The window spans a tenth of the patch on each side; the patch is flat there and reflects more
-    like a mirror.
-    """
-
-    mean = field.heights.mean()
-    # every other sample of a window of 2n + 1: taken at the pixels' centres, near 0 at both ends
-    rows, columns = (
-        scipy.signal.windows.tukey(2 * n + 1, 2 * TAPER_SHARE)[1::2] for n in field.shape
-    )
-    window = rows[:, None] * columns
-    heights = mean + (field.heights - mean) * window
-    return _reported(
-        field, heights, f"tapered to its mean height over {TAPER_SHARE:.0%} along each border"
-    )
-
-
 def periodic_exact(field: HeightField) -> HeightField:
     """Mark the patch as whole periods of a surface; heights stay as they are."""
     line = "taken for whole periods of a surface that repeats exactly"
     return field.changed(field.heights, line, cut_out=False, periodic=True)
-
-
-def _reported(field: HeightField, heights: FloatArray, what: str) -> HeightField:
-    """Return the patch with periodic heights; its history line has the steps before and after."""
-    after = HeightField(heights, field.pixel_size)
-    line = (
-        f"{what}: RMS step at the seams {seam_step(field):.3g} -> {seam_step(after):.3g} µm, "
-        f"{seam_share(field):.2g} -> {seam_share(after):.2g} of the mean-square slope"
-    )
-    return field.changed(after.heights, line + rms_change(field, heights))

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..files import FileKind, kind_of, readable_file
+from ..retired import retired_value
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
@@ -32,15 +33,16 @@ from .lengths import (
     numbers_of,
     pixel_size_of,
 )
-from .validity import seam_defects, tilted
+from .validity import tilted
 
-LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
-PERIODICS = {
-    "trend": preprocess.periodic_trend,
-    "smooth": preprocess.periodic_smooth,
-    "taper": preprocess.periodic_taper,
-    "exact": preprocess.periodic_exact,
+LEVELS = {
+    "plane": preprocess.level_plane,
+    "quadratic": preprocess.level_quadratic,
+    "lines": preprocess.level_lines,
 }
+#: Statements about the edges of a patch: whole periods of a surface that repeats, or a part of a
+#: larger surface.
+PERIODICS = ("exact", "open")
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,13 @@ def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
     return value
 
 
+def _periodic(value: object) -> str | None:
+    """Check the statement about the edges; values of earlier versions state nothing."""
+    if retired_value("periodic", value):
+        return None
+    return _choice(value, "periodic", PERIODICS)
+
+
 def _sigmas(value: object) -> float | None:
     """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
     if value is None or (isinstance(value, str) and value.strip() == "none"):
@@ -114,7 +123,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "fill": partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
     "level": partial(_choice, name="level", choices=("none", *LEVELS)),
     "clip": _sigmas,
-    "periodic": partial(_choice, name="periodic", choices=("none", *PERIODICS)),
+    "periodic": _periodic,
 }
 
 _READERS = {FileKind.IMAGE: read_image, FileKind.NPY: read_npy, FileKind.TEXT: read_text}
@@ -144,7 +153,7 @@ def read_heights(
 def treated_by_default(
     field: HeightField, options: LoadOptions, measured: bool = False
 ) -> HeightField:
-    """Treat a patch; level it and make it periodic by default where tilt or seams would diffract.
+    """Treat a patch; level it by default where a tilt would turn its mirror direction.
 
     measured : whether an instrument wrote the file; a line then says that it is not levelled.
     """
@@ -155,10 +164,7 @@ def treated_by_default(
         rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
-    field = treat(field, replace(options, periodic=None))
-    if options.periodic is None and small and seam_defects(field)[1] is not None:
-        return _by_default(PERIODICS["trend"](field), "periodic")
-    return treat(field, LoadOptions(periodic=options.periodic))
+    return treat(field, options)
 
 
 def _by_default(field: HeightField, option: str) -> HeightField:
@@ -290,13 +296,16 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
 
 
 def treat(field: HeightField, options: LoadOptions) -> HeightField:
-    """Crop, level, clip and make periodic, in this order: clipping needs a level surface."""
+    """Crop, level and clip, in this order: clipping needs a level surface."""
     if options.crop is not None:
         field = preprocess.crop(field, options.crop)
     if options.level not in (None, "none"):
         field = LEVELS[options.level](field)
     if options.clip is not None:
         field = preprocess.clip_outliers(field, options.clip)
-    if options.periodic not in (None, "none"):
-        field = PERIODICS[options.periodic](field)
+    if options.periodic == "exact":
+        field = preprocess.periodic_exact(field)
+    if options.periodic == "open":
+        line = "taken for a part of a larger surface"
+        field = field.changed(field.heights, line, cut_out=True, periodic=False)
     return field

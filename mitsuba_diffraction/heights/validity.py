@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .field import HeightField
-from .preprocess import level_plane, plane_of, plane_rise, trend_of
-from .seams import Seam, edge_steps, seams_of
+from .damage import damage
+from .field import HeightField, blocks
+from .preprocess import level_plane, plane_of, plane_rise
 from .spectra import seen_slope
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
@@ -35,15 +35,18 @@ COARSEST_PIXEL = 2.0
 QUARTER_WAVE = 8.0
 #: A plane that rises by less than this part of the RMS height occurs by chance in rough patches.
 CHANCE = 0.5
+#: A plane occurs by chance in few pixels, too: in white noise of N it rises by √(12/N) of the RMS
+#: height, one standard deviation. A tilt rises by so many.
+SURE = 4.0
+#: A plane that rises by at most the largest mean step between neighbouring lines, over this, is
+#: that of a facet or of a groove: one period of a blazed or lamellar grating rises by 1.5 steps.
+STEP = 0.6
 #: Levelling a ramp stored in 8-bit grey leaves 0.4 % of its RMS height. A patch of which less than
 #: this is left is one facet, a whole period of a blazed grating: its seams are the grating's steps.
 FACET = 0.01
-#: Share of the mean-square slope from which on seams are reported. For gentle heights it is the
-#: seams' share of the light outside the mirror direction, weighted with the angle's squared sine.
-SEAM_SHARE = 0.1
-#: Share of a seam's mean-square step that may remain without the cubic trend: with more, structure
-#: that the edge cuts makes most of the step, not waves longer than the patch.
-TREND_SHARE = 0.5
+#: Ratio of the steps between medians of neighbouring rows to those of columns, from which on scan
+#: lines jump. Isotropic surfaces stay within 1.5; ridges along x have correlated rows.
+JUMPS = 3.0
 
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
@@ -94,94 +97,59 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
             f"{field.range:.2g} µm, less than an atom"
         )
     if field.cut_out:
-        lines += edge_lines(field, shortest)
-    return lines
-
-
-def edge_lines(field: HeightField, shortest: float) -> list[str]:
-    """Return warnings of a patch whose opposite edges need not meet: of its tilt and its seams.
-
-    Parameters
-    ----------
-    field : the patch.
-    shortest : shortest wavelength, µm.
-
-    Returns
-    -------
-    list of str
-        At most one line on the tilt and one on the seams.
-    """
-    lines = []
-    without_tilt, levelled = field, ""
-    if tilted(field, shortest):
-        slope_x, slope_y = plane_of(field)
-        turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
-        lines.append(
-            f"{field.name}: use level=plane: the patch is not levelled; its best "
-            f"plane rises {plane_rise(field):.3g} µm across it and turns the mirror direction by "
-            f"{turn:.2g}°"
-        )
-        without_tilt, levelled = level_plane(field), " even after levelling"
-    share, worst = seam_defects(without_tilt)
-    if worst is not None:
-        largest = worst.largest_inside
-        compared = (
-            f"{worst.step / largest:.2g} times the largest step between neighbours inside"
-            if largest > 0
-            else "with no step between neighbours inside"
-        )
-        lines.append(
-            f"{field.name}: use periodic=trend: the patch tiles the surface, "
-            f"and its seams, {share:.0%} of the mean-square slope, diffract like a grating; "
-            f"opposite edges differ by {worst.step:.3g} µm RMS{levelled}, {compared}"
-        )
-    return lines
-
-
-def seam_defects(field: HeightField) -> tuple[float, Seam | None]:
-    """Return the seams' share of the mean-square slope, and the worst; None where none shows.
-
-    Seams of structure that the edges cut are none: no treatment mends them, and smoothing them adds
-    more light near the mirror direction than they do.
-    """
-    if _is_facet(field):
-        return 0.0, None
-    seams = seams_of(field)
-    pairs = zip(seams, trend_of(field).steps(), edge_steps(field), strict=True)
-    defects = [
-        seam
-        for seam, trend, step in pairs
-        if seam.defect and np.mean((step - trend) ** 2) < TREND_SHARE * np.mean(step**2)
-    ]
-    slope = sum(seam.slope for seam in defects)
-    inside = sum(seam.slope_inside for seam in seams)
-    if not slope > SEAM_SHARE * (slope + inside):
-        return 0.0, None
-    return slope / (slope + inside), max(defects, key=lambda seam: seam.slope)
-
-
-def _is_facet(field: HeightField) -> bool:
-    """Return whether a patch is flat, or but for noise one facet."""
-    return field.range == 0 or level_plane(field).rms_height < FACET * field.rms_height
+        lines.append(tilt_warning(field, shortest))
+        lines += damage(field)
+    return [line for line in lines if line]
 
 
 def tilted(field: HeightField, shortest: float) -> bool:
-    """Return whether the least-squares plane is a relevant tilt along one axis at least.
+    """Return whether the least-squares plane of a scan is a tilt that turns the mirror direction.
 
-    A tilt raises one edge over the opposite one by the plane's rise. The plane that fits a few
-    periods of a grating does not: the edges meet, or differ by a step that occurs inside, too.
+    The plane of a facet is none: it rises by as much as a step inside, the facet's end.
 
     shortest : shortest wavelength, µm.
     """
-    if _is_facet(field):
+    level = level_plane(field).rms_height
+    if level < FACET * field.rms_height:
         return False
-    level = level_plane(field)
-    least = max(shortest / QUARTER_WAVE, CHANCE * level.rms_height)
-    for slope, length, seam in zip(plane_of(field), field.extent, seams_of(field), strict=True):
-        rise = slope * length
-        if abs(rise) > least and abs(seam.rise - rise) < 0.5 * abs(seam.rise) and seam.defect:
+    chance = max(CHANCE, SURE * math.sqrt(12.0 / field.heights.size))
+    least = max(shortest / QUARTER_WAVE, chance * level)
+    for axis, slope, length in zip((1, 0), plane_of(field), field.extent, strict=True):
+        lines, rise = field.heights.swapaxes(0, axis), abs(slope * length)
+        steps = (np.abs(np.diff(part, axis=0).mean(axis=1)) for part in blocks(lines, 1))
+        if rise > least and max(float(s.max(initial=0.0)) for s in steps) < STEP * rise:
             return True
     return False
+
+
+def tilt_warning(field: HeightField, shortest: float) -> str:
+    """Return a warning of a tilted scan, or ""."""
+    if not tilted(field, shortest):
+        return ""
+    turn = math.degrees(2 * math.atan(math.hypot(*plane_of(field))))
+    return (
+        f"{field.name}: use level=plane: the patch is not levelled; its best plane rises "
+        f"{plane_rise(field):.3g} µm across it and turns the mirror direction by {turn:.2g}°"
+    )
+
+
+def jumping_lines(field: HeightField) -> str:
+    """Return advice where rows of a scan jump, as lines of an AFM do, or ""."""
+    if not field.cut_out or any("scan lines aligned" in line for line in field.history):
+        return ""
+    steps = [np.diff(np.median(field.heights, axis=axis)).std() for axis in (1, 0)]
+    pixels = field.pixel_size
+    rows, columns = steps[0] / pixels[1], steps[1] / pixels[0]
+    jumps = np.diff(np.median(field.heights, axis=1))
+    # lines that jump change sign from row to row; a structure along y does not
+    random = float(np.mean(jumps[1:] * jumps[:-1])) < 0.0
+    if not (random and rows > JUMPS * max(columns, 1e-12)):
+        return ""
+    return (
+        f"{field.name}: use level=lines: scan lines jump by {1e3 * steps[0]:.2g} "
+        f"nm RMS from row to row, {rows / max(columns, 1e-12):.2g} times as steeply as columns; "
+        "that diffracts like a grating along y"
+    )
 
 
 def units_warning(field: HeightField) -> str:

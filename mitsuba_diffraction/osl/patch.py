@@ -168,6 +168,7 @@ def patch_constants(
     statistic : of the heights, see `boundary.Model`.
     """
     rows, columns = table.grid.shape
+    limit = table.settings.window_width or _UNLIMITED
     return {
         "DRAWS": DRAWS,
         "ORDERS": rows * columns,
@@ -186,7 +187,8 @@ def patch_constants(
         "DRAWS_ROWS": textures.rows,
         "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
-        "SCAN_WIDTH": table.settings.window_width or _UNLIMITED,
+        "SCAN_WIDTH": table.window_width if table.inverse_taper else limit,
+        "INVERSE_TAPER": table.inverse_taper,
         "STATISTIC_NODES": len(statistic.nodes),
         "ORDER_0_NODES": ORDER_0_NODES,
         **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},

@@ -28,17 +28,16 @@ fill : string [none]
     Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
     `harmonic` spans a membrane over the gap.
 level : string [auto]
-    `plane` subtracts the best plane; `lines` aligns the scan lines by their medians first; `none`.
-    `auto` is `plane` for a file of heights whose tilt shows where the patch is tiled, else `none`.
+    `plane` subtracts the best plane, `quadratic` the best paraboloid, as of a scanner's arc;
+    `lines` aligns the scan lines by their medians first, then the plane; `none`.
+    `auto` is `plane` for a file of heights whose tilt turns the mirror direction, else `none`.
 clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
 periodic : string [auto]
-    Treatment of opposite edges, which meet where the patch is tiled: `trend` keeps the periodic
-    component (Moisan 2011) of waves longer than the patch, `smooth` for all heights; `taper`
-    attenuates heights towards the edges; `exact` leaves heights as they are and states that the
-    patch is whole periods of a surface that repeats; `none`. `auto` is `trend` for a file of
-    heights where seams of waves longer than the patch would diffract like a grating, else `none`.
-    Treatments are applied in the order crop, fill, level, clip, periodic.
+    Statement about the edges: `exact`, the patch is whole periods of a surface that repeats, and
+    tiles the plane; `open`, it is a part of a larger surface, seen through windows that fade
+    towards its edges. `auto`: files of heights are open, generated patches tile. Treatments are
+    applied in the order crop, fill, level, clip.
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,
     in a float format such as EXR) or mesh attribute of three channels, the first two of which are
@@ -67,8 +66,8 @@ The table
 coherence_width : float or string [auto]
     Width over which light is coherent, µm, 4σ of its Gaussian amplitude window. `auto` is the width
     of the table or the recipe, else 65 (sunlight). The mirror direction (order 0) has it from any
-    scan. Other orders of a scan have a window as wide as the scan's smaller side at most: a wider
-    one would show its repetition as a grating. Patches that repeat exactly set no limit.
+    scan. Other orders of a scan have its windows' width at most. Patches that repeat exactly set no
+    limit.
 coherence : string [ensemble]
     `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
     `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the
@@ -90,9 +89,11 @@ tolerance : float [0.001]
     Largest relative error of ⟨|P|²⟩. A table that cannot meet it is refused.
 terms : integer [from tolerance]
     Length of the series.
-windows : float or string [none]
-    Width, µm, of overlapping windows that a scan much wider than coherence_width is cut into. Each
-    is levelled, and their powers are averaged (Welch 1967). `auto` is twice coherence_width.
+windows : float or string [auto]
+    Width, µm, of the windows that an open patch is seen through; several overlap, each is levelled,
+    and their powers are averaged (Welch 1967). `auto`: a scan up to 32 µm is one window, as wide as
+    its smaller side; a wider one has windows of half its side, at least 32 µm and at most
+    coherence_width. Wider windows have narrower lobes and more grain.
 
 The material
 ------------

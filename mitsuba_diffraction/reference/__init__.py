@@ -12,6 +12,7 @@ fresnel, boundary, through  float64 judges of the formulas of the same names in 
 mirror        the correction of order 0 at the horizon, by its equation
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders
+scan          windows of a scan, whose screens fade towards their edges
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
 arguments     checks of the arguments
 """

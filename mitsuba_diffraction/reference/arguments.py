@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
-from ..heights.coherence import widths_of
+from ..heights.coherence import widths_of, window_and_taper
 from ..heights.field import HeightField
 from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
-from ..settings import SURFACE, checked
+from ..settings import COHERENCES, SURFACE, TableSettings, checked
 from .model import Light, Sigmas
+from .scan import ScanWindows
 
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
@@ -28,7 +29,14 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
                 f"coherence_width={shown} must be a positive number of µm, or auto"
             )
         value = float(value)
-    return Sigmas(*map(sigma_of, widths_of(value, [field], coherence)))
+    width, light = widths_of(value, [field], coherence)
+    if coherence != COHERENCES[0]:
+        return Sigmas(sigma_of(width), sigma_of(light))
+    width, taper = window_and_taper(TableSettings(), [field], width)
+    if taper is None:
+        return Sigmas(sigma_of(width), sigma_of(light))
+    looked_up = (width**-2 - taper**-2) ** -0.5
+    return Sigmas(sigma_of(looked_up), sigma_of(light), ScanWindows(width, sigma_of(taper)))
 
 
 class Window(NamedTuple):

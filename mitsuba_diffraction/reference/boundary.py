@@ -69,18 +69,11 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
     if isinstance(index, Filmed):
         index = index.tilted(0.5 * total[..., 2] / cos_half)
-    return facet_matrices(incident, outgoing, *amplitudes(cos_half, index))
-
-
-def facet_matrices(wi: ArrayLike, wo: ArrayLike, r_s: Complex, r_p: Complex) -> Complex:
-    """Jones matrices (..., 2, 2) of facets that mirror ωi to ωo with coefficients r_s, r_p."""
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     s_in, s_out = polarisation_axes(incident, outgoing)
-    axis, total = facet_axis(incident, outgoing, s_in), incident + outgoing
+    axis, (r_s, r_p) = facet_axis(incident, outgoing, s_in), amplitudes(cos_half, index)
     zero = np.zeros_like(r_s)
     facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
-    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
     scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
     return np.asarray(scale[..., None, None] * turned)
 
@@ -93,8 +86,13 @@ def small_slope_weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> R
 
 def blended(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
     """(1−s) K + s B of eq. 6, (..., 2, 2); arguments as for `small_slope`, s (...)."""
+    return mixed(kirchhoff(wi, wo, index), small_slope(wi, wo, index), s)
+
+
+def mixed(tangent_plane: Complex, gentle: Complex, s: ArrayLike) -> Complex:
+    """J of eq. 6 from K and B, (..., 2, 2), and s (...)."""
     weight = np.asarray(s, np.float64)[..., None, None]
-    return np.asarray((1 - weight) * kirchhoff(wi, wo, index) + weight * small_slope(wi, wo, index))
+    return np.asarray((1 - weight) * tangent_plane + weight * gentle)
 
 
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:

@@ -35,7 +35,7 @@ Measure = Callable[[Complex], Real]
 
 
 @dataclass(frozen=True)
-class Material:
+class SurfaceMaterial:
     """Material of a surface, and the model of its boundary.
 
     Attributes
@@ -134,7 +134,9 @@ def mueller(
     return _reflected(boundary.mueller, field, light, material, window)
 
 
-def _material(model: str | None, index: Complex | Filmed | None, coat: float | None) -> Material:
+def _material(
+    model: str | None, index: Complex | Filmed | None, coat: float | None
+) -> SurfaceMaterial:
     """Check what goes together."""
     if coat is not None:
         if index is None:
@@ -145,11 +147,11 @@ def _material(model: str | None, index: Complex | Filmed | None, coat: float | N
             )
         if not (np.isfinite(coat) and coat >= 1.0):
             raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    return Material(model_of(model, index), index, coat)
+    return SurfaceMaterial(model_of(model, index), index, coat)
 
 
 def _reflected(
-    measure: Measure, field: HeightField, light: Light, material: Material, window: Window
+    measure: Measure, field: HeightField, light: Light, material: SurfaceMaterial, window: Window
 ) -> Real:
     """Measured light where both directions are above the surface, 0 elsewhere."""
     assert material.index is not None
@@ -167,7 +169,7 @@ def _lit(
     field: HeightField,
     light: Light,
     index: Complex | Filmed,
-    material: Material,
+    material: SurfaceMaterial,
     window: Window,
 ) -> Real:
     """Measured light of directions above the surface."""

@@ -41,7 +41,7 @@ def reflected(
     jones : J of the structure in the coat.
     """
     inside = refracted_light(light, coat)
-    ends, (sigma, sigma_0) = (light.wi, light.wo, coat, index), sigmas
+    ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
     others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
     mirror = transmitted(model.facets(inside, index)[0], *ends)
     visible = horizon_correction(light, sigma_0, index, bare=False)

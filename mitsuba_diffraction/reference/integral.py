@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.geometry import diffraction_coordinates, wavenumber
+from . import scan
 from .model import Sigmas, orders_near, window_sums
 
 
@@ -54,12 +55,32 @@ def window_powers(
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     powers = np.zeros((3, len(k)))
     for n in np.flatnonzero(above):
-        screen = np.exp(1j * (k[n] * w[n]) * field.heights)
         centre = None if positions is None else (positions[n, 0], positions[n, 1])
-        powers[:, n] = screen_powers(
-            screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigmas, coherence, centre
-        )
+        q = (k[n] * u[n], k[n] * v[n])
+        powers[:, n] = field_powers(field, k[n] * w[n], q, sigmas, coherence, centre)
     return powers
+
+
+def field_powers(
+    field: HeightField,
+    kappa: float,
+    q: tuple[float, float],
+    sigmas: Sigmas,
+    coherence: str,
+    centre: tuple[float, float] | None = None,
+) -> NDArray[np.float64]:
+    """`window_powers` (3,) of a patch, or their means over the windows of a scan.
+
+    kappa, q : phase per height, and spatial frequency along x and y, rad/µm.
+    sigmas, coherence, centre : see `screen_power`.
+    """
+    tapers, parts = scan.tapers(field, sigmas.windows), scan.parts(field, sigmas.windows)
+    screens = (np.exp(1j * kappa * part) for part in parts)
+    powers = [
+        screen_powers(screen, field.pixel_size, *q, sigmas, coherence, centre, tapers)
+        for screen in screens
+    ]
+    return np.asarray(np.mean(powers, axis=0))
 
 
 def screen_power(
@@ -90,10 +111,14 @@ def screen_powers(
     sigmas: Sigmas,
     coherence: str,
     centre: tuple[float, float] | None = None,
+    tapers: scan.Tapers | None = None,
 ) -> tuple[float, float, float]:
-    """`window_powers` of one screen; arguments as for `screen_power`."""
+    """`window_powers` of one screen; arguments as for `screen_power`.
+
+    tapers : along y and x, of a window of a scan.
+    """
     sigma = sigmas.orders
-    orders = orders_near((alpha, beta), sigma, screen, pixel_size)
+    orders = orders_near((alpha, beta), sigma, screen, pixel_size, tapers)
     if coherence == "ensemble":
         return *window_sums(orders, (alpha, beta), sigmas), 0.0
     ny, nx = screen.shape

@@ -20,12 +20,12 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
-window has the light's σ₀; a small scan limits σ of other orders alone. C makes up for the part of
-its lobe beyond the horizon, with the reflectance exp(−βX) near it. K is Kirchhoff's tangent plane:
-Fresnel's r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s
-of light along d. Rows and columns of J are s and p, outgoing and incoming. B is first-order small
-slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py and
-transmission.py wrap this.
+window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
+orders alone. C makes up for the part of its lobe beyond the horizon, with the reflectance exp(−βX)
+near it. K is Kirchhoff's tangent plane: Fresnel's r_s, r_p at the half vector; U turns between the
+facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along d. Rows and columns of J are s and p of the
+outgoing and the incoming light. B is first-order small slope (Rice 1951; Voronovich 1985). Indices
+and results are arrays (n,) as in `Light`. coat.py and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -39,8 +39,9 @@ from numpy.typing import NDArray
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Index
-from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
-from .fresnel import amplitudes, decaying_root, reflectance
+from . import boundary, scan
+from .boundary import facet_axis, jones_matrix, mixed, polarisation_axes, turn, unpolarised
+from .fresnel import amplitudes, decaying_root
 from .mirror import horizon_correction
 
 Real = NDArray[np.float64]
@@ -56,15 +57,14 @@ class Light(NamedTuple):
 
 
 class Sigmas(NamedTuple):
-    """σ of the window of all orders but 0, and σ₀ of order 0's, the light's; both in µm."""
+    """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
+
+    `windows`: a scan's, which does not tile the plane.
+    """
 
     orders: float
     zeroth: float
-
-    @classmethod
-    def same(cls, sigma: float) -> Sigmas:
-        """Return one width for all orders."""
-        return cls(sigma, sigma)
+    windows: scan.ScanWindows | None = None
 
 
 def default_brdf(
@@ -75,7 +75,7 @@ def default_brdf(
     measure: Callable[[Complex], Real] = unpolarised,
 ) -> Real:
     """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
-    jones = blended(kirchhoff(light, index), small_slope(light, index), share(field, light, index))
+    jones = mixed(kirchhoff(light, index), small_slope(light, index), share(field, light, index))
     others, zeroth = ensemble_power(field, light, sigmas)
     rest = reflected(light, sigmas.orders, others, jones, measure)
     return rest + mirrored(light, sigmas, zeroth, index, measure)
@@ -102,10 +102,12 @@ def mirrored(
 def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
     """Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ of (3) in µm⁴, (2, n)."""
     k, powers = 2e3 * np.pi / light.wavelength, np.zeros((2, len(light.wavelength)))
+    parts, tapers = scan.parts(field, sigmas.windows), scan.tapers(field, sigmas.windows)
     for n, (u, v, w) in enumerate(light.wi + light.wo):
         q, kappa = (k[n] * u, k[n] * v), k[n] * w  # (1): frequency q, and phase per height κ
-        screen = np.exp(1j * kappa * field.heights), field.pixel_size
-        powers[:, n] = window_sums(orders_near(q, sigmas.orders, *screen), q, sigmas)
+        screens = (np.exp(1j * kappa * part) for part in parts)
+        orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
+        powers[:, n] = np.mean([window_sums(each, q, sigmas) for each in orders], axis=0)
     return powers
 
 
@@ -120,13 +122,17 @@ class Orders(NamedTuple):
 
 
 def orders_near(
-    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float]
-) -> Orders:
-    """Orders (2) of a screen (ny, nx) that the window about q reaches."""
-    ny, nx = screen.shape
-    qx, waves_x = plane_waves(nx, pixel_size[0], q[0], sigma)
-    qy, waves_y = plane_waves(ny, pixel_size[1], q[1], sigma)
-    return Orders(qx, qy, waves_x, waves_y, waves_y @ screen @ waves_x.T / (nx * ny))
+    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float],
+    tapers: scan.Tapers | None = None,
+) -> Orders:  # fmt: skip
+    """Orders (2) of a screen (ny, nx), or of a faded one, that the window about q reaches."""
+    (ny, nx), (screen, mean) = screen.shape, scan.faded(screen, tapers)
+    qx, waves_x = plane_waves(screen.shape[1], pixel_size[0], q[0], sigma)
+    qy, waves_y = plane_waves(screen.shape[0], pixel_size[1], q[1], sigma)
+    a = waves_y @ screen @ waves_x.T / screen.size
+    if mean is not None:
+        a[np.ix_(qy == 0, qx == 0)] = mean
+    return Orders(qx, qy, waves_x[:, :nx], waves_y[:, :ny], a)
 
 
 def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
@@ -150,18 +156,12 @@ def window_sums(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> tuple
     return float(unit * (window_y @ powers @ window_x)), float(unit * ratio * lobe * zeroth)
 
 
-def blended(tangent_plane: Complex, gentle: Complex, s: Real) -> Complex:
-    """J of (6) from K and B."""
-    return (1 - s[:, None, None]) * tangent_plane + s[:, None, None] * gentle
-
-
 def share(field: HeightField, light: Light, index: Index) -> Real:
     """s of (9), the part of small slope in J."""
     total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
     q = k * np.hypot(total[:, 0], total[:, 1])
     variance = ScaleRoughness.from_heights(field.heights, field.pixel_size).at(q)
-    roughness = np.square(k * total[:, 2]) * variance  # (κσ_q)²
-    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
+    return boundary.small_slope_weight(k * total[:, 2], variance, index)
 
 
 def kirchhoff(light: Light, index: Complex) -> Complex:

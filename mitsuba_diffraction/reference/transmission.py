@@ -13,9 +13,9 @@ from ..optics.geometry import wavenumber
 from ..settings import checked
 from . import boundary, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
+from .boundary import mixed
 from .coat import refracted
-from .integral import screen_power
-from .model import blended
+from .integral import field_powers
 
 
 def btdf(
@@ -40,7 +40,8 @@ def btdf(
     thin : whether the direction below is outside of a thin sheet, beyond its flat other side.
     """
     checked("coherence", coherence)
-    sigma, sigma_0 = sigmas = sigmas_of(coherence_width, field, coherence)
+    sigmas = sigmas_of(coherence_width, field, coherence)
+    sigma = sigmas.orders
     first, second, lam = directions_of(wi, wo, wavelength)
     model = model_of(model, index_of(eta, 0.0, lam, None), formulas.MODELS)
     if not 1.0 < float(eta) < np.inf:
@@ -61,19 +62,19 @@ def btdf(
     if model == "small_slope":
         variance = roughness.at(k * np.hypot(*total[:, :2].T))
         s = boundary.small_slope_weight(kappa, variance, eta)
-        jones = blended(jones, through.small_slope(above, inside, eta), s)
+        jones = mixed(jones, through.small_slope(above, inside, eta), s)
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
-    screens = [np.exp(1j * phase * field.heights) for phase in kappa]
     frequency = -k[:, None] * total[:, :2]
-    power = [
-        screen_power(screen, field.pixel_size, x, y, sigmas, coherence)
-        for screen, (x, y) in zip(screens, frequency, strict=True)
-    ]
-    lobe = 4 * np.pi**2 * sigma**2 * sigma_0**2
-    lobe = lobe * np.exp(-(sigma_0**2) * np.sum(frequency**2, axis=1))
+    others, zeroth, cosine = np.transpose(
+        [
+            field_powers(field, phase, (x, y), sigmas, coherence)
+            for phase, (x, y) in zip(kappa, frequency, strict=True)
+        ]
+    )
+    power = others + zeroth + 2.0 * cosine * np.sqrt(others * zeroth)
     # order 0 has the flat surface's transmittance; speckle may be darker than its mean
-    zeroth = np.minimum(np.abs([screen.mean() for screen in screens]) ** 2 * lobe, power)
+    zeroth = np.minimum(zeroth, power)
     cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
     orders = cosines * boundary.unpolarised(jones) * (power - zeroth)
     flat = boundary.unpolarised(through.order_0(above, below, eta, thin=thin)) * zeroth

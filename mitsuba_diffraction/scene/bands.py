@@ -27,7 +27,7 @@ _KEPT = (
 _MARGIN = 0.5
 
 
-class Bands(NamedTuple):
+class SensorBands(NamedTuple):
     """Responses of a film's channels.
 
     Attributes
@@ -46,7 +46,7 @@ class Bands(NamedTuple):
         return float(self.wavelengths[max(seen.index(True) - 1, 0)])
 
 
-def put_bands(state: Any, bands: Bands) -> None:
+def put_bands(state: Any, bands: SensorBands) -> None:
     """Replace all films by spectral films of these bands.
 
     A channel's value is ∫ L(λ) r(λ) dλ, with the radiance L per nanometre and its response r.
@@ -86,7 +86,7 @@ def wider_tables(first: float) -> Iterator[None]:
         yield
 
 
-def check_bands(bands: Bands, surfaces: Mapping[str, Sequence[Surface]]) -> None:
+def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -> None:
     """Refuse a table of heights, a file, that begins above the light that bands respond to.
 
     surfaces : surfaces that diffract, by the names of their shapes.

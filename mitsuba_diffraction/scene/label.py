@@ -48,7 +48,7 @@ _TURNS = tuple(sign * turn for turn in range(15, 181, 15) for sign in (1, -1))
 _STRETCH = (0.4, 1.5)
 
 
-class Place(NamedTuple):
+class LabelPlace(NamedTuple):
     """Place of a label on a surface.
 
     Attributes
@@ -73,16 +73,16 @@ def files_in(folder: Path) -> list[Path]:
     ]
 
 
-def card(aspect: float) -> Place:
+def card(aspect: float) -> LabelPlace:
     """Return the place of a picture, of this width over height, that fills an upright card."""
     width, height = 2 * _CARD * min(1.0, aspect), 2 * _CARD * min(1.0, 1.0 / aspect)
     matrix = np.array([[width, 0.0, -width / 2], [0.0, height, -height / 2]])
-    return Place(matrix, (width, height), np.zeros(1))
+    return LabelPlace(matrix, (width, height), np.zeros(1))
 
 
 def front(
     file: Path, aspect: float, *, width: float, height: float, up: str = "auto", turn: float = 0.0
-) -> Place:
+) -> LabelPlace:
     """Return the place of a label on the front of a mesh, upright and not mirrored.
 
     The texture coordinates of the triangle in the label's middle are continued over the label.
@@ -107,7 +107,7 @@ def front(
     mesh = fitted_mesh(file, up=up)
     uv = own.uv[own.faces]
 
-    def place_at(turn: float) -> Place:
+    def place_at(turn: float) -> LabelPlace:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         corners = (mesh.positions @ rotation.T)[mesh.faces]
@@ -137,7 +137,7 @@ def front(
 
 def _place(
     corners: Floats, normals: Floats, uv: Floats, wide: float, z: float, aspect: float
-) -> Place:
+) -> LabelPlace:
     """Return the place of a label on the side that looks to −y.
 
     Raises a DiffractionError if that side's normals point away from −y, or its texture coordinates
@@ -173,7 +173,7 @@ def _place(
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
     elevations = np.degrees(np.arcsin(np.clip(steep, -1.0, 1.0)))
-    place = Place(np.column_stack([linear, shift]), (wide, high), elevations)
+    place = LabelPlace(np.column_stack([linear, shift]), (wide, high), elevations)
     for x in np.linspace(-0.5, 0.5, _COLUMNS):
         for y in np.linspace(-0.5, 0.5, _ROWS):
             number, weights, hit = _in_front(corners, x * wide, z + y * rise, facing)
@@ -233,7 +233,7 @@ def geometry(elevations: Floats) -> tuple[float, Floats]:
     return ring, np.clip(tangential, low, high)
 
 
-def write(folder: Path, parts: Areas, place: Place, mesh: Path | None, **values: str) -> Path:
+def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **values: str) -> Path:
     """Write textures, patch, light and scene into a folder; return the scene.
 
     Parameters

@@ -29,7 +29,7 @@ from .parameters import check_includes, check_parameters, files_of, parameters_o
 
 if TYPE_CHECKING:
     from .additions import SceneValues
-    from .bands import Bands
+    from .bands import SensorBands
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -91,7 +91,7 @@ def load_scene(
     parameters: Mapping[str, Any],
     *,
     box_filter: bool = False,
-    bands: Bands | None = None,
+    bands: SensorBands | None = None,
 ) -> Any:
     """Load an XML scene in the variant that is set.
 
@@ -138,7 +138,11 @@ def load_scene(
 
 
 def _instantiated(
-    file: Path, known: Sequence[Path], values: SceneValues, box_filter: bool, bands: Bands | None
+    file: Path,
+    known: Sequence[Path],
+    values: SceneValues,
+    box_filter: bool,
+    bands: SensorBands | None,
 ) -> Any:
     """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects.
 

@@ -81,7 +81,7 @@ class DiffractionTable:
     @property
     def order_0_ratio(self) -> float:
         """(σ₀/σ)²: order 0's lobe is so many times as high and as small as other orders' lobes."""
-        return (self.coherence_width / self.window_width) ** 2
+        return (self.sigma_0 / self.sigma) ** 2
 
     @property
     def width_text(self) -> str:
@@ -118,8 +118,14 @@ class DiffractionTable:
 
     @property
     def sigma(self) -> float:
-        """σ of the amplitude window of all orders but 0, µm."""
-        return sigma_of(self.window_width)
+        """σ of the window by which all orders but 0 are looked up, µm."""
+        return sigma_of(self.settings.lookup_width)
+
+    @property
+    def inverse_taper(self) -> float:
+        """1/σ_t² of the taper of a scan's windows, 1/µm²; 0 of a patch that tiles the plane."""
+        taper = self.settings.taper_width
+        return 0.0 if taper is None else sigma_of(taper) ** -2
 
     @property
     def sigma_0(self) -> float:

@@ -36,13 +36,13 @@ def test_json_has_the_numbers(run, heights):
     assert data["warnings"] == []
     # of light of 550 nm: sin θ = 0.55/6
     assert data["window"] == (
-        "65 µm for the mirror direction, 6 µm for orders: a scan of 6 µm knows nothing of light "
+        "65 µm for the mirror direction, 6 µm for orders: windows of 6 µm know nothing of light "
         "within 5.3° of the mirror but the mirror"
     )
 
 
 def test_treatments_are_listed(run, heights):
-    options = ("--pixel-size", "0.08", "--level", "plane", "--periodic", "smooth", "--json")
+    options = ("--pixel-size", "0.08", "--level", "plane", "--periodic", "exact", "--json")
     history = json.loads(run("info", heights, *options).out)["history"]
     assert len(history) == 2
 
@@ -201,7 +201,8 @@ def test_only_a_table_has_an_albedo(run, heights, tmp_path):
 
 def test_a_patch_too_wide_for_its_window_is_mentioned(run, tmp_path):
     np.save(tmp_path / "wide.npy", np.random.default_rng(1).random((8, 600)) * 0.01)
-    data = json.loads(run("info", tmp_path / "wide.npy", "--pixel-size", "10", "--json").out)
+    asked = ("--pixel-size", "10", "--periodic", "exact", "--json")
+    data = json.loads(run("info", tmp_path / "wide.npy", *asked).out)
     assert any("so much more than the coherence window" in line for line in data["warnings"])
 
 

@@ -91,13 +91,14 @@ def test_lengths_in_nanometres_are_asked_about(run, heights, here):
     assert "is the pixel size of 80 µm in nm? Then divide it by 1000" in line
     np.save("nm.npy", 1e4 * np.load(heights))
     line = run("precompute", "nm.npy", "--pixel-size", "0.08", *options).failed_in_one_line()
-    assert "are the heights, with a range of 399.9 µm, in nm?" in line
+    assert "are the heights, with a range of " in line
+    assert "in nm?" in line
 
 
 def test_tilt_is_said_before_the_work_and_once(run, heights, here, monkeypatch):
     np.save("tilted.npy", np.load(heights) + 0.003 * np.arange(75))
     assert "not levelled" not in run("precompute", "tilted.npy", *QUICK).err
-    raw = [*QUICK, "--level", "none", "--periodic", "none"]
+    raw = [*QUICK, "--level", "none"]
     ran = run("precompute", "tilted.npy", *raw)
     assert ran.code == 0
     (line,) = [line for line in ran.err.splitlines() if "not levelled" in line]
@@ -320,9 +321,9 @@ def test_a_wide_scan_s_table_says_how_sure_its_mean_is(run, tmp_path, monkeypatc
     x = 0.1 * np.arange(200)
     np.save("wide.npy", 0.03 * np.sin(2 * np.pi * x / 1.6) + 0 * x[:, None])
     ran = run(
-        "precompute", "wide.npy", "--pixel-size", 0.1, "--coherence-width", 5, "--windows", "auto",
+        "precompute", "wide.npy", "--pixel-size", 0.1, "--windows", 5,
         "--tolerance", 0.05, "--wavelength-range", 500, 600,
     )  # fmt: skip
     assert ran.code == 0, ran
-    assert "mean of 9 windows of 10 x 10 µm; its standard error is" in ran.out
-    assert '"number": 9' in run("info", "wide.exr", "--json").out
+    assert "mean of 7 windows of 5 x 20 µm; its standard error is" in ran.out
+    assert '"number": 7' in run("info", "wide.exr", "--json").out

@@ -18,7 +18,7 @@ from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 
 def test_two_workers_of_which_one_is_killed_build_the_same_table(client):
-    scan, wanted = HeightField(rough(300), PIXEL, name="scan"), {"windows": "auto", **SETTINGS}
+    scan, wanted = HeightField(rough(300), PIXEL, name="scan", cut_out=True), SETTINGS
     killed = []
 
     def disturb(done, total, text):

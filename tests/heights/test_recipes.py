@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.recipes import LOAD_KEYS, Recipe
@@ -68,7 +68,20 @@ def test_generator_gets_its_arguments(folder):
     path = write(folder, SMALL_BLAZED)
     field = HeightField.load(path)
     assert field.digest() == gratings.blazed(2.0, 0.2, periods=1, rows=4).digest()
-    assert HeightField.load(path, periodic="taper").history
+    opened = HeightField.load(path, periodic="open")
+    assert opened.cut_out
+    assert not opened.periodic
+
+
+def test_a_recipe_of_an_earlier_version_loads_and_says_what_replaces_its_treatment(folder):
+    for value in ("trend", "smooth", "taper", "none"):
+        path = write(folder, f'periodic = "{value}"\n' + SMALL_BLAZED)
+        with pytest.warns(DiffractionWarning, match="windows.*periodic=exact") as said:
+            assert (
+                HeightField.load(path).digest()
+                == gratings.blazed(2.0, 0.2, periods=1, rows=4).digest()
+            )
+        assert len(said) == 1
 
 
 def test_table_arguments_are_those_that_are_set(folder):

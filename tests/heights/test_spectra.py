@@ -19,6 +19,7 @@ from mitsuba_diffraction.heights.spectra import (
     height_spectrum,
     order_powers,
     profile,
+    seen_slope,
 )
 from tests.support.directions import rough_patch
 
@@ -258,3 +259,24 @@ def test_one_period_of_a_grating_is_known_only_where_it_repeats():
     (found,) = dominant_periods(blaze)
     assert found.period == pytest.approx(2.5)
     assert dominant_periods(HeightField(blaze.heights, blaze.pixel_size, cut_out=True)) == []
+
+
+def test_noise_of_pixels_adds_nothing_to_the_slope_that_light_sees():
+    even = sinusoidal(period=1.6, depth=0.06, periods=8, rows=64)
+    noise = 0.002 * np.random.default_rng(2).normal(size=even.heights.shape)
+    noisy = HeightField(even.heights + noise, even.pixel_size, periodic=True)
+    assert noisy.rms_slope > 1.3 * even.rms_slope
+    # of white noise the part below 2/λ remains, a tenth of the frequencies here
+    assert seen_slope(noisy, 0.36) == pytest.approx(even.rms_slope, rel=0.1)
+    assert seen_slope(even, 0.36) == pytest.approx(even.rms_slope, rel=0.01)
+
+
+@pytest.mark.parametrize(("periods", "certain"), [(3, False), (8, True)])
+def test_periods_with_few_repeats_are_perhaps_one(periods, certain):
+    x = np.arange(256) * (1.6 * periods / 256)
+    heights = np.tile(0.03 * np.sin(2.0 * np.pi * x / 1.6), (256, 1))
+    field = HeightField(heights, float(x[1]), cut_out=True)
+    (grating, *_), _ = examine_periods(field)
+    assert grating.repeats == pytest.approx(periods, rel=0.1)
+    assert str(grating).startswith("perhaps") != certain
+    assert "repeats" in str(grating)

@@ -11,7 +11,7 @@ from mitsuba_diffraction.optics import boundary, through
 from mitsuba_diffraction.optics.blend import RoughnessTable
 from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.tables.energy.conserved import Transmitter
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from tests.support.directions import polar
 
 FLAT = md.HeightField(np.zeros((4, 4)), 0.2)
@@ -23,9 +23,9 @@ CALLS = {
     ),
     "btdf": lambda name: reference.btdf(FLAT, UP, DOWN, 520.0, eta=1.5, model=name),
     "model": lambda name: boundary.model_of(name),
-    "gain": lambda name: Gain(Path(1.5, name), RoughnessTable(0.0, np.zeros(2)), 12.0, 1.0).exact(
-        np.array(0.5), np.array(0.5), 0.0
-    ),
+    "gain": lambda name: PathGain(
+        Path(1.5, name), RoughnessTable(0.0, np.zeros(2)), 12.0, 1.0
+    ).exact(np.array(0.5), np.array(0.5), 0.0),
     "dielectric": lambda name: Transmitter(1.5, name, thin=False).paths(np.ones(1), 0.1),
 }
 

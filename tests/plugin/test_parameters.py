@@ -166,7 +166,7 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
     tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
     np.save(tmp_path / "tilted.npy", tilted)
     given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
-    raw = {"level": "none", "periodic": "none"}
+    raw = {"level": "none"}
     counted = r"^\d notes? on 'tilted\.npy': mitsuba-diffraction info .* --pixel-size 0.08,0.08"
     with pytest.warns(md.DiffractionWarning, match=counted) as caught:
         loads(**given, **raw)()
@@ -175,8 +175,8 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
     field = md.HeightField.load(tmp_path / "tilted.npy", pixel_size=0.08, **raw)
     with pytest.warns(md.DiffractionWarning, match=said):
         load(field)  # as an array, too
-    level = loads(**given, level="plane", periodic="smooth")()  # nothing to warn of
-    again = load(field, level="plane", periodic="smooth")
+    level = loads(**given, level="plane")()  # nothing to warn of
+    again = load(field, level="plane")
     wo = [polar(25, phi) for phi in range(0, 360, 30)]
     values = [evaluated(bsdf, polar(10), wo, 500.0) for bsdf in (level, again)]
     # single precision of the array's heights
@@ -185,7 +185,7 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
 
 def test_a_patch_is_cropped_in_the_scene(some_variant, png):
     given = {"heightfield": str(png), "pixel_size": 0.08, "max_height": PATCH.range}
-    bsdf = loads(**given, crop="1.6, 2.4", periodic="smooth", coherence_width=1.6)()
+    bsdf = loads(**given, crop="1.6, 2.4", coherence_width=1.6)()
     assert bsdf.table.source["shape"] == [30, 20]
 
 

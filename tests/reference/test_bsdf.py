@@ -24,7 +24,7 @@ def order_power(field: HeightField, frequency: tuple[float, float], kappa: float
     """|a|² of the order at a frequency, through a window so wide that its lobes do not overlap."""
     screen = np.exp(1j * kappa * field.heights)
     sigma = 3.0 * max(field.extent)  # neighbours weigh exp(−(3·2π)²) at most
-    power = screen_power(screen, field.pixel_size, *frequency, Sigmas.same(sigma), "ensemble")
+    power = screen_power(screen, field.pixel_size, *frequency, Sigmas(sigma, sigma), "ensemble")
     return power / (4 * np.pi**2 * sigma**4)
 
 
@@ -39,7 +39,7 @@ def test_the_power_is_that_of_a_sum_over_pixels_of_the_plane(coherence, kappa):
     for alpha, beta in [(0.0, 0.0), (3.1, -2.2), (-4.0, 1.3), (2.2, 4.9)]:
         exact = riemann_power(SMALL, alpha, beta, kappa, SIGMA, coherence)
         computed = screen_power(
-            screen, SMALL.pixel_size, alpha, beta, Sigmas.same(SIGMA), coherence
+            screen, SMALL.pixel_size, alpha, beta, Sigmas(SIGMA, SIGMA), coherence
         )
         # rounding of sums of 1e4 terms, relative to the largest that any direction gets
         assert abs(computed - exact) < 1e-12 * 4 * np.pi**2 * SIGMA**4
@@ -120,7 +120,7 @@ def test_nothing_is_known_beyond_the_pixels_nyquist_frequency():
     nyquist = np.pi / SMALL.pixel_size[0]
     inside, spilled, far = (
         screen_power(
-            screen, SMALL.pixel_size, nyquist + n / SIGMA, 0.0, Sigmas.same(SIGMA), "ensemble"
+            screen, SMALL.pixel_size, nyquist + n / SIGMA, 0.0, Sigmas(SIGMA, SIGMA), "ensemble"
         )
         for n in (-1.0, 1.0, 9.0)
     )

@@ -29,14 +29,16 @@ def test_matrices_are_those_of_the_tables(index):
         np.hypot(*total[:, :2].T)
     )
     assert s == pytest.approx(boundary.small_slope_weight(total[:, 2], variance, index))
-    both = model.blended(model.kirchhoff(LIGHT, index), model.small_slope(LIGHT, index), s)
+    both = boundary.mixed(model.kirchhoff(LIGHT, index), model.small_slope(LIGHT, index), s)
     assert both == pytest.approx(boundary.blended(WI, WO, index, s))
 
 
 def test_the_reference_s_default_is_the_model():
     light = {"eta": 1.5, "coherence_width": 2.0}
     found = reference.brdf(FIELD, WI, WO, LIGHT.wavelength, **light)
-    expected = model.default_brdf(FIELD, LIGHT, INDICES[0], model.Sigmas.same(sigma_of(2.0)))
+    expected = model.default_brdf(
+        FIELD, LIGHT, INDICES[0], model.Sigmas(sigma_of(2.0), sigma_of(2.0))
+    )
     assert np.array_equal(found, expected)
     matrices = reference.mueller(FIELD, WI, WO, LIGHT.wavelength, **light)
     assert matrices[:, 0, 0] == pytest.approx(found)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.scene.bands import Bands
+from mitsuba_diffraction.scene.bands import SensorBands
 from mitsuba_diffraction.scene.load import load_scene
 from tests.support.directions import polar, rough_patch
 from tests.support.orders import thin_grating
@@ -36,7 +36,7 @@ SCENE = """<scene version="3.0.0">
         <bsdf type="diffraction">
             <string name="heightfield" value="{heights}"/>
             <string name="pixel_size" value="{pixel}"/>
-            <string name="periodic" value="none"/>
+            <string name="periodic" value="exact"/>
             <string name="level" value="none"/>
         </bsdf>
     </shape>
@@ -69,7 +69,7 @@ def test_a_band_of_ultraviolet_is_the_reference_s_integral(scene):
     field, file = scene
     nodes = np.arange(300.0, 701.0)
     spans = {"uv": (310.0, 340.0), "green": (520.0, 560.0)}
-    bands = Bands(
+    bands = SensorBands(
         nodes.tolist(),
         {name: ((nodes >= a) & (nodes <= b)).astype(float).tolist()
          for name, (a, b) in spans.items()},
@@ -97,8 +97,8 @@ def test_tables_that_begin_at_longer_wavelengths_are_refused(scene, tmp_path):
     first, last = text.index('<string name="heightfield"'), text.index("</bsdf>")
     file.write_text(f'{text[:first]}<string name="table" value="table.exr"/>{text[last:]}')
     with pytest.raises(md.DiffractionError, match="begins at 360 nm"):
-        load_scene(file, {}, bands=Bands([300.0, 350.0, 400.0], {"u": [0.0, 1.0, 0.0]}))
-    load_scene(file, {}, bands=Bands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
+        load_scene(file, {}, bands=SensorBands([300.0, 350.0, 400.0], {"u": [0.0, 1.0, 0.0]}))
+    load_scene(file, {}, bands=SensorBands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
 
 
 #: A film's bands, nm, and whether each lies within the table's 360 to 830 nm.

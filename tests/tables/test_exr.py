@@ -133,7 +133,7 @@ def test_an_image_that_is_no_table(tmp_path):
     file = tmp_path / "picture.exr"
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {"RGB": np.ones((4, 4, 3), np.float32)}).write(str(file))
-    assert "is an EXR image but no table; make one of it with" in refused(file)
+    assert "is an EXR image but no table; make a table with" in refused(file)
 
 
 @pytest.mark.parametrize("version", [1, 2, None, "3"])

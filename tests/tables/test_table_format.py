@@ -117,6 +117,6 @@ def test_the_page_describes_every_field(tmp_path):
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.M)
     described = set(re.findall(r"\w+", " ".join(rows)))
     fields = {*document, *document["expansion"], *document["grid"]}
-    assert fields | {"windows", "window_width"} == described  # only of wide and of small scans
+    assert fields | {"window_width", "taper_width"} == described  # of scans alone
     assert re.search(rf"^\| `version` \| \w+ \| {FORMAT_VERSION}\b", PAGE, re.M)
     assert json.dumps(document["version"]) == str(FORMAT_VERSION)

@@ -85,7 +85,9 @@ def agreement(
         distance = np.hypot(qx, qy)
         inside = distance * whole.sigma <= GLOSSY_RADIUS
         part = inside if name == "glossy" else ~inside & (distance <= kappa)
-        windows, exact = (t.window_sum(qx[part], qy[part], kappa) for t in (windowed, whole))
+        windows, exact = (
+            t.window_sum(qx[part], qy[part], kappa) * t.sigma**2 for t in (windowed, whole)
+        )
         result[name] = float(np.abs(windows - exact).sum() / exact.sum()), error[name]
     return result
 
@@ -117,8 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory(dir=args.folder) as folder:
             scan = Path(folder) / "scan.npy"
             field(scan, args.pixels)
-            windowed = built(scan, args.pixels, ["--windows", "auto"])
-            whole = built(scan, args.pixels)
+            windowed = built(scan, args.pixels)
+            whole = built(scan, args.pixels, ["--periodic", "exact"])
         text = report(whole, windowed, args.pixels)
         print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
         if args.output:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.heights.preprocess import periodic_smooth
 
 from .cases import ALUMINIUM, KERATIN
 
@@ -180,7 +179,7 @@ def _cut(surface: Surface, patch: HeightField) -> tuple[NDArray[np.float64], flo
     count = 2 * round(surface.size / pixel / 2)
     row, column = surface.place
     piece = patch.heights[row : row + count, column : column + count]
-    periodic = periodic_smooth(HeightField(piece, patch.pixel_size))
+    periodic = _periodic(HeightField(piece, patch.pixel_size))
     side = count * pixel
     return _smoothed(periodic.heights, side), side
 
@@ -190,6 +189,25 @@ def _source(surface: Surface) -> HeightField:
     if surface.kind == "elaphe_like":
         return gratings.elaphe_like(extent=20.0, pixels=410, seed=1)
     return gratings.cd(extent=64.0, pixels=1312, seed=0)
+
+
+def _periodic(field: HeightField) -> HeightField:
+    """Heights whose opposite edges meet, which the solver needs.
+
+    The periodic component of L. Moisan, Periodic plus smooth image decomposition, Journal of
+    Mathematical Imaging and Vision 39, 161-179 (2011), eq. 11; pixels are square.
+    """
+    h = field.heights
+    steps = np.zeros_like(h)
+    steps[0], steps[-1] = h[-1] - h[0], h[0] - h[-1]
+    steps[:, 0] += h[:, -1] - h[:, 0]
+    steps[:, -1] -= h[:, -1] - h[:, 0]
+    waves = [2 * np.cos(2 * np.pi * np.fft.fftfreq(count)) - 2 for count in h.shape]
+    laplacian = waves[0][:, None] + waves[1]
+    laplacian[0, 0] = 1.0  # the steps have mean 0
+    spectrum = np.fft.fft2(steps) / laplacian
+    spectrum[0, 0] = 0.0
+    return HeightField(h - np.fft.ifft2(spectrum).real, field.pixel_size, name=field.name)
 
 
 def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:

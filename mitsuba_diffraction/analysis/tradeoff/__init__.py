@@ -2,10 +2,10 @@
 
 Contents
 --------
-Setting               settings of one table
+TradeoffSetting       settings of one table
 settings              settings that `mitsuba-diffraction tradeoff` measures
 measure               error, colours, time and memory of each setting
-Measured              result of one setting
+MeasuredSetting       result of one setting
 lit_pairs             pairs of directions between which a patch sends light
 measure_wavelengths   error of sums over the spectrum, and noise by wavelengths per ray
 measure_depths        error of each series over depth: where Taylor's diverges

@@ -58,7 +58,7 @@ class Sample:
     ) -> Sample:
         """Draw n pairs of directions, and compute exact window sums from all pixels."""
         sigma = sigma_of(coherence_width)
-        sigmas = Sigmas.same(sigma)
+        sigmas = Sigmas(sigma, sigma)
         pairs = lit_pairs(field, sigma, n, seed=20140113)
         exact = np.empty(n)
         for i in range(n):

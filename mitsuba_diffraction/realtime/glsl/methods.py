@@ -60,7 +60,9 @@ def _cached_build(heights: HeightField, **arguments: Any) -> DiffractionTable:
     """Build a table like `DiffractionTable.build`, or read it from the cache."""
     progress = arguments.pop("progress", None)
     settings = TableSettings(**arguments)
-    return cached_table(heights.digest(), settings, lambda: build_with(heights, settings, progress))
+    return cached_table(
+        heights.digest(), settings, lambda: build_with(heights, settings, progress), [heights.name]
+    )
 
 
 def pack_method(method: Method) -> Packed:
@@ -195,8 +197,13 @@ def window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
     """Return the uniforms of another coherence width of the light in µm; a scan's limit stays."""
     sigma = sigma_0 = sigma_of(coherence_width)
     table_sigma, table_ratio = tables.uniforms.get("sigma"), tables.uniforms.get("order_0_ratio")
-    if isinstance(table_sigma, float) and isinstance(table_ratio, float) and table_ratio > 1.0:
-        sigma = min(sigma, table_sigma)
+    if isinstance(table_sigma, float) and isinstance(table_ratio, float):
+        taper = tables.uniforms.get("inverse_taper", 0.0)
+        assert isinstance(taper, float)
+        if taper > 0.0:  # of a scan's windows, which stays: the look-up makes up for it
+            sigma = (min(sigma, (table_sigma**-2 + taper) ** -0.5) ** -2 - taper) ** -0.5
+        elif table_ratio > 1.0:
+            sigma = min(sigma, table_sigma)
     factor = area_factor(sigma)
     exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms.get("area_factor")
     uniforms: dict[str, Uniform] = {

@@ -118,6 +118,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "spacing": (table.spacing[0], table.spacing[1]),
             "sigma": table.sigma,
             "order_0_ratio": table.order_0_ratio,
+            "inverse_taper": table.inverse_taper,
             "interval_length": expansion.length,
             "intervals": expansion.intervals,
             "cells": cells,

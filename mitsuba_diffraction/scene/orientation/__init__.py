@@ -4,6 +4,7 @@ Contents
 --------
 trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
 mesh_files   `load_mesh`, `write_ply`; PLY files of polygons
+mesh_indices  mesh files checked before Mitsuba reads them
 interchange  meshes of glTF and USD files
 tangents     `check_tangents`: whether a mesh has the tangents that a patch needs, where they break
 directions   `direction_field`: a smooth field of directions on any mesh

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import response
 from ...plugin.memory import upload
-from .recording import Recorded, Session
+from .recording import RecordedLookups, Session
 
 #: Longest paths that are followed, vertices and camera included.
 MOST_BOUNCES = 12
@@ -109,7 +109,7 @@ class _Answer(NamedTuple):
 
     value: Any
     density: Any
-    records: list[Recorded]
+    records: list[RecordedLookups]
 
 
 class _Vertex(NamedTuple):

@@ -40,7 +40,7 @@ _one_at_a_time = threading.Lock()
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedLookups:
     """Look-ups of one BSDF in one call; lanes without light are left out."""
 
     bsdf: int  # index among the session's BSDFs
@@ -125,7 +125,7 @@ class Session:
         for buffer, column in zip(buffers, columns, strict=True):
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
-    def records(self) -> list[Recorded]:
+    def records(self) -> list[RecordedLookups]:
         """Look-ups since `start`; recording has ended."""
         result = []
         for number, buffers in enumerate(self._buffers):
@@ -133,7 +133,9 @@ class Session:
             values = np.stack(value, axis=1)
             lane = np.flatnonzero(values.max(axis=1) > 0.0)
             if len(lane):
-                result.append(Recorded(number, lane, u[lane], v[lane], w[lane], values[lane]))
+                result.append(
+                    RecordedLookups(number, lane, u[lane], v[lane], w[lane], values[lane])
+                )
         self._buffers = []
         return result
 

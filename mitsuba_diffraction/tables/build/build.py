@@ -42,8 +42,8 @@ from .choose import (
 from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
-from .powers import Spectra
-from .windows import Run, shape_of, windows_of
+from .powers import PatchSpectra
+from .windows import Run, extent_of, shape_of, windows_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4
@@ -71,7 +71,7 @@ class Attempt:
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
         self._tick = _Ticks(tell)
-        self._spectra = Spectra(patches, outer, double, self._tick)
+        self._spectra = PatchSpectra(patches, outer, double, self._tick)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
         transforms = expansion.intervals * expansion.series_terms * self._spectra.count
         self._tick.transforms = transforms
@@ -147,13 +147,13 @@ class _Wanted:
     @property
     def spacing(self) -> tuple[float, float]:
         """rad/µm between bins."""
-        extent = self.patches[0].extent
+        extent = extent_of(self.patches)
         return (2 * np.pi / extent[0], 2 * np.pi / extent[1])
 
     @property
     def steps(self) -> tuple[float, float]:
         """Spacing of the bins in units of 1/σ."""
-        sigma = sigma_of(self.settings.width)
+        sigma = sigma_of(self.settings.lookup_width)
         return (sigma * self.spacing[0], sigma * self.spacing[1])
 
     @property
@@ -196,7 +196,7 @@ def build_table(
     height_scale_max: float = TableSettings.height_scale_max,
     taps: int | None = None,
     frequency_limit: float | tuple[float, float] | None = None,
-    windows: str | float | None = None,
+    windows: str | float = TableSettings.windows,
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
@@ -239,7 +239,7 @@ def build_with(
         check_patches(scans, settings)
     check_units(scans)
     try:
-        check_window(patches[0].extent, settings)
+        check_window(extent_of(patches), settings)
         table = _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in scans if (question := units_warning(patch))]
@@ -338,7 +338,7 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     """Grid of DFT bins, wide enough for window sums with so many taps (x, y)."""
     limit, spacing = wanted.frequency_limit, wanted.spacing
     if max(taps) > MAX_TAPS:
-        raise too_wide(wanted.patches[0].extent, wanted.settings, taps)
+        raise too_wide(extent_of(wanted.patches), wanted.settings, taps)
     radius = (limit[0] / spacing[0], limit[1] / spacing[1])
     ny, nx = shape_of(wanted.patches)
     # A margin as wide as the taps: see tables.lookup

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import DiffractionError
-from ...heights.coherence import resolved, window_warning
+from ...heights.coherence import SEVERAL, resolved, window_warning
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
@@ -24,9 +24,6 @@ from .choose import taylor_rounding, taylor_truncation
 MOST_PATCHES = 400
 #: What taps may use up of the tolerance when their number is chosen.
 TAPS_SHARE = 0.5
-
-#: Orders read in a look-up that slow rendering down; 16 are usual.
-SLOW = 150
 
 #: Heights of both, a slope of 89.4° and a range in µm, are some hundred nm taken for µm.
 HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
@@ -84,9 +81,17 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
         raise too_wide(extent, settings, taps)
 
 
+def period_of(field: HeightField, settings: TableSettings) -> tuple[float, float]:
+    """Return the period (x, y) of the transforms by resolved settings, µm."""
+    if settings.taper_width is None:
+        return field.extent
+    x, y = (2.0 * max(settings.width, 2.0 * pixel) for pixel in field.pixel_size)
+    return x, y
+
+
 def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple[int, int]:
     """Return the orders (x, y) that a look-up will probably read, for a patch this large, µm."""
-    x, y = (sigma_of(settings.width) * 2.0 * np.pi / length for length in extent)
+    x, y = (sigma_of(settings.lookup_width) * 2.0 * np.pi / length for length in extent)
     return taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
 
 
@@ -95,33 +100,19 @@ def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[s
 
     Heights that are refused have none.
     """
-    settings, first = resolved(settings, scans), scans[0]
-    if settings.windows is not None:  # levelled and tapered: tilt and edges do not show
-        scans = [replace(scan, history=(), cut_out=False) for scan in scans]
-    lines = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
+    settings = resolved(settings, scans)
+    # windows of one scan are levelled, so that its tilt does not show
+    cut = settings.taper_width is not None
+    several = cut and max(scans[0].extent) > SEVERAL * settings.width
+    shown = [replace(scan, cut_out=False) for scan in scans] if several else scans
+    lines = [line for scan in shown for line in scan.validity(settings.wavelength_range)]
     try:
         check_units(scans)
-        if settings.windows is None:
-            check_window(first.extent, settings)
+        check_window(period_of(scans[0], settings), settings)
     except DiffractionError:
         return []
-    if settings.windows is None:
-        taps = expected_taps(first.extent, settings)
-        lines.append(slow_warning(first, settings.width, taps))
     lines.append(window_warning(settings.width, scans))
     return [line for line in dict.fromkeys(lines) if line]
-
-
-def slow_warning(field: HeightField, width: float, taps: tuple[int, int]) -> str:
-    """Return a warning of look-ups that read too many orders under a window, µm; else ""."""
-    if taps[0] * taps[1] <= SLOW:
-        return ""
-    return (
-        f"{field.name}: average over windows, windows=auto, or crop "
-        f"the heights, crop={width:g}: the patch of {field.extent[0]:.4g} × "
-        f"{field.extent[1]:.4g} µm is so much larger than the coherence width of {width:g} µm that "
-        f"every look-up reads {taps[0]}×{taps[1]} orders, and rendering will be slow"
-    )
 
 
 def too_wide(
@@ -131,8 +122,8 @@ def too_wide(
     width = settings.width
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
-        f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it, windows=auto, "
-        f"or crop the heights, crop={width:g}"
+        f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it, "
+        f"windows={width:g}, or crop the heights, crop={width:g}"
     )
 
 

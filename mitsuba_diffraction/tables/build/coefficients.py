@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..expansion import Expansion, principal_functions
 from ..layout import Grid
 from .error import alternate
-from .powers import Spectra
+from .powers import PatchSpectra
 from .spectrum import GLOSSY_RADIUS, Spectrum
 
 #: Fills an array (nodes, …) with the expanded values of all bins at the nodes of an interval, one
@@ -74,7 +74,7 @@ def series_of(
 
 
 def coefficients_of(
-    spectra: Spectra, grid: Grid, expansion: Expansion, functions: int | None
+    spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
 ) -> Coefficients:
     """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
 
@@ -90,7 +90,7 @@ def coefficients_of(
 
 
 def _taylor(
-    spectra: Spectra, grid: Grid, expansion: Expansion
+    spectra: PatchSpectra, grid: Grid, expansion: Expansion
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """Coefficients DFT[iⁿ(2h/H)ⁿ] of all bins, and of order 0."""
     result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
@@ -119,7 +119,7 @@ def _near(grid: Grid, components: int) -> NDArray[np.int64]:
 
 
 def _powers_at(
-    spectra: Spectra,
+    spectra: PatchSpectra,
     grid: Grid,
     expansion: Expansion,
     interval: int,
@@ -138,7 +138,7 @@ def _powers_at(
 
 
 def _amplitudes_at(
-    spectra: Spectra,
+    spectra: PatchSpectra,
     grid: Grid,
     expansion: Expansion,
     interval: int,

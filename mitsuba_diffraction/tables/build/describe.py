@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ...heights.coherence import repeats, width_reason
+from ...heights.coherence import TAPER_SHARE, repeats, width_reason
 from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
 from .spectrum import Spectrum
-from .windows import Windows
+from .windows import Windows, extent_of, shape_of
 
 # Points along a side of the windows whose roughness stands for that of a large patch.
 _PART = 2048
@@ -42,10 +42,11 @@ def describe(patches: Sequence[HeightField], settings: TableSettings) -> dict[st
             "number": len(windows),
             "along x, y": windows.counts,
             "extent": list(windows[0].extent),
-            "standard_error": windows.standard_error(coherence_width),
         }
-    elif len(scans) > 1:
-        source["variation"] = _variation(scans)
+        if len(windows) > 1:
+            source["windows"]["standard_error"] = windows.standard_error(coherence_width)
+    if len(scans) == len(patches) > 1:
+        source["variation"] = _variation(patches)
     return source
 
 
@@ -58,7 +59,7 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
         if patch.heights.size <= LARGE:
             roughness.append(ScaleRoughness.from_heights(patch.heights, patch.pixel_size))
         else:
-            roughness.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
+            roughness.append(ScaleRoughness.mean(_parts(_whole(patch)).roughness()))
     return ScaleRoughness.mean(roughness).table(q_max)
 
 
@@ -66,18 +67,24 @@ def _parts(windows: Windows) -> Windows:
     """Windows small enough for transforms, which take ten times their memory."""
     if max(windows.shape) <= _PART:
         return windows
-    return Windows(windows.scans, _PART * min(windows.scans[0].pixel_size))
+    width = _PART * min(windows.scans[0].pixel_size)
+    return Windows(windows.scans, width, width / math.sqrt(TAPER_SHARE))
+
+
+def _whole(patch: HeightField) -> Windows:
+    width = max(patch.extent)
+    return Windows([patch], width, width / math.sqrt(TAPER_SHARE))
 
 
 def _variation(patches: Sequence[HeightField]) -> float:
     kappa = 2.0 * float(wavenumber(_GREEN))
     reach = 2.0 * float(wavenumber(_GREEN)) / (2 * np.pi)
-    extent = patches[0].extent
-    last = tuple(
-        int(min(reach * length, max(p.shape[axis] for p in patches) // 2))
-        for axis, length in ((1, extent[0]), (0, extent[1]))
+    ny, nx = shape_of(patches)
+    x, y = extent_of(patches)
+    last = int(min(reach * x, nx // 2)), int(min(reach * y, ny // 2))
+    spectra = (
+        patches.spectrum(n, last) if isinstance(patches, Windows) else Spectrum(patch, last)
+        for n, patch in enumerate(patches)
     )
-    powers = np.stack(
-        [np.abs(Spectrum(p, (last[0], last[1])).of_phase(kappa)) ** 2 for p in patches]
-    )
+    powers = np.stack([np.abs(spectrum.of_phase(kappa)) ** 2 for spectrum in spectra])
     return float(powers.std(axis=0, ddof=1).sum() / powers.mean(axis=0).sum())

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..expansion import Expansion
 from ..layout import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
-from .powers import Spectra
+from .powers import PatchSpectra
 from .spectrum import GLOSSY_RADIUS
 
 #: A part that vanishes at some κ is compared with this share of its largest value.
@@ -46,7 +46,7 @@ class ErrorMeter:
     Several spectra are of several patches, whose powers are averaged.
     """
 
-    def __init__(self, spectra: Spectra, grid: Grid, expansion: Expansion) -> None:
+    def __init__(self, spectra: PatchSpectra, grid: Grid, expansion: Expansion) -> None:
         self.spectra, self.grid, self.expansion = spectra, grid, expansion
         spectrum = spectra.first
         self._real, self._outer = spectrum.real_type, spectrum.last

@@ -6,7 +6,9 @@ the same, to the last bit, with any number of workers.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,6 +22,8 @@ from .windows import Windows
 
 #: Bytes of sums that a batch of windows gives at once: of several κ, for which it is read once.
 _GROUP = 2**26
+#: Windows that are transformed at a time: each holds its powers at several κ.
+_MOST_THREADS = 8
 
 
 @dataclass
@@ -62,7 +66,7 @@ class Power:
         return Power(self.bins, self.change / count, self.order_0 / count)
 
 
-class Spectra:
+class PatchSpectra:
     """Transforms of patches.
 
     Parameters
@@ -82,8 +86,11 @@ class Spectra:
         self.tick, self._patches = tick, patches
         self._of = last, double
         self._batches = patches.batches() if isinstance(patches, Windows) else []
-        whole = [patches[0]] if self._batches else patches
-        self._spectra = [Spectrum(patch, last, double) for patch in whole]
+        self._spectra = (
+            [patches.spectrum(0, last, double)]
+            if isinstance(patches, Windows)
+            else [Spectrum(patch, last, double) for patch in patches]
+        )
 
     @property
     def first(self) -> Spectrum:
@@ -122,8 +129,21 @@ class Spectra:
 def _batch_sums(
     last: tuple[int, int], double: bool, kappas: tuple[float, ...], windows: Windows
 ) -> list[Power]:
-    """Sums over some windows, one for every κ."""
-    return _sums((windows.spectrum(n, last, double) for n in range(len(windows))), kappas)
+    """Sums over some windows, one for every κ; as many windows at a time as there are threads."""
+    threads = min(os.cpu_count() or 1, _MOST_THREADS, len(windows))
+    if threads == 1:
+        return _sums((windows.spectrum(n, last, double) for n in range(len(windows))), kappas)
+
+    def powers_of(n: int) -> list[Power]:
+        spectrum = windows.spectrum(n, last, double, threaded=False)
+        return [Power.of(spectrum, kappa) for kappa in kappas]
+
+    total: list[Power] = []
+    with ThreadPoolExecutor(threads) as pool:
+        for start in range(0, len(windows), threads):
+            for powers in pool.map(powers_of, range(start, min(start + threads, len(windows)))):
+                _add(total, powers)
+    return total
 
 
 def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -35,7 +36,10 @@ class Spectrum:
     last : (jx, jy), the outermost bins wanted.
     double : compute in double precision instead of single.
     tapers : along y and x, of mean square 1, what f without its mean fades with: bin 0 is then the
-        mean, and all others are of the rest. None along an axis, or altogether, for no fading.
+        mean, weighted by the tapers, and all others are of the rest. None along an axis, or
+        altogether, for no fading.
+    tile : (ny, nx), number of points that screens are filled up to with zeros.
+    threaded : whether a transform may use several threads.
     """
 
     def __init__(
@@ -44,6 +48,8 @@ class Spectrum:
         last: tuple[int, int],
         double: bool = False,
         tapers: Tapers = (None, None),
+        tile: tuple[int, int] | None = None,
+        threaded: bool = True,
     ) -> None:
         self.real_type: Any = np.float64 if double else np.float32
         self.complex_type: Any = np.complex128 if double else np.complex64
@@ -53,9 +59,9 @@ class Spectrum:
         self.heights = np.empty(field.shape, self.real_type)
         middle = 0.5 * (highest + lowest)
         np.subtract(field.heights, middle, out=self.heights, dtype=np.float64, casting="same_kind")
-        self.last = last
-        self._columns = _Crop(self.heights.shape[1], last[0])
-        self._rows = _Crop(self.heights.shape[0], last[1])
+        self.last, self._tile, self._threaded = last, tile or field.shape, threaded
+        self._columns = _Crop(self._tile[1], last[0])
+        self._rows = _Crop(self._tile[0], last[1])
         self._tapers = None if tapers[0] is None and tapers[1] is None else self._filled(tapers)
 
     @property
@@ -85,56 +91,64 @@ class Spectrum:
         """DFT of function(h), which is applied to blocks of rows of the centred heights (µm)."""
         ny = self.heights.shape[0]
         half = np.empty((ny, len(self._columns.bins)), self.complex_type)
-        sums = np.zeros(-(-ny // _ROWS), np.complex128)
         result = np.zeros(self.shape, self.complex_type)
+        faded, mean = (None, 0.0) if self._tapers is None else self._faded(function)
 
         def along_x(start: int) -> None:
-            block = function(self.heights[start : start + _ROWS]).astype(
-                self.complex_type, copy=False
-            )
-            if self._tapers is not None:
-                sums[start // _ROWS] = block.sum(dtype=np.complex128)
-                block *= self._tapers[0][start : start + _ROWS, None]
-                block *= self._tapers[1]
-            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
-            half[start : start + _ROWS] = lines[:, self._columns.source]
+            rows = slice(start, start + _ROWS)
+            block = function(self.heights[rows]) if faded is None else faded[rows]
+            block = block.astype(self.complex_type, copy=False)
+            lines = scipy.fft.ifft(block, self._tile[1], axis=1, overwrite_x=True)
+            half[rows] = lines[:, self._columns.source]
 
         def along_y(start: int) -> None:
             block = np.ascontiguousarray(half[:, start : start + _ROWS].T)
-            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
+            lines = scipy.fft.ifft(block, self._tile[0], axis=1, overwrite_x=True)
             wanted = lines[:, self._rows.source].T
             columns = self._columns.target[start : start + _ROWS]
             result[self._rows.target[0] : self._rows.target[-1] + 1, columns] = wanted
 
         blocks = range(0, ny, _ROWS), range(0, half.shape[1], _ROWS)
-        small = self.heights.size < _SMALL  # threads would take longer to start
-        with nullcontext() if small else ThreadPoolExecutor(os.cpu_count()) as pool:
+        # threads would take longer to start
+        alone = not self._threaded or self.heights.size < _SMALL
+        with nullcontext() if alone else ThreadPoolExecutor(os.cpu_count()) as pool:
             for work, starts in zip((along_x, along_y), blocks, strict=True):
                 list((pool.map if pool else map)(work, starts))
-        return self._mean_apart(result, sums)
+        if faded is not None:
+            result[self.last[1], self.last[0]] = mean
+        return result
+
+    def _faded(
+        self, function: Callable[[NDArray[Any]], NDArray[Any]]
+    ) -> tuple[NDArray[np.complexfloating], complex]:
+        """Return c·w·(f − a), and a = Σ w² f / Σ w².
+
+        With this mean |a|² and the powers of w·(f − a) add up to the mean of |f|² under w². In bin
+        0 a replaces what is left, which c makes up for.
+        """
+        assert self._tapers is not None
+        y, x = self._tapers
+        values = function(self.heights).astype(self.complex_type, copy=False)
+        # in double precision: orders are small beside a mean of nearly 1
+        wide_y, wide_x = (np.square(taper, dtype=np.float64) for taper in (y, x))
+        mean = complex(wide_y @ (values @ wide_x)) / float(wide_y.sum() * wide_x.sum())
+        values -= self.complex_type(mean)
+        values *= y[:, None]
+        values *= x
+        points = math.prod(self._tile)
+        power = float(np.vdot(values, values).real) / points
+        left = abs(complex(values.sum(dtype=np.complex128)) / points) ** 2
+        if power > left:
+            values *= self.real_type(math.sqrt(power / (power - left)))
+        return values, mean
 
     def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:
+        # of mean square 1 over the tile, so that powers add up to the screen's (Parseval)
         y, x = (
-            np.ones(n) if taper is None else taper
-            for n, taper in zip(self.heights.shape, tapers, strict=True)
+            np.ones(n) if taper is None else taper * np.sqrt(tile / n)
+            for n, taper, tile in zip(self.heights.shape, tapers, self._tile, strict=True)
         )
         return y.astype(self.real_type), x.astype(self.real_type)
-
-    def _mean_apart(
-        self, result: NDArray[np.complexfloating], sums: NDArray[np.complex128]
-    ) -> NDArray[np.complexfloating]:
-        """From the transform of w·f, that of w·(f − mean), with the mean in bin 0."""
-        if self._tapers is None:
-            return result
-        mean = sums.sum() / self.heights.size
-        y, x = (
-            scipy.fft.ifft(taper.astype(np.float64))[crop.source]
-            for taper, crop in zip(self._tapers, (self._rows, self._columns), strict=True)
-        )
-        rows, columns = self._rows.target, self._columns.target
-        result[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] -= np.outer(mean * y, x)
-        result[self.last[1], self.last[0]] = mean
-        return result
 
 
 class _Crop:

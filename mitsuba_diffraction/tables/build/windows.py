@@ -1,13 +1,12 @@
-"""A scan much wider than the coherence window, as overlapping windows whose powers are averaged.
+"""A scan seen through tapered windows, whose powers are averaged.
 
-Welch's method (1967, IEEE Transactions on Audio and Electroacoustics 15, 70) for the screen
-exp(iκh): windows overlap by half, each is levelled, and what is left of its screen once the mean is
-taken out fades at the edges (Hann, of mean square 1), so that the seams of the tiles diffract
-nothing. The mean itself is order 0, and has no seams. Windows are cut out when they are asked for:
-memory does not grow with the scan.
-
-A Hann window L wide widens every lobe. Its power has the variance 1/3 in bins of 2π/L, the
-coherence window's 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 19 % wider.
+A scan is part of a larger surface: its edges do not meet, so it must not tile the plane. Windows
+W = 4σ wide overlap by half (Welch 1967, IEEE Transactions on Audio and Electroacoustics 15, 70);
+`heights.coherence` has their width and their places. The mean of a window's phase screen exp(iκh),
+weighted with its taper's square, is order 0. The rest fades with a Gaussian taper and is filled up
+with zeros to 2 W, so that orders lie π/W apart and no edge meets another. The look-up's window is
+wider by as much as the taper is narrow, 1/σ² = 1/σ_t² + 1/σ_l²: an order's lobe is that of σ.
+Windows are cut out when they are asked for: memory does not grow with the scan.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...heights.coherence import window_corners, window_places
 from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
 from ...optics.blend import ScaleRoughness
@@ -31,10 +31,6 @@ from ...settings import TableSettings
 from ..table import build_error
 from .spectrum import GLOSSY_RADIUS, Spectrum
 
-#: Width of a window, in coherence widths, of `windows="auto"`.
-AUTO = 2.0
-#: An axis with less than so many windows' widths is one window, as wide as the scan and untapered.
-_WIDE = 1.5
 #: Windows that the roughness by spatial frequency is taken from, which is smooth.
 _ROUGHNESS_OF = 16
 _GREEN = 550.0  # nm, where the standard error is stated
@@ -48,38 +44,44 @@ Run = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 @dataclass(frozen=True)
 class _Axis:
-    """Where windows lie along one axis of a scan, in pixels; `taper` is None for a single one."""
+    """Where windows lie along one axis of a scan, in pixels.
+
+    Attributes
+    ----------
+    starts, length, tile : first pixels of the windows, their length, and that with zeros.
+    taper : of mean square 1; None along an axis without any change of height.
+    """
 
     starts: Sequence[int]
     length: int
+    tile: int
     taper: Reals | None
 
     @classmethod
-    def of(cls, pixels: int, wanted: float) -> _Axis:
-        if pixels < _WIDE * wanted:
-            return cls([0], pixels, None)
-        length = int(scipy.fft.next_fast_len(round(wanted)))
-        count = 1 + max(1, round((pixels - length) / (0.5 * length)))
-        starts = np.linspace(0, pixels - length, count).round().astype(int).tolist()
-        taper = np.hanning(length + 1)[:-1]
-        return cls(starts, length, taper / np.sqrt(np.mean(taper**2)))
+    def of(cls, pixels: int, window: float, deviation: float) -> _Axis:
+        """Windows some `window` pixels long; `deviation` is σ of the taper."""
+        starts, length = window_places(pixels, window)
+        place = np.arange(length) - 0.5 * (length - 1)
+        taper = np.exp(-0.5 * np.square(place / deviation))
+        return cls(starts, length, 2 * length, taper / np.sqrt(np.mean(taper**2)))
 
-    @property
-    def variance_factor(self) -> float:
-        """Variance of the mean over the windows of one: 1/n if they were independent (Welch)."""
+    @classmethod
+    def even(cls, pixels: int) -> _Axis:
+        """The one window of an axis without any change of height, which tiles."""
+        return cls([0], pixels, pixels, None)
+
+    def alike(self) -> Reals:
+        """Share that the powers of two windows have in common, by how many steps they are apart."""
         count = len(self.starts)
-        if self.taper is None:
-            return 1.0
+        if count == 1 or self.taper is None:
+            return np.eye(count)[0]
         step = (self.starts[-1] - self.starts[0]) / (count - 1)
-        total = 1.0
-        for n in range(1, count):
-            shift = round(n * step)
-            if shift >= self.length:
-                break
-            overlap = float(np.mean(self.taper[shift:] * self.taper[: self.length - shift]))
-            overlap *= (self.length - shift) / self.length
-            total += 2.0 * (1.0 - n / count) * overlap**2
-        return total / count
+        shares = np.zeros(count)
+        for n in range(count):
+            left = max(0, self.length - round(n * step))
+            overlap = self.taper[self.length - left :] @ self.taper[:left]
+            shares[n] = (overlap / self.length) ** 2
+        return shares
 
 
 class Windows(Sequence[HeightField]):
@@ -88,36 +90,43 @@ class Windows(Sequence[HeightField]):
     Parameters
     ----------
     scans : with pixels of one size.
-    width : of a window, µm.
+    width, taper_width : of a window, and 4σ of its taper, µm.
     run : what does the work of batches, as `map` does here.
 
     Attributes
     ----------
-    tapers : along y and x, of mean square 1; None where a window is as wide as its scan.
+    shape, tile : (ny, nx) of a window, and of its screen with zeros around it.
+    tapers : along y and x, of mean square 1; None where heights do not change.
     variance_factor : variance of the mean over all windows, of one window's.
     """
 
-    def __init__(self, scans: Sequence[HeightField], width: float, run: Run = map) -> None:
+    def __init__(
+        self, scans: Sequence[HeightField], width: float, taper_width: float, run: Run = map
+    ) -> None:
         self.scans, self.run = list(scans), run
+        changes = [any(scan.varies_along(axis) for scan in scans) for axis in (0, 1)]
+
+        def axis_of(pixels: int, pixel: float, varies: bool) -> _Axis:
+            if not varies:
+                return _Axis.even(pixels)
+            return _Axis.of(pixels, width / pixel, sigma_of(taper_width) / pixel)
+
         axes = [
-            [_Axis.of(n, width / d) for n, d in zip(s.shape, self._pixels, strict=True)]
-            for s in scans
+            [axis_of(*each) for each in zip(scan.shape, self._pixels, changes, strict=True)]
+            for scan in self.scans
         ]
         self._check(axes)
         self._places = [
             (scan, top, left)
             for scan, (along_y, along_x) in zip(self.scans, axes, strict=True)
-            for top in along_y.starts
-            for left in along_x.starts
+            for top, left in window_corners(along_y.starts, along_x.starts)
         ]
         self.shape = axes[0][0].length, axes[0][1].length
+        self.tile = axes[0][0].tile, axes[0][1].tile
         self.tapers = axes[0][0].taper, axes[0][1].taper
+        self._several = [any(len(each[n].starts) > 1 for each in axes) for n in (0, 1)]
         self.counts = [(len(x.starts), len(y.starts)) for y, x in axes]
-        weights = [nx * ny / len(self) for nx, ny in self.counts]
-        self.variance_factor = sum(
-            w**2 * y.variance_factor * x.variance_factor
-            for w, (y, x) in zip(weights, axes, strict=True)
-        )
+        self.variance_factor = sum(_pairs(y, x) for y, x in axes) / len(self) ** 2
 
     def _check(self, axes: Sequence[Sequence[_Axis]]) -> None:
         first = self.scans[0]
@@ -145,10 +154,10 @@ class Windows(Sequence[HeightField]):
         heights.setflags(write=False)  # so that it is not copied once more
         slopes, (dx, dy) = plane_of(HeightField(heights, scan.pixel_size)), scan.pixel_size
         heights.setflags(write=True)
-        # A tilt turns the mirror direction; an axis of one window is periodic, and its own
-        if self.tapers[1] is not None:
+        # A tilt turns the mirror direction; a scan of one window has been levelled, or is not to be
+        if self._several[1]:
             heights -= slopes[0] * dx * np.arange(nx)
-        if self.tapers[0] is not None:
+        if self._several[0]:
             heights -= (slopes[1] * dy * np.arange(ny))[:, None]
         heights.setflags(write=False)
         return HeightField(heights, scan.pixel_size, name=f"{scan.name}, window {n + 1}")
@@ -156,7 +165,7 @@ class Windows(Sequence[HeightField]):
     def batches(self) -> list[Windows]:
         """All windows, some neighbours at a time; the same whoever does their work."""
         ny, nx = self.shape
-        most = 1 + max(0, int((BATCH_POINTS / ny - nx) / (0.5 * nx)))
+        most = max(1, int(BATCH_POINTS / (ny * nx)))
         batches = []
         for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
             places = list(row)
@@ -176,9 +185,11 @@ class Windows(Sequence[HeightField]):
         places = [(part, y - int(top), x - int(left)) for _, y, x in self._places]
         return {**self.__dict__, "scans": [part], "_places": places, "run": map}
 
-    def spectrum(self, n: int, last: tuple[int, int], double: bool = False) -> Spectrum:
+    def spectrum(
+        self, n: int, last: tuple[int, int], double: bool = False, threaded: bool = True
+    ) -> Spectrum:
         """Transforms of one window."""
-        return Spectrum(self[n], last, double, self.tapers)
+        return Spectrum(self[n], last, double, self.tapers, self.tile, threaded)
 
     def standard_error(self, coherence_width: float) -> dict[str, float]:
         """Relative standard error of the mean over windows, from their scatter.
@@ -187,8 +198,8 @@ class Windows(Sequence[HeightField]):
         directions, near order 0 and in all others, as a table's own error is summed.
         """
         sigma, kappa = sigma_of(coherence_width), 2.0 * float(wavenumber(_GREEN))
-        bins = [2.0 * math.pi / (n * d) for n, d in zip(self.shape, self._pixels, strict=True)]
-        last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.shape, strict=True)]
+        bins = [2.0 * math.pi / (n * d) for n, d in zip(self.tile, self._pixels, strict=True)]
+        last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.tile, strict=True)]
         lobe = [1.0 / (math.sqrt(2.0) * sigma * q) for q in bins]
         scatter = partial(_scatter, (last[1], last[0]), kappa, lobe)
         count, mean, squares = 0, np.zeros(1), np.zeros(1)
@@ -229,6 +240,21 @@ class Windows(Sequence[HeightField]):
         return dy, dx
 
 
+def _pairs(along_y: _Axis, along_x: _Axis) -> float:
+    """Sum the share in common over all pairs of windows of a scan, with itself too (Welch 1967).
+
+    For independent windows it is their number.
+    """
+    corners = window_corners(range(len(along_y.starts)), range(len(along_x.starts)))
+    taken = np.zeros((len(along_y.starts), len(along_x.starts)))
+    taken[tuple(np.transpose(corners))] = 1.0
+    shares = (np.concatenate([a[:0:-1], a]) for a in (along_y.alike(), along_x.alike()))
+    if taken.size == 1:
+        return 1.0
+    both = scipy.signal.fftconvolve(taken, np.outer(*shares), mode="same")
+    return float((taken * both).sum())
+
+
 def _scatter(
     last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Windows
 ) -> tuple[int, Reals, Reals]:
@@ -246,31 +272,33 @@ def _scatter(
 def windows_of(
     scans: Sequence[HeightField], settings: TableSettings, run: Run = map
 ) -> Sequence[HeightField]:
-    """The windows of scans as `settings.windows` has them; the scans where none is wide enough.
+    """Return the windows of scans by resolved settings; the patches if they tile the plane.
 
     run : what does their work.
 
     Raises a DiffractionError if their powers cannot be averaged.
     """
-    if settings.windows is None or not scans:
+    if settings.taper_width is None or not scans:
         return scans
     if settings.coherent or settings.basis == "taylor":
         raise build_error(
             "windows have their powers averaged, which coherence='patch' and basis='taylor' "
             "cannot; use coherence='ensemble' and basis='svd', or leave windows out"
         )
-    width = settings.windows
-    if isinstance(width, str):
-        width = AUTO * settings.width
-    if min(width / d for d in scans[0].pixel_size) < 4:
-        return scans  # pixels so coarse that something else is wrong
-    windows = Windows(scans, width, run)
-    return scans if len(windows) == len(scans) else windows
+    return Windows(scans, settings.width, settings.taper_width, run)
+
+
+def extent_of(patches: Sequence[HeightField]) -> tuple[float, float]:
+    """Period (x, y) of the transforms, µm: of a patch, or of a window with its zeros."""
+    if not isinstance(patches, Windows):
+        return patches[0].extent
+    (dx, dy), (ny, nx) = patches.scans[0].pixel_size, patches.tile
+    return nx * dx, ny * dy
 
 
 def shape_of(patches: Sequence[HeightField]) -> tuple[int, int]:
     """The largest (ny, nx) of all patches."""
     if isinstance(patches, Windows):
-        return patches.shape
+        return patches.tile
     ny, nx = np.max([patch.shape for patch in patches], axis=0)
     return int(ny), int(nx)

@@ -29,7 +29,7 @@ from .conserved import Reflector, Transmitter
 from .gain import thick
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
-from .transport import Orders, ScatteredLight, Transport
+from .transport import ScatteredLight, ScatteredOrders, Transport
 
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
@@ -102,7 +102,7 @@ class SurfaceEnergy:
         if isinstance(material, Reflector):
             finer += thick(material.index(np.array(table.wavelength_range[:1])))
         light = wavelength_range or table.wavelength_range
-        self.orders = Orders(table, light, height_scale, material.densest, finer)
+        self.orders = ScatteredOrders(table, light, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))

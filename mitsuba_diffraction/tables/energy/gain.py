@@ -28,7 +28,7 @@ FARTHEST = 2.0
 
 
 @dataclass(frozen=True)
-class Gain:
+class PathGain:
     """G of a path at one wavelength.
 
     Attributes

@@ -72,7 +72,7 @@ def test_the_choices_are_those_of_the_code(some_variant):
     choices = {
         "fill": ("none", *preprocess.FILLS),
         "level": ("auto", "none", *options.LEVELS),
-        "periodic": ("auto", "none", *options.PERIODICS),
+        "periodic": ("auto", *options.PERIODICS),
         "shadowing": SHADOWINGS,
         "basis": (*BASES, "auto"),
     }

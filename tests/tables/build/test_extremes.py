@@ -96,7 +96,7 @@ def check(seed: int, table: DiffractionTable, field: HeightField, asked: dict[st
     exact = np.array(
         [
             screen_power(
-                np.exp(1j * a), field.pixel_size, qx, qy, Sigmas.same(sigma), asked["coherence"]
+                np.exp(1j * a), field.pixel_size, qx, qy, Sigmas(sigma, sigma), asked["coherence"]
             )
             for a, qx, qy in zip((k * w)[:, None, None] * field.heights, k * u, k * v, strict=True)
         ]

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.tables.energy.conserved import Transmitter
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from tests.support.directions import rough_patch
 
 PATHS = [
@@ -23,7 +23,7 @@ PATHS = [
 def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
     patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
     exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
-    gain = Gain(path, exact.table(50.0), 11.0, 1.0)
+    gain = PathGain(path, exact.table(50.0), 11.0, 1.0)
     rng = np.random.default_rng(4)
     cos_i, cos_o = rng.uniform(0.4, 0.98, (2, 400))
     turn = rng.uniform(-np.pi, np.pi, 400)

@@ -12,6 +12,7 @@ transmission   orders that go through, and the sum of reflected and transmitted 
 conductor      a perfect conductor
 solutions      accuracy of the rigorous solutions
 numerics       closed forms and random surfaces
+scans          hues of scanned gratings, and crops of a rough surface
 plots          pictures
 markdown       tables and numbers
 """

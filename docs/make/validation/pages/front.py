@@ -207,6 +207,7 @@ def _tables() -> str:
         ["[perfect conductor](validation/conductor.md)", "Kirchhoff's model alone"],
         ["[numerics](validation/numerics.md)", "closed forms, random surfaces"],
         ["[rigorous solutions](validation/solutions.md)", "solvers, convergence, agreement"],
+        ["[scans](validation/scans.md)", "hues of scanned gratings, crops of a rough surface"],
     ]
     return f"""## The tables
 

@@ -20,6 +20,7 @@ from . import (
     numerics,
     orders,
     plots,
+    scans,
     solutions,
     surfaces,
     transmission,
@@ -37,6 +38,7 @@ PAGES: dict[str, Callable[[Measurements], str]] = {
     "conductor": conductor.write,
     "numerics": numerics.write,
     "solutions": solutions.write,
+    "scans": scans.write,
 }
 
 _EXAMPLES = (

@@ -152,9 +152,12 @@ class Target {
 }
 
 // Constants of a table of orders for a coherence width times a factor of at most 1. The window of
-// orders other than the mirror's is narrower than that already where the patch is.
-function narrower({ sigma, order_0_ratio = 1, area_factor }, factor) {
-  const mirror = factor * sigma * Math.sqrt(order_0_ratio), others = Math.min(sigma, mirror);
+// orders other than the mirror's is narrower than that already where the patch is. The taper of a
+// scan's windows stays, and the look-up makes up for it.
+function narrower({ sigma, order_0_ratio = 1, area_factor, inverse_taper = 0 }, factor) {
+  const mirror = factor * sigma * Math.sqrt(order_0_ratio);
+  const seen = Math.min((sigma ** -2 + inverse_taper) ** -0.5, mirror);
+  const others = (seen ** -2 - inverse_taper) ** -0.5;
   return { sigma: others, order_0_ratio: (mirror / others) ** 2, area_factor: area_factor * (others / sigma) ** 2 };
 }
 

@@ -1,0 +1,60 @@
+"""docs/validation/scans.md: hues of scanned gratings, and crops of a rough surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scans import BESIDE, LIGHT, crops, random_hues
+from .markdown import percent, table
+from .measurements import Measurements
+
+
+def write(measured: Measurements) -> str:
+    """Write the page."""
+    return "\n\n".join([_hues(6 if measured.quick else 300), _crops(measured.quick)])
+
+
+def _hues(count: int) -> str:
+    found = random_hues(count)
+    hue, peak = (np.abs([getattr(one, name) for one in found]) for name in ("hue", "peak"))
+    width = np.array([one.width for one in found])
+    rows = [
+        [name, percent(np.quantile(values, 0.95)), percent(values.max())]
+        for name, values in (("mean wavelength above half height", hue), ("highest point", peak))
+    ]
+    low, high = np.quantile(width, [0.05, 0.95])
+    return f"""# Scans
+
+A scan is a part of a larger surface. The package sees it through windows that fade towards their
+edges ([theory.md](../theory.md#scans)). Two surfaces whose light is known show what that costs;
+values are of `md.reference.brdf`.
+
+## Hues of gratings
+
+{count} random sinusoids, scans of 10 to 65 µm with 3 to 40 periods, turned by 0 to 45°, light from
+{LIGHT:g}°, detector at the normal. Deviation from the closed form J_m² under the light's window:
+
+{table(["", "95 % are below", "largest"], rows)}
+
+Peaks are {percent(width.mean() - 1.0)} wider than through the light's window on average, 90 % of
+them {percent(low - 1.0)} to {percent(high - 1.0)}. Orders of a window of width W lie π/W apart;
+between them a look-up has ripples, which move the highest point, and the window ends where its
+taper is still 0.22."""
+
+
+def _crops(quick: bool) -> str:
+    few = {"count": 3, "degrees": (10.0,), "wavelengths": np.array([500.0, 600.0])}
+    found = crops(**few) if quick else crops(degrees=BESIDE)  # type: ignore[arg-type]
+    rows = [
+        [f"{one.degrees:g}°", f"{one.ratio:.2f}", f"{one.worst:.2f}", f"{one.scatter:.2f}"]
+        for one in found
+    ]
+    return f"""## Crops of a rough surface
+
+Crops of 10 µm, levelled, of rough ridges over the whole, 133 µm, under the same window. Light from
+30°, 430 to 800 nm. *Mean* is over crops and wavelengths, *colour* the largest ratio of the mean
+crop at a wavelength, *scatter* the standard deviation of single crops.
+
+{table(["from the mirror", "mean", "colour", "scatter"], rows)}
+
+Light within 7° of the mirror is of waves longer than a crop."""
