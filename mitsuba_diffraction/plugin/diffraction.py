@@ -343,7 +343,7 @@ class Diffraction(DiffractingSurface):
         if self.coat is not None:
             yield self.optical_refusal(self.coat.eta, "coat_eta", "coat_ior")
         if self.nested is not None and self.boundary.material.absorbs:
-            yield read.refusal(Feature.NESTED.phrase(), "film_k above 0, which absorbs its light")
+            yield read.refusal(Feature.NESTED.phrase(), Feature.OPAQUE.phrase())
 
     def kernel_constants(self) -> tuple[object, ...]:
         """See `PluginBSDF.kernel_constants`."""
