@@ -7,8 +7,8 @@ import hashlib
 import os
 import platform
 import re
+import secrets
 import stat
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,8 +30,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.
 
-    What is written is on the disk before it is renamed. Writers that swallow errors when they close
-    a file, such as Mitsuba's and OpenEXR's, encode to memory, and Python writes.
+    The content is on the disk before the file is renamed. Of writers that lose errors when they
+    close a file, Mitsuba's pictures are encoded to memory, and other files are read back.
 
     Raises a DiffractionError as `check_target` does, if the folder is missing or cannot be written,
     or the disk is full.
@@ -40,26 +40,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     check_target(target)
     remove_abandoned(target.parent, re.escape(target.stem[:_STEM]), target.suffix)
     try:
-        handle, name = tempfile.mkstemp(
-            dir=target.parent,
-            prefix=f".{target.stem[:_STEM]}.{_HOST}-{os.getpid()}-",
-            suffix=target.suffix,
-        )
+        temporary = _created(target)
     except OSError as error:
         raise DiffractionError(
             f"cannot write '{target}': {error.strerror}; choose a folder that exists and can be "
             "written to"
         ) from error
-    os.close(handle)
-    temporary = Path(name)
     _in_use.add(temporary)
     try:
         yield temporary
         _flush(temporary)
-        # mkstemp makes private files; a finished result follows the user's umask like any other
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
         _replace(temporary, target)
         note_output(target)
     except OSError as error:
@@ -70,6 +60,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         with contextlib.suppress(PermissionError):  # on Windows, a file that a writer left open
             temporary.unlink(missing_ok=True)
         _in_use.discard(temporary)
+
+
+def _created(target: Path) -> Path:
+    """Create a temporary file for a target, with the permissions of any new file."""
+    while True:
+        name = f".{target.stem[:_STEM]}.{_HOST}-{os.getpid()}-{secrets.token_hex(4)}{target.suffix}"
+        path = target.with_name(name)
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            return path
 
 
 def check_target(target: Path) -> None:

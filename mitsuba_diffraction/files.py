@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import stat
+import tomllib
 from enum import StrEnum
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from .errors import DiffractionError, quoted
+from .errors import DiffractionError, one_line, quoted
 from .inputs import note_input
-from .limits import LARGEST_FILE, LARGEST_TEXT
+from .limits import LARGEST_FILE, LARGEST_TEXT, MOST_KEY_PARTS
 
 #: Attribute of an EXR file that makes it a table; the JSON in it holds everything but coefficients.
 TABLE_ATTRIBUTE = "mitsuba_diffraction"
@@ -64,6 +66,9 @@ _SUFFIXES = {
     **dict.fromkeys((".png", ".bmp", ".tif", ".tiff"), FileKind.IMAGE),
     **dict.fromkeys((".txt", ".csv", ".tsv", ".xyz"), FileKind.TEXT),
 }  # fmt: skip
+# Keys of TOML with more parts; possessive, so that the search takes a step for each letter
+_KEY = r"""(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_KEY = re.compile(f"(?:{_KEY}){{{MOST_KEY_PARTS}}}")
 # Private tags of TIFF files with physical heights: of Park Systems, and JPK's length of a scan.
 _INSTRUMENT_TAGS = {50432, 0x8042}
 
@@ -187,6 +192,36 @@ def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
         return read_bytes(path, largest).decode("utf-8")
     except UnicodeDecodeError as error:
         raise DiffractionError(f"{os.fspath(path)!r} is not text (UTF-8)") from error
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a TOML file, whose whole numbers fit 64 bits, as TOML has them.
+
+    Raises a DiffractionError as `read_text` does, or if the file is not TOML.
+    """
+    text = read_text(path)
+    if long := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long.start()) + 1
+        raise DiffractionError(
+            f"{os.fspath(path)!r}, line {line}: a key may have {MOST_KEY_PARTS} parts with dots "
+            "between"
+        )
+    try:
+        content = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # ValueError: also numbers of 5,000 digits
+        raise DiffractionError(
+            f"{os.fspath(path)!r} is not TOML: {one_line(str(error)).partition(';')[0]}"
+        ) from error
+    waiting: list[Any] = [content]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict | list):
+            waiting += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise DiffractionError(
+                f"{os.fspath(path)!r} is not TOML: the number {quoted(value)} exceeds 64 bits"
+            )
+    return content
 
 
 def refuse_pipe(path: Path) -> None:

@@ -24,8 +24,8 @@ LARGEST_FILE = 1 << 32
 LARGEST_TEXT = 1_000_000
 #: Bytes of a CSV of efficiencies: two million lines.
 LARGEST_LISTING = 100_000_000
-#: Characters of a line of a grid of heights.
-LONGEST_LINE = 4_000_000
+#: Characters of a line in a text of heights.
+LONGEST_LINE = 1_000_000
 #: Bytes that every file may unpack to. A larger content needs a file of more than one byte for each
 #: `MOST_COMPRESSED` bytes: deflate packs zeros 1000 to 1, and measurements less than 10 to 1.
 SMALL_CONTENT, MOST_COMPRESSED = 1 << 29, 200
@@ -33,6 +33,10 @@ SMALL_CONTENT, MOST_COMPRESSED = 1 << 29, 200
 LARGEST_MEMBER_TEXT = 1 << 25
 #: Pixels of heights: 16384², 2 GiB.
 MOST_PIXELS = 1 << 28
+#: Parts of a dotted key in a TOML file; Python's reader takes the square of it in steps.
+MOST_KEY_PARTS = 32
+#: Patches of a recipe: its sources, or seeds.
+MOST_PATCHES = 1000
 #: Layers of a stack, repetitions included.
 MOST_LAYERS = 1000
 #: Numbers in a file of efficiencies, or a table of orders.

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mitsuba_diffraction.atomic import atomic_path, remove_temporaries
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.tables import exr
+from tests.support.systems import posix
 
 KILLED = """
 import os, sys
@@ -83,3 +88,47 @@ def test_a_target_that_a_program_holds_open_is_one_line_and_stays(tmp_path, monk
         path.write_text("after")
     assert target.read_text() == "before"
     assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_what_the_disk_refuses_late_leaves_what_was_there(tmp_path, monkeypatch):
+    """Network file systems and some local ones tell of a full disk when the file is flushed."""
+    target = tmp_path / "a.txt"
+    target.write_text("before")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(DiffractionError, match="No space left"), atomic_path(target) as path:
+        path.write_text("after")
+    assert target.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_writer_that_loses_the_error_of_a_full_disk_is_found_out(tmp_path, monkeypatch):
+    """OpenEXR closes its file without a word where the last buffer does not fit."""
+    target = tmp_path / "a.exr"
+    target.write_text("before")
+
+    class Losing(exr.OpenEXR.File):
+        def write(self, name: str) -> None:
+            Path(name).touch()
+
+    monkeypatch.setattr(exr.OpenEXR, "File", Losing)
+    with pytest.raises(DiffractionError, match="is the disk full"):
+        exr.write_channels(target, {"Y": np.ones((2, 2), np.float32)})
+    assert target.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a.exr"]
+
+
+@posix
+def test_permissions_follow_the_umask_which_no_thread_sees_changed(tmp_path, monkeypatch):
+    before = os.umask(0o027)
+    change = os.umask
+    try:
+        monkeypatch.setattr(os, "umask", lambda _: pytest.fail("all threads' files would change"))
+        with atomic_path(tmp_path / "a.txt") as path:
+            path.write_text("whole")
+    finally:
+        change(before)
+    assert (tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640

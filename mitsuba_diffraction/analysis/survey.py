@@ -38,7 +38,7 @@ from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, table_of
-from .survey_files import SHEET, write_rows, write_sheets
+from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
@@ -314,11 +314,18 @@ def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:
     """Read the row that an earlier run has stored, if its files exist."""
     try:
         (path,) = scans.glob(f"*-{job.key}.json")
-        row: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    except ValueError:  # no such file, or damaged
+        row = json.loads(path.read_text("utf-8")) if path.is_file() else None
+    except (ValueError, RecursionError):  # no such file, or damaged
         return None
-    complete = row["reason"] or all(path.with_suffix(s).is_file() for s in (".exr", ".png"))
-    return row if complete else None
+    if not is_row(row):
+        return None
+    if row["reason"]:
+        return {**row}
+    files = {name: path.with_suffix(suffix) for suffix, name in FILES.items()}
+    whole = all(file.is_file() and not file.is_symlink() for file in files.values())
+    if not (whole and is_map(files["map"])):
+        return None
+    return {**row, **{name: f"{SCANS}/{file.name}" for name, file in files.items()}}
 
 
 def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]:
@@ -328,7 +335,7 @@ def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any
     for suffix, content in result.files.items():
         with atomic_path(scans / f"{stem}{suffix}") as temporary:
             temporary.write_bytes(content)
-        row[{".exr": "table", ".png": "map"}[suffix]] = f"{SCANS}/{stem}{suffix}"
+        row[FILES[suffix]] = f"{SCANS}/{stem}{suffix}"
     if not row["reason"].startswith("unexpected"):
         with atomic_path(scans / f"{stem}.json") as temporary:
             temporary.write_text(json.dumps(row), "utf-8")

@@ -7,14 +7,22 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from ..atomic import atomic_path
+from ..errors import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHEET = "sheet"
+#: Columns of a scan's files by suffix.
+FILES = {".exr": "table", ".png": "map"}
+# Columns that are texts, and those that contact sheets and summaries need.
+_TEXTS = ("reason", "warnings", "tiling", "ranked_among", *FILES.values())
+_NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light", "tiling")
+# First characters of formulas.
+_FORMULAS = ("=", "+", "-", "@", "\t")
 _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
@@ -40,9 +48,47 @@ def write_table(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, An
     text = io.StringIO()
     writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({k: _cell(v) for k, v in row.items()} for row in rows)
     with atomic_path(path) as temporary:
         temporary.write_text(text.getvalue(), "utf-8")
+
+
+def _cell(value: Any) -> Any:
+    """Return a cell; a text that a spreadsheet would take for a formula begins with an apostrophe.
+
+    Names of files come from anywhere, and programs of spreadsheets run what formulas say.
+    """
+    if not isinstance(value, str):
+        return value
+    text = printable(value)  # the line end of a name is not the row's
+    return f"'{text}" if text.startswith(_FORMULAS) else text
+
+
+def is_row(row: object) -> TypeGuard[dict[str, Any]]:
+    """Say whether what a file holds is a row as `measure` makes them."""
+    if not (isinstance(row, dict) and isinstance(row.get("reason"), str)):
+        return False
+    for name, value in row.items():
+        if name in _TEXTS or value == "":
+            fits = isinstance(value, str)
+        else:
+            fits = isinstance(value, float) or (type(value) is int and abs(value) < 2**63)
+        if not fits:
+            return False
+    needed = _NEEDED + (("direction_1_deg",) if "period_1_um" in row else ())
+    return bool(row["reason"]) or all(name in row for name in needed)
+
+
+def is_map(file: Path) -> bool:
+    """Say whether a file is a picture that a contact sheet can show."""
+    from ..images import open_image
+
+    try:
+        with open_image(file, ("PNG",)) as picture:
+            picture.load()
+    except (OSError, ValueError, SyntaxError):
+        return False
+    return True
 
 
 def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import fnmatch
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError, check_keys, one_line
-from ..files import read_text
+from ..errors import DiffractionError, check_keys
+from ..files import read_toml
 from ..heights.read import LoadOptions
 from ..heights.recipes import LOAD_KEYS, options_and_settings
 from ..retired import retired
@@ -51,10 +50,7 @@ def load_treatments(
     """
     if path is None:
         return []
-    try:
-        content = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise DiffractionError(f"cannot read '{path}': {one_line(str(error))}") from error
+    content = read_toml(path)
     return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
 
 

@@ -76,6 +76,11 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
+    with noted():  # options may read files when they are parsed
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     try:
         for text in sys.argv[1:] if argv is None else argv:
             check_name(text)

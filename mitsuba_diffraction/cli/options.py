@@ -56,7 +56,8 @@ HEIGHTS: dict[str, tuple[str, str]] = {
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
     "level": (
         "METHOD",
-        "plane: subtract the best plane; lines: also align the scan lines; none; default: plane if "
+        "plane: subtract the best plane; quadratic: a scanner's arc as well; lines: also align the "
+        "scan lines; none; default: plane if "
         "the tilt of a file shows",
     ),
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
@@ -363,10 +364,11 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
     from ..heights.coherence import resolved
-    from ..tables.build.checks import check_window, period_of, warnings_of
+    from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 
     how = resolved(settings, fields)
     try:
+        check_units(fields)
         check_window(period_of(fields[0], how), how)
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import DiffractionError
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -171,7 +171,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     """Solve a recipe on the requested processes; partial solutions are stored beside the output."""
     from ..orders.solve.accuracy import WORST
-    from ..orders.solve.jobs import Jobs
+    from ..orders.solve.jobs import Jobs, remove_results
     from ..orders.solve.orders import solve_orders
 
     light: dict[str, Any] = {}
@@ -210,7 +210,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             jobs=Jobs(folder, executor, bar),
             announce=announce,
         )
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_results(folder)
     return table
 
 
@@ -267,7 +267,10 @@ def _layer(text: str) -> Layers:
     if text.endswith(".toml"):
         from ..orders.solve.films import read_layers
 
-        return read_layers(text)
+        try:
+            return read_layers(text)
+        except DiffractionError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
     material, _, thickness = text.rpartition(":")
     try:
         return ((material, float(thickness)),)

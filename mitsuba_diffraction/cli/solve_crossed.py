@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +25,7 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
     """Solve a crossed grating."""
     from ..heights.read import LoadOptions, read_heights
     from ..orders.solve.crossed import solve_crossed
+    from ..orders.solve.jobs import remove_results
 
     options.refuse(args, _GROOVES_ONLY, ": not allowed with --crossed")
     if args.period is None:
@@ -55,5 +55,5 @@ def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> 
             folder=folder,
             progress=bar,
         )
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_results(folder)
     return table

@@ -5,9 +5,11 @@ Scene files are identified by content: used in place, or copied to workers that 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import hashlib
 import os
+import shutil
 import tempfile
 import time
 import warnings
@@ -284,8 +286,19 @@ class SceneFiles:
         return _has(path, digest) or _has(str(self._copy(path)), digest)
 
     def _copy(self, path: str) -> Path:
-        folder = cache_folder() or Path(tempfile.gettempdir()) / "mitsuba_diffraction"
+        folder = cache_folder() or _own_temporary()
         return folder / "scenes" / self.digest[:32] / Path(path).relative_to(Path(path).anchor)
+
+
+@lru_cache(1)
+def _own_temporary() -> Path:
+    """Return a new folder for files of tasks, of this process alone, where there is no cache.
+
+    A folder of a known name in the folder that all users share might be somebody else's.
+    """
+    folder = tempfile.mkdtemp(prefix="mitsuba_diffraction-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _has(path: str, digest: str) -> bool:

@@ -10,6 +10,7 @@ formats      readers, by kind of file
 recipes      TOML files that name the source of heights and the settings of their table
 preprocess   treatments of heights: crop, fill, level, clip
 gratings     height fields computed from formulas
+damage       aborted and repeated lines, and the bow of a scanner
 validity     warnings where a patch leaves the model or its own resolution
 spectra      spectrum of heights, and powers of their orders
 coherence    coherence width that a patch allows

@@ -44,7 +44,8 @@ def central_part(
     """
     (ny, nx), (dx, dy) = values.shape, pixel_size
     whole = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
-    kept = round(size[0] / dx), round(size[1] / dy)
+    # at most one too many: the quotient may be infinite
+    kept = round(min(size[0] / dx, nx + 1)), round(min(size[1] / dy, ny + 1))
     for count, most in zip(kept[::-1], (ny, nx), strict=True):
         if not 2 <= count <= most:
             raise DiffractionError(
@@ -172,6 +173,22 @@ def level_plane(field: HeightField) -> HeightField:
     """Subtract the least-squares plane; the mean height stays."""
     heights, rise = _without_plane(field)
     line = f"plane removed: it rose {rise}{rms_change(field, heights)}"
+    return field.changed(heights, line)
+
+
+def level_quadratic(field: HeightField) -> HeightField:
+    """Subtract the least-squares polynomial of degree 2, a scanner's arc; the mean height stays."""
+    bases = []
+    for count in field.shape:
+        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(2, count - 1))
+        bases.append(np.linalg.qr(powers)[0])  # orthonormal on the pixels
+    along_y, along_x = bases
+    weights = along_y.T @ field.heights @ along_x
+    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 2] = 0.0
+    weights[0, 0] = 0.0
+    arc = along_y @ weights @ along_x.T
+    heights = field.heights - arc
+    line = f"paraboloid removed: it spanned {np.ptp(arc):.3g} µm{rms_change(field, heights)}"
     return field.changed(heights, line)
 
 

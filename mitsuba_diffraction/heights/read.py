@@ -35,7 +35,11 @@ from .lengths import (
 )
 from .validity import tilted
 
-LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
+LEVELS = {
+    "plane": preprocess.level_plane,
+    "quadratic": preprocess.level_quadratic,
+    "lines": preprocess.level_lines,
+}
 #: Statements about the edges of a patch: whole periods of a surface that repeats, or a part of a
 #: larger surface.
 PERIODICS = ("exact", "open")

@@ -17,7 +17,6 @@ import inspect
 import json
 import os
 import shlex
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -25,11 +24,11 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, check_keys
-from ..files import FileKind, kind_of, path_within, read_text
+from ..files import FileKind, kind_of, path_within, read_toml
+from ..limits import MOST_PATCHES, check_count
 from ..retired import retired
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
-from .formats import first_line
 from .read import LoadOptions
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
@@ -65,7 +64,7 @@ class Recipe:
         """
         file = Path(path)
         shown = repr(str(file))
-        content = _parse(file, shown)
+        content = read_toml(file)
         if content.get("method") == SOLVED:
             raise DiffractionError(
                 f"{shown} is a recipe of solved orders: run the command 'solve "
@@ -136,14 +135,6 @@ def options_and_settings(
         raise DiffractionError(f"{where}: {error}") from error
 
 
-def _parse(file: Path, shown: str) -> dict[str, Any]:
-    """Read a TOML file."""
-    try:
-        return tomllib.loads(read_text(file))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DiffractionError(f"{shown} is not a recipe (TOML): {first_line(error)}") from error
-
-
 def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:
     """Return the paths of the files of heights, relative to the recipe's folder."""
     for key in ("arguments", "seeds"):
@@ -157,6 +148,7 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
         raise DiffractionError(
             f"{shown}: source: expected a path, or a list of paths, got {source!r}"
         )
+    check_count(len(names), MOST_PATCHES, shown, "sources")
     for name in names:
         if kind_of(file.parent / name) is FileKind.RECIPE:
             raise DiffractionError(f"{shown}: source: {name!r} is a recipe; name a file of heights")
@@ -196,6 +188,7 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
         raise DiffractionError(
             f"{shown}: seeds: expected a list of different whole numbers, got {seeds!r}"
         )
+    check_count(len(seeds), MOST_PATCHES, shown, "seeds")
     if "seed" not in parameters or "seed" in arguments:
         why = "seed is set, too" if "seed" in arguments else f"{name!r} has no parameter seed"
         raise DiffractionError(f"{shown}: seeds: {why}; leave one out")

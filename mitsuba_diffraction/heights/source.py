@@ -100,6 +100,16 @@ class Source:
         arguments = [dict(patch) for patch in recipe.arguments]
         return _digest_of(options, recipe.generator, arguments, *map(_sha256, files))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the patches."""
+        if self.patches:
+            return tuple(field.name for field in self.patches)
+        if self.recipe is None:
+            return tuple(file.name for file in self.files)
+        sources = tuple(source.name for source in self.recipe.sources)
+        return sources or (str(self.recipe.generator),) * len(self.recipe.arguments)
+
     def fields(self) -> list[HeightField]:
         """Read or generate the heights of all patches.
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .damage import damage
 from .field import HeightField, blocks
 from .preprocess import level_plane, plane_of, plane_rise
 from .spectra import seen_slope
@@ -97,6 +98,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
         )
     if field.cut_out:
         lines.append(tilt_warning(field, shortest))
+        lines += damage(field)
     return [line for line in lines if line]
 
 

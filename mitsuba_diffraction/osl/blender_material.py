@@ -151,7 +151,7 @@ def read_folder(folder: Path) -> dict[str, Any]:
 def _file(folder: Path, name: str, suffix: str) -> Path:
     """Return the path of a file that the document names; only names in its folder are allowed."""
     if Path(name).name != name or Path(name).suffix != suffix:
-        raise ValueError(f"{name!r} is no name of a file *{suffix} in this folder")
+        raise ValueError(f"{name!r} is not the name of a file *{suffix} in this folder")
     return folder.resolve() / name
 
 

@@ -53,7 +53,7 @@ class Feature(Enum):
     ORIENTATION = "", "an orientation other than 0"
     VARYING_ORIENTATION = "", "an orientation that varies"
     NESTED = "", "a nested BSDF or pigment"
-    OPAQUE = "", "a conductor or layer that absorbs the light that is not reflected"
+    OPAQUE = "", "a conductor or layers that absorb the light (film_k, layers)"
     COLOURS = "", "an RGB variant, whose light has no wavelengths to tell speckle by"
 
     def phrase(self, model: str = "") -> str:

@@ -28,7 +28,8 @@ fill : string [none]
     Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
     `harmonic` spans a membrane over the gap.
 level : string [auto]
-    `plane` subtracts the best plane; `lines` aligns the scan lines by their medians first; `none`.
+    `plane` subtracts the best plane, `quadratic` the best paraboloid, as of a scanner's arc;
+    `lines` aligns the scan lines by their medians first, then the plane; `none`.
     `auto` is `plane` for a file of heights whose tilt turns the mirror direction, else `none`.
 clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
@@ -342,7 +343,7 @@ class Diffraction(DiffractingSurface):
         if self.coat is not None:
             yield self.optical_refusal(self.coat.eta, "coat_eta", "coat_ior")
         if self.nested is not None and self.boundary.material.absorbs:
-            yield read.refusal(Feature.NESTED.phrase(), "film_k above 0, which absorbs its light")
+            yield read.refusal(Feature.NESTED.phrase(), Feature.OPAQUE.phrase())
 
     def kernel_constants(self) -> tuple[object, ...]:
         """See `PluginBSDF.kernel_constants`."""

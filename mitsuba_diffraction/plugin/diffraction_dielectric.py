@@ -68,7 +68,7 @@ from . import parameters as read
 from .arithmetic import plain
 from .base import asked_sides
 from .boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
-from .directions import CoatedPair, Crossing, Pair, Sides, Site, TablePoint, Turned
+from .directions import CoatedPair, Pair, PairBelow, PairThrough, Sides, Site, TablePoint
 from .energy import EnergyModel, dielectric_of
 from .materials import Dielectric, Inside
 from .properties import flag
@@ -147,7 +147,7 @@ class DiffractionDielectric(DiffractingSurface):
                 density = dr.select(lit, share * with_even_share(orders), density)
         if transmits:
             lit = active & (cos_i * cos_o < 0.0)
-            crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
+            crossing = PairThrough(si, wo, frame, lit, self.material.eta, self.thin)
             passed = self._transmitted(ctx, site, crossing) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
@@ -203,13 +203,13 @@ class DiffractionDielectric(DiffractingSurface):
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, si = self.material.eta, site.si
         if self.thin:
-            outer = Turned(si, wo, site.frame, lit, mi.Float(1.0))
+            outer = PairBelow(si, wo, site.frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             power = self.power.power(pair, site.scale, si)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
             value += self.face(ctx, site, outer, self.mirror, lit)
             return value, self.power.density(outer, site.scale * n, si)
-        inner = Turned(si, wo, site.frame, lit, n)
+        inner = PairBelow(si, wo, site.frame, lit, n)
         power = self.power.power(inner.place, site.scale, si)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
@@ -234,7 +234,7 @@ class DiffractionDielectric(DiffractingSurface):
 
     # ------------------------------------------------------------------ transmission
 
-    def _transmitted(self, ctx: Context, site: Site, crossing: Crossing) -> Spectrum:
+    def _transmitted(self, ctx: Context, site: Site, crossing: PairThrough) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
@@ -260,7 +260,7 @@ class DiffractionDielectric(DiffractingSurface):
             outside *= dr.select(down, *scales)
         return dr.select(crossing.active, value * outside, 0.0)
 
-    def _matrices(self, site: Site, crossing: Crossing, pair: Geometry) -> list[Jones]:
+    def _matrices(self, site: Site, crossing: PairThrough, pair: Geometry) -> list[Jones]:
         """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
         n, above, below = crossing.n, crossing.above, crossing.below
         heights = self.boundary.heights(crossing.place, site.scale, site.wavenumbers)
@@ -273,7 +273,7 @@ class DiffractionDielectric(DiffractingSurface):
             return matrices
         return [out_of_sheet(jones, n, above.z, -below.z) for jones in matrices]
 
-    def _order_0(self, crossing: Crossing, pair: Geometry) -> Jones:
+    def _order_0(self, crossing: PairThrough, pair: Geometry) -> Jones:
         """Return the matrix of order 0."""
         n, above = crossing.n, crossing.above.z
         outer = -crossing.below.z if self.thin else dr.safe_sqrt(outside_square(pair, n))
@@ -281,7 +281,7 @@ class DiffractionDielectric(DiffractingSurface):
         return order_0(pair, *ends)
 
     def _factor(
-        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
+        self, ctx: Context, si: Interaction, crossing: PairThrough, matrices: list[Jones]
     ) -> Spectrum:
         """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:

@@ -96,6 +96,7 @@ class Pair:
     wi, wo : ωi and ωo in the shading frame.
     cos_i, cos_o : cosines of their angles to the normal.
     frame : the patch at the point of the surface.
+    asked : lanes whose light is asked for.
     uv : tangential part of ωi + ωo, in the coordinates of the table.
     w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
@@ -107,7 +108,7 @@ class Pair:
     medium: Float = 1.0
 
     def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
-        self.wi, self.wo, self.frame = si.wi, wo, frame
+        self.wi, self.wo, self.frame, self.asked = si.wi, wo, frame, active
         total = si.wi + wo
         self.uv = frame.to_table(total)
         self.w = dr.select(active, total.z, 1.0)
@@ -140,6 +141,7 @@ class TablePoint:
     w: Float
     cos_i: Float = 1.0
     cos_o: Float = 1.0
+    asked: Mask = True
 
 
 class CoatedPair(Pair):
@@ -154,7 +156,7 @@ class CoatedPair(Pair):
     def __init__(self, outer: Pair, n: Float) -> None:
         self._outer, self.n = outer, n
         self.wi, self.wo = (mi.Vector3f(*refracted(w, n)) for w in (outer.wi, outer.wo))
-        self.frame, self.uv = outer.frame, outer.uv
+        self.frame, self.uv, self.asked = outer.frame, outer.uv, outer.asked
         self.cos_i, self.cos_o = self.wi.z, self.wo.z
         self.w = n * (self.cos_i + self.cos_o)
         self.one_plus_dot = 0.5 * dr.squared_norm(self.wi + self.wo)
@@ -165,7 +167,7 @@ class CoatedPair(Pair):
         return self._outer
 
 
-class Turned(Pair):
+class PairBelow(Pair):
     """Two directions below the surface, turned over: as if above a surface of negative heights.
 
     n : optical index of the medium that both are in.
@@ -192,14 +194,14 @@ class Turned(Pair):
         return dr.squared_norm(self.uv) < _FARTHEST**2
 
 
-class Crossing:
+class PairThrough:
     """A pair of directions, one above and the other below the surface, in any order.
 
     Attributes
     ----------
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
-    uv, w, cos_i, cos_o, frame : what `PowerModel.density` asks of a pair.
+    uv, w, cos_i, cos_o, frame, asked : what `PowerModel.density` asks of a pair.
     """
 
     def __init__(
@@ -215,7 +217,7 @@ class Crossing:
         level = mi.Vector3f(0.0, 0.0, 1.0)
         self.above = dr.select(active, dr.select(down, si.wi, wo), level)
         self.below = dr.select(active, dr.select(down, wo, si.wi), -level)
-        self.n, self.frame = n, frame
+        self.n, self.frame, self.asked = n, frame, active
         self.inside = self.below
         if thin:
             x, y, z = refracted(self.below, n)

@@ -58,7 +58,8 @@ def check_plugins(state: Any) -> None:
 
     state : `mi.parser.ParserState`, not yet instantiated.
 
-    Raises a DiffractionError if the name of a plugin is none, or its file is not one of Mitsuba's.
+    Raises a DiffractionError if a plugin's name is malformed, or its file lies elsewhere than in
+    Mitsuba's folder.
     """
     known = {path.stem for path in (folder() / "plugins").iterdir()} - {_BLENDER}
     for name in dict.fromkeys(node.props.plugin_name() for node in state.nodes):

@@ -15,7 +15,7 @@ import mitsuba as mi
 from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
 from .device_table import device_table
-from .directions import Crossing, Pair, TablePoint
+from .directions import Pair, PairThrough, TablePoint
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
@@ -32,7 +32,7 @@ class PowerModel(Protocol):
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
-    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """Density per solid angle with which `draw` draws ωo."""
 
     def both(
@@ -92,7 +92,7 @@ class SpectralPower:
         functions = [self._power(pair, height_scale, si)]
         return _powers(self._each(functions, si, pair, height_scale)[0])
 
-    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean over all wavelengths."""
         functions = [self._density(pair, height_scale)]
         return _mean(self._each(functions, si, pair, height_scale)[0])
@@ -125,7 +125,7 @@ class SpectralPower:
         interferes = bool(windows) or self.device.grid.coherent
         return PerWavenumber(3 if interferes else 2, of_wavelength)
 
-    def _density(self, pair: Pair | Crossing, height_scale: Float) -> PerWavenumber:
+    def _density(self, pair: Pair | PairThrough, height_scale: Float) -> PerWavenumber:
         def of_wavelength(k: Float) -> list[Float]:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
             density = self._sampler.density(k * pair.uv, strategy)
@@ -181,7 +181,7 @@ class SpectralPower:
         self,
         functions: Sequence[PerWavenumber],
         si: Interaction,
-        pair: Pair | TablePoint | Crossing,
+        pair: Pair | TablePoint | PairThrough,
         scale: Float,
     ) -> list[list[list[Float]]]:
         """Evaluate each function of k at each wavelength.
@@ -209,7 +209,10 @@ class SpectralPower:
             for function in functions
         ]
         state = (mi.UInt32(0), wavenumbers, nothing)
-        return [list(values) for values in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
+        # inactive lanes end at once: vectors without an active one skip the look-ups
+        asked = mi.Mask(pair.asked)
+        loop = dr.while_loop(state, lambda n, *_: (n < count) & asked, body)
+        return [list(values) for values in loop[2]]
 
 
 def _powers(values: list[list[Float]]) -> Powers:

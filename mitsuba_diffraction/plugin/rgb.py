@@ -19,7 +19,7 @@ from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
-from .directions import Crossing, Pair, TablePoint
+from .directions import Pair, PairThrough, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
@@ -151,7 +151,7 @@ class RGBPower:
             others = total - zeroth
         return Powers(others, zeroth)
 
-    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`."""
         strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
         return self._density(pair.uv, *strategy) * pair.cos_o * pair.frame.area

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, check_keys, one_line, quoted
-from ..files import read_text
+from ..errors import DiffractionError, check_keys, quoted
+from ..files import read_toml
 from ..heights.lengths import count_between, number_between
 from ..limits import MOST_LAYERS, check_count
 from ..optics.colour import linear_srgb, response
@@ -78,10 +77,7 @@ def read_layers(path: Path) -> Layers:
     Raises a DiffractionError if the file cannot be read, or a key or value is not allowed.
     """
     shown = f"layers='{path}'"
-    try:
-        content = tomllib.loads(read_text(path))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DiffractionError(f"{shown} is not TOML: {one_line(str(error))}") from error
+    content = read_toml(path)
     check_keys(shown, content, _KEYS)
     pairs = content.get("layers")
     if not (

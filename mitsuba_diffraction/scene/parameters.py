@@ -237,8 +237,8 @@ def _elements(
 ) -> Iterator[tuple[ElementTree.Element, tuple[Path, ...]]]:
     """Yield the elements of a scene and of its includes, in Mitsuba's order.
 
-    With each come the folders in which Mitsuba 3.9 looks for a name in it; the first is that of the
-    element's file.
+    With each come the folders in which Mitsuba 3.9 looks for a name; the first is the folder of
+    the element's file.
 
     values, defaults : of parameters that occur in names; the caller may add to `defaults`.
     """

@@ -10,7 +10,7 @@ import dataclasses
 import itertools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,9 +58,24 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
 
 
 def to_record(table: DiffractionTable) -> Record:
-    """Return the record of a table for the cache."""
+    """Return the record of a table for the cache, without the names of its patches."""
     document = json.loads(json.dumps(document_of(table), default=plain))
+    for patch in _patches(document["source"]):
+        patch["name"] = ""
     return Record(document, [table.coefficients])
+
+
+def named(table: DiffractionTable, names: Sequence[str]) -> DiffractionTable:
+    """Give the patches of a table from the cache their names, unless they have some."""
+    if table.source.get("name") == "":
+        for patch, name in zip(_patches(table.source), (names[0], *names), strict=False):
+            patch["name"] = name
+    return table
+
+
+def _patches(source: Any) -> list[dict[str, Any]]:
+    """Return the descriptions of the first patch, and of all if there are several."""
+    return [source, *source.get("patches", [])]
 
 
 def from_record(record: Record) -> DiffractionTable:

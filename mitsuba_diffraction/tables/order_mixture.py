@@ -27,6 +27,8 @@ _JOINED = 1.0
 _SAMPLED, _FINE = 0.8, 0.15
 #: Least deviation that smooths samples, in their distance.
 _BRIDGED = 0.7
+#: Largest lobe, in the density's smoothing, of a window's samples that are summed on their own.
+NARROW = 0.25
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,9 @@ def order_mixture(
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
     kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
     lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
-    all_smooth = lobe >= smoothing
+    # samples of a window's power have its lobes in them already: as strong orders, with lobes of
+    # their own, they are for lobes that are narrow beside the smoothing
+    all_smooth = lobe >= (NARROW if table.grid.coherent else 1.0) * smoothing
     axes = [_Axis(table, axis, fine=2.0 * lobe > smoothing) for axis in (0, 1)]
     if table.grid.coherent:  # powers between the bins have the lobes in them
         apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)

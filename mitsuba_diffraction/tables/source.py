@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -21,6 +21,7 @@ from ..progress import Progress, silent
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from .build.build import build_with
 from .build.checks import warnings_of
+from .document import named
 from .store import cached, key_of, loaded_once
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -97,7 +98,8 @@ class TableRequest:
 
     def cached(self, settings: TableSettings) -> DiffractionTable:
         """Return the table with these settings, from the cache or built."""
-        return cached_table(self.digest, settings, lambda: self._built(settings))
+        names = self.source.names
+        return cached_table(self.digest, settings, lambda: self._built(settings), names)
 
     def _built(self, settings: TableSettings) -> DiffractionTable:
         """Build the table; warnings are one line for a file."""
@@ -137,12 +139,19 @@ def table_key(digest: str, settings: TableSettings) -> str:
 
 
 def cached_table(
-    digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
+    digest: str,
+    settings: TableSettings,
+    build: Callable[[], DiffractionTable],
+    names: Sequence[str],
 ) -> DiffractionTable:
-    """Return the table of heights with this digest, from memory, from disk, or built and stored."""
+    """Return the table of heights with this digest, from memory, from disk, or built and stored.
+
+    names : of the patches. The file in the cache has none: patches of other names may be equal.
+    """
     key = table_key(digest, settings)
     # the package assigns the methods of `Recorded`
-    return cached("table", key, _tables, build, DiffractionTable)  # type: ignore[type-var]
+    table = cached("table", key, _tables, build, DiffractionTable)  # type: ignore[type-var]
+    return named(table, names)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

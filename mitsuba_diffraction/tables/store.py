@@ -20,7 +20,7 @@ from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import platformdirs
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
@@ -31,6 +31,9 @@ from ..inputs import note_input
 VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
 #: The files unused for longest go when all are larger than this together.
 MAX_BYTES = 4 << 30
+
+#: Seconds after which it is said that another process holds a lock.
+PATIENCE = 5.0
 
 SUFFIX = ".cache"
 _MAGIC = "mitsuba_diffraction cache"
@@ -129,9 +132,18 @@ def _from_disk(kind: str, key: str, make: Callable[[], R], stored: type[R]) -> R
 def _locked(path: Path) -> Iterator[None]:
     """Hold the lock of a file among all processes; does nothing without file locks."""
     lock = FileLock(path.with_suffix(".lock"))
-    with contextlib.suppress(OSError):
+    try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
+        lock.acquire(timeout=PATIENCE)
+    except Timeout:
+        warn(
+            f"another process holds '{lock.lock_file}' and makes what this one needs: waiting for "
+            "it; if none is at work, remove that file"
+        )
+        with contextlib.suppress(OSError):
+            lock.acquire()
+    except OSError:
+        pass
     try:
         yield
     finally:

@@ -6,6 +6,7 @@ import os
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.systems import posix
@@ -139,3 +140,38 @@ def test_a_misspelt_parameter_of_a_scene_is_one_line(run, here, command):
     assert "'int_iorr'; did you mean int_ior?" in line
     assert "Traceback" not in line
     assert "instantiate" not in line
+
+
+@pytest.mark.parametrize("digits", [30, 5000])
+@pytest.mark.parametrize(
+    "command",
+    ["precompute {}", "info {}", "solve {}", "survey a.npy --treatments {}", "plan a.xml",
+     "brdf-map a.npy --pixel-size 0.1 --height-unit um --material Al --layers {} -m scalar_rgb"],
+)  # fmt: skip
+def test_a_whole_number_of_many_digits_in_toml_is_refused_in_one_line(run, here, command, digits):
+    Path("a.toml").write_text(f"pixel_size = {digits * '9'}\n")
+    np.save("a.npy", np.zeros((20, 20)))
+    Path("a.xml").write_text(
+        SCENE.format(
+            '<shape type="sphere"><bsdf type="diffraction">'
+            '<string name="heightfield" value="a.toml"/></bsdf></shape>'
+        )
+    )
+    ran = run(*command.format("a.toml").split())
+    assert ran.code == 1
+    *notes, line = ran.err.splitlines()
+    assert all("note" in note for note in notes)
+    assert "a.toml' is not TOML" in line
+
+
+def test_layers_of_a_solution_that_are_no_toml_are_a_usage_error_that_says_so(run, here):
+    Path("a.toml").write_text(f"repeat = {5000 * '9'}\n")
+    ran = run("solve", "lamellar", "--period", 1, "--depth", 0.1, "--layer", "a.toml")
+    assert ran.code == 2
+    assert "argument --layer: 'a.toml' is not TOML" in ran.err
+
+
+@pytest.mark.parametrize("crop", ["1e308", "1e308,1", "1,1e308"])
+def test_a_crop_wider_than_numbers_go_is_refused_in_one_line(run, heights, here, crop):
+    line = run("info", heights, "--pixel-size", "0.08", "--crop", crop).failed_in_one_line()
+    assert "larger than the patch" in line

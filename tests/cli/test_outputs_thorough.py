@@ -36,8 +36,6 @@ COMMANDS = [
     ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
     ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
-    ("solve profile.txt --period 0.6 --resolution 80 --tolerance 0.2 --wavelength-range 590,610",
-     ".nc"),
 ]  # fmt: skip
 
 

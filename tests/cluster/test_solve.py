@@ -61,7 +61,7 @@ from pathlib import Path
 from mitsuba_diffraction.cli import main
 
 def watch():
-    while len(list(Path(".groove.solving").glob("*.npz"))) < {count}:
+    while len(list(Path(".groove.solving").glob("*.solved"))) < {count}:
         time.sleep(0.01)
     os.kill(os.getpid(), signal.{signal})
 
@@ -82,7 +82,7 @@ def test_a_client_that_was_killed_and_interrupted_goes_on(client, table, tmp_pat
         )
         assert ran.returncode == code
         assert "Traceback" not in ran.stderr
-        before = len(list((tmp_path / ".groove.solving").glob("*.npz")))
+        before = len(list((tmp_path / ".groove.solving").glob("*.solved")))
         assert not (tmp_path / "groove.nc").exists()
     assert main(words) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["groove.nc"]

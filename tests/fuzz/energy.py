@@ -28,7 +28,10 @@ _GRAZING, _EXCESS, _ERRORS = 85.0, (0.01, 0.05), 5.0
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
 #: Variants by their share. RGB variants have colours outside the gamut, which are negative, or
 #: above 1 as the red of gold: their luminance is at most 1.
-_VARIANTS = {"llvm_ad_mono": 0.75, "llvm_ad_spectral": 0.2, "llvm_ad_rgb": 0.05}
+_VARIANTS = {
+    "llvm_ad_mono": 0.65, "llvm_ad_spectral": 0.2, "llvm_ad_mono_polarized": 0.1,
+    "llvm_ad_rgb": 0.05,
+}  # fmt: skip
 _TEXELS = (4, 4, 1)
 #: Of linear sRGB's channels.
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -62,7 +65,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         reflectance = _texture(np.full(_TEXELS, value)) if rng.random() < 0.5 else plain
         chosen["beneath"] = {"type": "diffuse", "reflectance": reflectance}
     chosen |= {
-        "coherence_width": max(1.5, float(np.mean(field.extent)) * log_uniform(rng, 0.5, 20.0)),
+        "coherence_width": max(0.5, float(np.mean(field.extent)) * log_uniform(rng, 0.1, 20.0)),
         "model": str(rng.choice(["small_slope", "kirchhoff"])),
         "wavelength": float(rng.uniform(400.0, 700.0)),
     }
@@ -72,7 +75,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         chosen |= {"layers": _stack(rng), "model": "kirchhoff"}
     if rng.random() < 0.3:
         chosen["coherence"] = "patch"
-    for name, low, high in (("lateral_scale", 0.2, 2.0), ("height_scale", 1e-3, 1.5)):
+    for name, low, high in (("lateral_scale", 0.1, 2.0), ("height_scale", 1e-3, 1.5)):
         factor, drawn = log_uniform(rng, low, high), rng.random()
         # scales of energy of a varying sheet take a minute
         if drawn < 0.05 and "plugin" not in chosen:
@@ -88,7 +91,9 @@ def _stack(rng: np.random.Generator) -> str:
         [f"{1.0 + log_uniform(rng, 0.05, 1.5):.4f}", log_uniform(rng, 0.01, 0.3)]
         for _ in range(int(rng.integers(1, 4)))
     ]
-    if rng.random() < 0.2:
+    if rng.random() < 0.2:  # a gap, or a layer of the index above
+        pairs[-1][0] = "1.0"
+    if rng.random() < 0.2 and pairs[0][0] != "1.0":
         pairs[0][0] += f"+{log_uniform(rng, 1e-4, 0.3):.5f}i"
     repeat, spread = int(rng.integers(1, 6)), rng.choice([0.0, 0.05])
     return f"layers = {json.dumps(pairs)}\nrepeat = {repeat}\nspread = {spread}\n"
@@ -105,11 +110,21 @@ def grooves(rng: np.random.Generator) -> md.HeightField:
     return md.HeightField(heights, pixel, periodic=True)
 
 
+def domes(rng: np.random.Generator) -> md.HeightField:
+    """Spherical caps side by side, of slopes up to 0.5, that end in edges."""
+    count, pixel = int(rng.integers(16, 48)), log_uniform(rng, 0.03, 0.1)
+    x = np.linspace(-1.0, 1.0, count, endpoint=False)
+    squared = x**2 + x[:, None] ** 2
+    height = 0.25 * log_uniform(rng, 0.05, 0.5) * count * pixel
+    return md.HeightField(height * np.maximum(1.0 - squared, 0.0), pixel, periodic=True)
+
+
 def check(rng: np.random.Generator) -> None:
     """Sample what a surface sends on, and look at values."""
     mi.set_variant(str(rng.choice(list(_VARIANTS), p=list(_VARIANTS.values()))))
     try:
-        field = grooves(rng) if rng.random() < 0.1 else surface(rng)
+        shape = (grooves, domes, surface)[rng.choice(3, p=[0.1, 0.1, 0.8])]
+        field = shape(rng)
         asked = parameters(rng, field)
         bsdf = _load(field, asked)
     except md.DiffractionError:
@@ -124,7 +139,7 @@ def check(rng: np.random.Generator) -> None:
     wi = np.stack([polar(*angles) for angles in zip(theta, phi, strict=True)])
     if "plugin" in asked:
         wi[:, 2] *= rng.choice([-1.0, 1.0], _DIRECTIONS)
-    uv, wavelengths = rng.random((_DIRECTIONS, 2)), rng.uniform(200.0, 1500.0, (_DIRECTIONS, 4))
+    uv, wavelengths = rng.random((_DIRECTIONS, 2)), rng.uniform(0.0, 1500.0, (_DIRECTIONS, 4))
     where = f"{asked}: from {theta}°, on the side {np.sign(wi[:, 2])}, at {wavelengths} nm"
     most = _albedo_beneath(asked) * (1.0 + np.where(grazing, *_EXCESS[::-1]))
 
@@ -179,7 +194,7 @@ def _check_values(bsdf: Any, si: Any, wo: Any, where: str) -> None:
     """Values in all directions are finite and not negative."""
     wo = wo / np.linalg.norm(wo, axis=1, keepdims=True)
     value, density = bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo))
-    values = spectra(value)
+    values = spectra(mi.unpolarized_spectrum(value))
     assert np.isfinite(values).all(), f"{where}: a value is not finite"
     assert mi.is_rgb or values.min() >= 0.0, f"{where}: a value is {values.min():.3g}"
     assert dr.all(density >= 0.0), f"{where}: a density is negative"

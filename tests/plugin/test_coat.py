@@ -173,7 +173,7 @@ def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):
     [
         ({"coat_eta": 0.9}, "coat_eta=0.9"),
         ({"coat_eta": 2.9}, "beyond the table's 2.37"),
-        ({"height_scale": 1.6}, "height_scale=1.6 is outside the table's range"),
+        ({"height_scale": 1.6}, "height_scale=1.6 must be above 0"),
     ],
 )
 def test_a_change_beyond_the_table_is_refused(some_variant, changed, line):

@@ -30,6 +30,15 @@ CASES = [
 ]
 
 
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_list_has_every_differentiable_parameter(name):
+    mi.set_variant("llvm_ad_mono")
+    parameters = mi.traverse(mi.load_dict(plate(name, 6.0)))
+    fixed = int(mi.ParamFlags.NonDifferentiable)
+    differentiable = {key for key in parameters if not int(parameters.flags(key)) & fixed}
+    assert differentiable == set(SURFACES[name][1])
+
+
 @pytest.mark.parametrize(("mitsuba_variant", "name", "width"), CASES)
 def test_every_parameter_has_the_derivative_of_differences(mitsuba_variant, name, width):
     if not runs(mitsuba_variant):

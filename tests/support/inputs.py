@@ -68,7 +68,7 @@ def write_inputs(folder: Path) -> None:
         "recipe.toml": 'source = "h.npy"\npixel_size = 0.1\ncoherence_width = 2\n'
         "tolerance = 0.05\n",
         "pigment.csv": "400,0.2\n700,0.4\n", "profile.txt": "0 0\n0.3 0.05\n0.6 0\n",
-        "layers.toml": '[[layer]]\nmaterial = "SiO2"\nthickness = 0.1\n',
+        "layers.toml": 'layers = [["SiO2", 0.1]]\n',
         "treatments.toml": '["*.npy"]\npixel_size = 0.1\n',
     }  # fmt: skip
     for name, text in texts.items():

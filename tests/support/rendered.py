@@ -50,13 +50,14 @@ SURFACES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5, "nested.reflectance.value": 0.4},
     ),
     "coat": (
-        {"material": "Al", "coat_ior": 1.5},
-        {"orientation": 20.0, "height_scale": 0.9, "coat_eta": 1.5},
+        {"eta": 0.9, "k": 6.0, "coat_ior": 1.5},
+        {"orientation": 20.0, "height_scale": 0.9, "coat_eta": 1.5, "eta.value": 0.9,
+         "k.value": 6.0},
     ),
     "film": (
         {"eta": 0.9, "k": 6.0, "film_ior": 2.0, "film_thickness": 200.0},
         {"orientation": 20.0, "height_scale": 0.9, "film_thickness": 200.0, "film_eta": 2.0,
-         "film_k": 0.05},
+         "film_k": 0.05, "eta.value": 0.9, "k.value": 6.0},
     ),
     "patch": (
         {"material": "none", "coherence": "patch", "lateral_scale": 1.0},

@@ -190,6 +190,11 @@ def _(path: Path) -> None:
     path.write_text("1" * 5_000_000)
 
 
+@hostile("long_line.dat", heights)
+def _(path: Path) -> None:
+    path.write_text("1 " * 4_000_000)
+
+
 @hostile("layers.toml", layers)
 def _(path: Path) -> None:
     path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
@@ -198,6 +203,22 @@ def _(path: Path) -> None:
 @hostile("solved_layers.toml", solved_layers)
 def _(path: Path) -> None:
     path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
+
+
+@hostile("dots.toml", heights)
+def _(path: Path) -> None:
+    path.write_text("a." * 490_000 + "b = 1\n")
+
+
+@hostile("sources.toml", heights)
+def _(path: Path) -> None:
+    path.write_text("source = [" + '"a",' * 240_000 + "]\n")
+
+
+@hostile("seeds.toml", heights)
+def _(path: Path) -> None:
+    seeds = ",".join(map(str, range(140_000)))
+    path.write_text(f'generator = "brushed"\nseeds = [{seeds}]\n[arguments]\n')
 
 
 def run(names: list[str], folder: Path) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from mitsuba_diffraction import DiffractionWarning
 from mitsuba_diffraction.tables import store
@@ -188,3 +190,25 @@ def test_what_a_killed_process_left_is_removed(folder):
     get([], key="5" * 64)
     assert len([path for path in folder.iterdir() if path.name.startswith(".")]) == 0
     assert len(list(folder.iterdir())) == 2
+
+
+def test_another_process_that_makes_it_is_named_after_a_while(folder, monkeypatch):
+    """A lock that nobody releases would look like a command that hangs."""
+    monkeypatch.setattr(store, "PATIENCE", 0.05)
+    path = folder / f"values-{KEY[:32]}.lock"
+    folder.mkdir()
+    held, over = threading.Event(), threading.Event()
+
+    def hold():
+        with FileLock(path):
+            held.set()
+            over.wait(0.5)
+
+    other = threading.Thread(target=hold)
+    other.start()
+    held.wait()
+    made = []
+    with pytest.warns(DiffractionWarning, match="another process holds"):
+        get(made)
+    other.join()
+    assert made == [KEY]

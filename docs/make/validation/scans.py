@@ -137,7 +137,7 @@ def rough_ridges(rng: np.random.Generator) -> Real:
 
 
 def crops(
-    count: int = 200, degrees: Sequence[float] = BESIDE, wavelengths: Real | None = None
+    count: int = 120, degrees: Sequence[float] = BESIDE, wavelengths: Real | None = None
 ) -> list[Beside]:
     """Compare levelled crops of 10 µm with the whole, 133 µm, under one window."""
     rng = np.random.default_rng(5)
@@ -147,7 +147,7 @@ def crops(
         cut = heights[top : top + _CROP, left : left + _CROP]
         parts.append(HeightField(cut, _PIXEL, cut_out=True).treated(level="plane"))
     whole, width = HeightField(heights, _PIXEL, periodic=True), _CROP * _PIXEL
-    lam = np.arange(430.0, 801.0, 10.0) if wavelengths is None else wavelengths
+    lam = np.arange(430.0, 801.0, 20.0) if wavelengths is None else wavelengths
     incident, results = np.radians(30.0), []
     wi = [np.sin(incident), 0.0, np.cos(incident)]
     for off in degrees:

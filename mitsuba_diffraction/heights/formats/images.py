@@ -5,7 +5,9 @@ from __future__ import annotations
 import struct
 import warnings
 import zlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...files import read_bytes
 from ...images import open_image
 from ...limits import check_content
 from ...streams import without_chatter
@@ -28,6 +31,14 @@ _COLOUR = {
     "YCbCr": "colours (YCbCr)", "LAB": "colours (Lab)", "HSV": "colours (HSV)",
 }  # fmt: skip
 
+# Tags of TIFF, and its orientations: where row 0 and column 0 of the file are (TIFF 6.0, 1992).
+_PHOTOMETRIC, _ORIENTATION = 262, 274
+_TURNED: dict[int, Callable[[Any], Any]] = {
+    1: lambda rows: rows, 2: np.fliplr, 3: lambda rows: rows[::-1, ::-1], 4: np.flipud,
+    5: np.transpose, 6: lambda rows: np.rot90(rows, -1), 7: lambda rows: rows[::-1, ::-1].T,
+    8: np.rot90,
+}  # fmt: skip
+
 # Exceptions that Pillow's decoders raise on damaged files.
 _DAMAGED = (
     OSError, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, EOFError,
@@ -37,7 +48,9 @@ _DAMAGED = (
 
 
 def read_image(path: Path) -> RawHeights:
-    """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative) or 32-bit float (µm).
+    """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative), or of floats (µm).
+
+    Floats have 32 bits, of uncompressed TIFFs also 64.
 
     Eight-bit colours are read if red, green and blue are equal and no pixel is transparent. The
     image's top row is the largest y, so rows are flipped.
@@ -56,6 +69,8 @@ def read_image(path: Path) -> RawHeights:
     except DiffractionError:
         raise
     except UnidentifiedImageError as error:
+        if (doubles := _doubles(path, shown)) is not None:
+            return RawHeights(doubles[::-1])
         raise DiffractionError(
             f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
         ) from error
@@ -81,7 +96,46 @@ def _heights_of(image: Image.Image, shown: str) -> RawHeights:
             "greyscale, or as 32-bit float in µm"
         )
     values = np.asarray(image)[::-1] / np.float64(_FULL_SCALE[mode])
+    # Pillow inverts TIFFs of 8 bits and fewer whose white is 0, and none of 16
+    if mode.startswith("I;16") and getattr(image, "tag_v2", {}).get(_PHOTOMETRIC) == 0:
+        values = 1.0 - values
     return RawHeights(values, relative=True)
+
+
+def _doubles(path: Path, shown: str) -> npt.NDArray[np.float64] | None:
+    """Read an uncompressed TIFF of one channel of 64-bit floats, which Pillow cannot; else None."""
+    content = read_bytes(path)
+    order = {b"II*\0": "<", b"MM\0*": ">"}.get(content[:4])
+    if order is None:
+        return None
+    try:
+        (start,) = struct.unpack(f"{order}I", content[4:8])
+        (count,) = struct.unpack(f"{order}H", content[start : start + 2])
+        tags = {}
+        for n in range(count):
+            at = start + 2 + 12 * n
+            tag, kind, number = struct.unpack(f"{order}HHI", content[at : at + 8])
+            letter = {3: "H", 4: "I"}.get(kind)
+            if letter is None:
+                continue
+            size = struct.calcsize(letter) * number
+            place = (
+                at + 8 if size <= 4 else struct.unpack(f"{order}I", content[at + 8 : at + 12])[0]
+            )
+            tags[tag] = struct.unpack(f"{order}{number}{letter}", content[place : place + size])
+        wanted = {258: (64,), 259: (1,), 277: (1,), 339: (3,)}
+        if any(tags.get(tag, (1,)) != value for tag, value in wanted.items()):
+            return None
+        (nx,), (ny,) = tags[256], tags[257]
+        check_pixel_count(ny, nx, shown)
+        strips = zip(tags[273], tags[279], strict=True)
+        data = b"".join(content[place : place + size] for place, size in strips)
+        heights = np.frombuffer(data, f"{order}f8").reshape(ny, nx).astype(np.float64)
+    except (struct.error, KeyError, ValueError) as error:
+        if isinstance(error, DiffractionError):
+            raise
+        raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
+    return np.asarray(_TURNED.get(tags.get(_ORIENTATION, (1,))[0], _TURNED[1])(heights))
 
 
 def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections import deque
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, warn
 from ...extras import optional
-from ...limits import bounded_memory, check_archive, check_content
+from ...files import beginning
+from ...limits import bounded_lines, bounded_memory, check_archive, check_content
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
+from .nanoscope import stated_size
 
 # Signals that instruments record in nanometres beside the topography.
 _NOT_HEIGHT = re.compile(
@@ -23,6 +26,8 @@ _NOT_HEIGHT = re.compile(
     re.IGNORECASE,
 )
 _MICROMETRE = "µm"
+#: Relative difference up to which two statements of a size are one: rounding.
+_SAME_SIZE = 0.01
 
 
 def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
@@ -47,6 +52,9 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     """
     shown, size = repr(str(path)), path.stat().st_size
     check_archive(path, shown)
+    if b"\0" not in beginning(path, 1 << 16):  # text: some readers take n² steps for long lines
+        with path.open(encoding="latin-1") as stream:
+            deque(bounded_lines(stream, shown), maxlen=0)
     with warnings.catch_warnings(), bounded_memory(size, shown):
         # Readers warn of unknown fields and missing optional packages; units and sizes are checked
         # below.
@@ -79,6 +87,25 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         finally:
             reader.close()
     raw.notes = (note,)
+    return _witnessed(raw, path)
+
+
+def _witnessed(raw: RawHeights, path: Path) -> RawHeights:
+    """Compare the size with the file's header, which wins, and say so in a note."""
+    stated = stated_size(path)
+    if stated is None or raw.pixel_size is None:
+        return raw
+    (ny, nx), (dx, dy), (width, height, aspect) = raw.values.shape, raw.pixel_size, stated
+    if abs(nx * dx / width - 1.0) < _SAME_SIZE and abs(ny * dy / height - 1.0) < _SAME_SIZE:
+        return raw
+    raw.pixel_size = (width / nx, height / ny)
+    line = (
+        f"the header states {width:.4g} x {height:.4g} µm (aspect ratio {aspect}), and the library "
+        f"that reads it {nx * dx:.4g} x {ny * dy:.4g} µm: the header's are taken; pixel_size "
+        "overrides them"
+    )
+    warn(f"{str(path)!r}: {line}")
+    raw.notes = (*raw.notes, line)
     return raw
 
 

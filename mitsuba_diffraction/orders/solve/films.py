@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ...errors import DiffractionError, check_keys, one_line, quoted
-from ...files import read_text
+from ...errors import DiffractionError, check_keys, quoted
+from ...files import read_toml
 from ...heights.lengths import count_between, number_between
 from ...limits import MOST_LAYERS, check_count
 from .grating_index import TabulatedIndex, material_of
@@ -72,10 +71,7 @@ def read_layers(path: str | os.PathLike[str]) -> Layers:
     Raises a DiffractionError if the file cannot be read, or a key or value is not allowed.
     """
     shown = repr(os.fspath(path))
-    try:
-        content = tomllib.loads(read_text(path))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DiffractionError(f"{shown} is not TOML: {one_line(str(error))}") from error
+    content = read_toml(path)
     check_keys(shown, content, ("layers", "repeat"))
     repeat = count_between(content.get("repeat", 1), f"{shown}: repeat", 1, MOST_LAYERS)
     layers = checked_layers(content.get("layers"), f"{shown}: layers")

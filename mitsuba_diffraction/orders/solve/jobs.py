@@ -9,20 +9,19 @@ import threading
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
+from ...tables.store import Record, read_record, write_record
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .integral import IntegralSolver
@@ -127,6 +126,10 @@ def solver_of(problem: Problem) -> Solver:
     return METHODS[problem.method](grating.profile, problem.resolution, *layers)
 
 
+# Suffix of files of results.
+_SUFFIX = ".solved"
+
+
 class Solved(NamedTuple):
     """Numbers of a solution, and the processor seconds that they took.
 
@@ -217,9 +220,9 @@ class Jobs:
         """
         names = {item: digest_of(key(item))[:24] for item in items}
         files = {} if self.folder is None else {
-            item: self.folder / f"{name}.npz" for item, name in names.items()
+            item: self.folder / f"{name}{_SUFFIX}" for item, name in names.items()
         }  # fmt: skip
-        results = {item: _read(file) for item, file in files.items()}
+        results = {item: _read(file, names[item]) for item, file in files.items()}
         known = {item: solved for item, solved in results.items() if solved is not None}
         missing = [item for item in names if item not in known]
         if self.folder is not None and missing:
@@ -228,8 +231,8 @@ class Jobs:
         for item, solved in self._solved(task, missing):
             known[item] = solved
             if item in files:
-                with atomic_path(files[item]) as temporary:
-                    np.savez(temporary, values=solved.values, seconds=solved.seconds)
+                record = Record({"seconds": solved.seconds}, [solved.values])
+                write_record(files[item], _title(names[item]), record)
             self.progress(len(known), len(names), text)
         self._seconds |= {names[item]: solved.seconds for item, solved in known.items()}
         return known
@@ -325,11 +328,25 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def _read(file: Path) -> Solved | None:
-    if not file.is_file():
-        return None
+def remove_results(folder: Path) -> None:
+    """Remove the results in a folder, and the folder once it is empty."""
+    with suppress(OSError):
+        for file in folder.glob(f"*{_SUFFIX}"):
+            file.unlink()
+        folder.rmdir()
+
+
+def _read(file: Path, name: str) -> Solved | None:
+    """Return a stored result; None if there is none, or a damaged one, which is solved again."""
     try:
-        with np.load(file) as stored:
-            return Solved(stored["values"], float(stored["seconds"]))
-    except (OSError, ValueError, EOFError, KeyError, BadZipFile):
-        return None  # solved again
+        record = read_record(file, _title(name))
+        (values,) = record.arrays
+        solved = Solved(values, float(record.document["seconds"]))
+        return solved if np.isfinite(values).all() else None
+    except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError):
+        return None
+
+
+def _title(name: str) -> str:
+    """Return the first words of a result's file."""
+    return f"mitsuba_diffraction solution {name}"

@@ -25,14 +25,13 @@ from __future__ import annotations
 
 import inspect
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...errors import DiffractionError, check_keys, one_line, quoted
-from ...files import path_within, read_text
+from ...errors import DiffractionError, check_keys, quoted
+from ...files import path_within, read_toml
 from ...heights.lengths import number_between
 from ...heights.recipes import SOLVED
 from ..table import WAVELENGTHS
@@ -77,12 +76,7 @@ class SolvedRecipe:
         that is not allowed.
         """
         file, shown = Path(path), repr(os.fspath(path))
-        try:
-            content = tomllib.loads(read_text(file))
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise DiffractionError(
-                f"{shown} is not a recipe (TOML): {one_line(str(error))}"
-            ) from error
+        content = read_toml(file)
         if content.get("method") != SOLVED:
             raise DiffractionError(
                 f'{shown} has no line method = "{SOLVED}": it is a recipe of heights, for '

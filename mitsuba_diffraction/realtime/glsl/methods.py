@@ -60,7 +60,9 @@ def _cached_build(heights: HeightField, **arguments: Any) -> DiffractionTable:
     """Build a table like `DiffractionTable.build`, or read it from the cache."""
     progress = arguments.pop("progress", None)
     settings = TableSettings(**arguments)
-    return cached_table(heights.digest(), settings, lambda: build_with(heights, settings, progress))
+    return cached_table(
+        heights.digest(), settings, lambda: build_with(heights, settings, progress), [heights.name]
+    )
 
 
 def pack_method(method: Method) -> Packed:

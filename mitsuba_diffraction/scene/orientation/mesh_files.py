@@ -1,4 +1,4 @@
-"""Mesh files, most of them read by Mitsuba, PLY files of polygons cut into triangles first."""
+"""Mesh files: Mitsuba reads most, and PLY files of polygons after they are cut into triangles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
 from ..meshes import MeshArrays, mesh_arrays
 from .interchange import interchange_mesh
-from .mesh_indices import CODES, check_mesh, ply_header
+from .mesh_indices import CODES, any_line_begins, check_mesh, ply_header
 from .trimesh import TriangleMesh
 
 Floats = NDArray[np.float64]
@@ -70,12 +70,12 @@ def has_own_normals(path: str | os.PathLike[str]) -> bool:
         header = ply_header(readable_file(file))
         vertex = [e for e in header.elements if e.name == "vertex"] if header else []
         return any(words[-1] == "nx" for element in vertex for words in element.properties)
-    return file.suffix.lower() != ".obj" or _any_line_begins(readable_file(file), b"vn")
+    return file.suffix.lower() != ".obj" or any_line_begins(readable_file(file), b"vn")
 
 
 def _load(file: Path) -> mi.Mesh:
     kind = KINDS[file.suffix.lower()]
-    _check(file, kind, file)
+    check_mesh(file, kind)
     try:
         return _read(file, kind)
     except _UNREAD as error:
@@ -87,33 +87,12 @@ def _load(file: Path) -> mi.Mesh:
             with tempfile.TemporaryDirectory() as folder:
                 cut = Path(folder, file.name)
                 cut.write_bytes(triangles)
-                _check(cut, kind, file)
+                check_mesh(cut, kind, shown=f"mesh '{file}'")
                 with contextlib.suppress(*_UNREAD):
                     return _read(cut, kind)
         lines = str(error).split(": ", 1)[-1].split()
         reason = " ".join(lines)[-200:] or type(error).__name__
         raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
-
-
-def _check(file: Path, kind: str, named: Path) -> None:
-    """Refuse a mesh without triangles, or one that Mitsuba cannot read safely.
-
-    Dr.Jit compiles kernels for all meshes alive, those that the traceback of an error keeps as
-    well: one without triangles would break every later rendering of the process.
-
-    named : the file in messages.
-    """
-    triangles = check_mesh(file, kind, shown=f"mesh '{named}'")
-    if kind == "obj" and not _any_line_begins(file, b"f"):
-        triangles = 0
-    if triangles == 0:
-        raise DiffractionError(f"mesh '{named}': it has no triangles")
-
-
-def _any_line_begins(file: Path, word: bytes) -> bool:
-    """Whether a line of an OBJ file begins with a word."""
-    with file.open("rb") as lines:
-        return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
 
 
 def _read(file: Path, kind: str) -> mi.Mesh:

@@ -6,6 +6,7 @@ and allocates what a header states. It checks OBJ files itself.
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -67,37 +68,51 @@ class Header(NamedTuple):
         return ">" if self.format == "binary_big_endian" else "<"
 
 
-def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> int | None:
+def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
     """Refuse a mesh file that Mitsuba cannot read safely.
 
-    kind : Mitsuba's plugin: `ply`, `serialized`, or others, which nothing is checked of.
+    kind : Mitsuba's plugin: `ply`, `serialized`, `obj`; others are not checked.
     number : of the mesh in a serialized file.
     shown : the file in messages.
 
-    Returns the number of triangles, or None where only Mitsuba knows it.
-
-    Raises a DiffractionError if a triangle names a vertex that does not exist, or the file is
-    shorter than its header states.
+    Raises a DiffractionError if a triangle names a vertex that does not exist, the file is shorter
+    than its header states, or it has no triangles: Dr.Jit compiles kernels for all meshes alive,
+    and one without triangles would break every later rendering of the process.
     """
     shown = shown or f"mesh '{file}'"
+    triangles = None
     if kind == "ply":
-        return _check_ply(file, shown)
-    return _check_serialized(file, number, shown) if kind == "serialized" else None
+        triangles = _check_ply(file, shown)
+    elif kind == "serialized":
+        triangles = _check_serialized(file, number, shown)
+    elif kind == "obj" and not any_line_begins(file, b"f"):
+        triangles = 0
+    if triangles == 0:
+        raise DiffractionError(f"{shown}: it has no triangles")
+
+
+def any_line_begins(file: Path, word: bytes) -> bool:
+    """Whether a line of an OBJ file begins with a word."""
+    with file.open("rb") as lines:
+        return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
 
 
 def ply_header(file: Path, shown: str = "") -> Header | None:
     """Return the header of a PLY file; None for other files.
 
-    Raises a DiffractionError if an element has no properties or an unknown type.
+    Raises a DiffractionError if it has no end, or an element has no properties or an unknown type.
     """
     with file.open("rb") as stream:
         start = stream.read(_LONGEST_HEADER)
-    end = start.find(b"\nend_header")
-    line_end = start.find(b"\n", end + 1)
-    if not start.startswith(b"ply") or end < 0 or line_end < 0:
+    if not re.match(rb"ply\s", start):
         return None
     shown, form, elements = shown or f"mesh '{file}'", "", []
-    for line in start[:end].decode("latin-1").split("\n")[1:]:
+    end = re.search(rb"\nend_header[ \t\r]*\n", start)
+    if end is None:
+        raise DiffractionError(
+            f"{shown} is a damaged PLY: its header has no end; export the mesh again"
+        )
+    for line in start[: end.start()].decode("latin-1").split("\n")[1:]:
         words = line.split()
         if words[:1] == ["format"] and len(words) > 1:
             form = words[1]
@@ -123,7 +138,7 @@ def ply_header(file: Path, shown: str = "") -> Header | None:
             raise DiffractionError(
                 f"{shown}: element {quoted(element.name)} has no properties, {element.number} times"
             )
-    return Header(form, elements, line_end + 1)
+    return Header(form, elements, end.end())
 
 
 def _check_ply(file: Path, shown: str) -> int | None:
@@ -214,7 +229,7 @@ def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:
         )
 
 
-def _check_serialized(file: Path, number: int, shown: str) -> int | None:
+def _check_serialized(file: Path, number: int, shown: str) -> int:
     """Check one mesh of Mitsuba's own format, as Mitsuba 3.9 reads it."""
     size = file.stat().st_size
     with file.open("rb") as stream:
@@ -234,7 +249,9 @@ def _check_serialized(file: Path, number: int, shown: str) -> int | None:
         except (struct.error, ValueError, zlib.error) as error:
             if isinstance(error, DiffractionError):
                 raise
-            return None  # Mitsuba refuses it
+            raise DiffractionError(
+                f"{shown}: it is damaged, or not Mitsuba's format; export the mesh again"
+            ) from error
     check_indices(corners, vertices, shown)
     return int(faces)
 

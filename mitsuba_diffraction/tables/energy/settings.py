@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 31
+VERSION = 32
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class EnergySettings:
     between : places between neighbouring wavelengths, as shares of the interval, at which light is
         looked at: first of dielectrics and of surfaces with more than `few_orders` strong orders,
         then of reflectors with fewer.
-    rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
+    rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest,
+        as close as rings.
     fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of a scale to the
         next, and most wavelengths. Under thin films waves in between come and go.
     sweeps : of Sinkhorn and Knopp's iteration.
@@ -49,7 +50,7 @@ class EnergySettings:
     few_orders: int = 32
     between: tuple[tuple[float, ...], tuple[float, ...]] = ((0.5,), (0.33, 0.67))
     rings: int = 36
-    steps: int = 80
+    steps: int = 144
     sweeps: int = 12
     threshold: float = 0.99
     target: float = 0.992

@@ -27,14 +27,15 @@ from ...optics.geometry import wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
 from ...optics.paths import Path
 from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
-from ..order_mixture import order_mixture
+from ..order_mixture import NARROW, order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, PathGain
 from .settings import energy_settings
 
-#: The weak orders are smoothed by this share of the distance between directions, at least.
-SMOOTHING = 0.6
+#: The weak orders are smoothed by this share of the distance between rings, at least. Orders that
+#: have wider lobes are all in the density: with 0.6 of the distance their sums were 7 % off.
+SMOOTHING = 1.0
 #: Weak orders of less power in all are left out.
 LEAST_WEAK = 2e-3
 
@@ -64,8 +65,11 @@ class ScatteredOrders:
         self.roughness, self.height_scale = table.roughness, height_scale
         self.densest, settings = densest, energy_settings()
         longest, shortest = (float(wavenumber(each)) for each in wavelength_range)
-        rings, steps = finer * settings.rings, finer * settings.steps
-        smoothing = SMOOTHING * longest * 0.5 * math.pi / rings
+        smoothing = SMOOTHING * longest * 0.5 * math.pi / settings.rings
+        lobe = 1.0 / (math.sqrt(2.0) * table.sigma)
+        if table.grid.coherent and lobe >= NARROW * smoothing:  # which smoothing would widen
+            finer = max(finer, math.ceil(smoothing / lobe))
+        rings, steps, smoothing = finer * settings.rings, finer * settings.steps, smoothing / finer
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)

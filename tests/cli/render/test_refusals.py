@@ -53,7 +53,7 @@ def test_arguments_that_do_not_fit_are_one_line(run, scene, arguments, said):
     [
         ("a.obj", "# of a modeller\nv 0 0 0\n", "tangents a.obj -o mesh.ply' first"),
         ("a.stl", "solid a\n", "'a.stl' is not a PLY mesh, which the scene expects: convert it"),
-        ("a.ply", "ply\n#\n", "'a.ply' is a damaged PLY"),
+        ("a.ply", "ply\n#\n", "/a.ply' is a damaged PLY"),
     ],
 )  # fmt: skip
 def test_a_mesh_of_another_format_is_answered_with_what_to_do(run, scene, name, content, said):

@@ -35,7 +35,8 @@ def test_what_is_kept_is_what_is_solved_and_has_converged():
 @pytest.mark.parametrize("stack", STACKS, ids=lambda stack: stack.name)
 def test_gratings_of_slope_up_to_a_tenth(stack):
     found = filmed.deviations(stack, "small_slope")
-    # thick lacquer lacks light that the rough faces diffract twice
-    assert found.max() < (0.2 if stack.thickness > 300.0 else 0.1)
-    assert found[0].max() < 0.007  # of slope 0.03: first order is exact as heights go to 0
+    # thick lacquer lacks light that the rough faces diffract twice, which grows as heights squared
+    worst, gentle = (0.2, 0.02) if stack.thickness > 300.0 else (0.1, 0.007)
+    assert found.max() < worst
+    assert found[0].max() < gentle  # of slope 0.03: first order is exact as heights go to 0
     assert np.median(found / filmed.deviations(stack, "kirchhoff")) < 0.3

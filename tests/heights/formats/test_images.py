@@ -257,3 +257,56 @@ def test_damaged_files_load_or_are_one_clear_line(samples, tmp_path, data):
         HeightField.load(path, pixel_size=0.1, max_height=0.5 if name[2] in "pbt" else None)
     except DiffractionError as error:
         assert "\n" not in str(error)
+
+
+def test_a_tiff_whose_white_is_zero_is_as_high_as_it_is_bright(tmp_path):
+    levels = np.broadcast_to(np.arange(64) * 1000, (64, 64)).astype(np.uint16)
+    for photometric, stored in ((1, levels), (0, 65535 - levels)):
+        path = tmp_path / f"{photometric}.tif"
+        Image.fromarray(stored).save(path, tiffinfo={262: photometric})
+        field = HeightField.load(path, pixel_size=0.1, max_height=1.0, level="none")
+        assert field.heights == pytest.approx(levels / 65535, abs=1e-12), path
+
+
+@pytest.mark.parametrize(
+    ("orientation", "shown"),
+    [
+        (1, lambda rows: rows), (2, np.fliplr), (3, lambda rows: rows[::-1, ::-1]), (4, np.flipud),
+        (6, lambda rows: np.rot90(rows, -1)), (8, np.rot90),
+    ],
+)  # fmt: skip
+def test_a_tiff_is_turned_as_it_is_to_be_shown(tmp_path, orientation, shown):
+    path = tmp_path / "turned.tif"
+    Image.fromarray(FLOATS).save(path, tiffinfo={274: orientation})
+    found = HeightField.load(path, pixel_size=0.1, level="none").heights
+    np.testing.assert_array_equal(found[::-1], shown(FLOATS))
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_doubles_of_a_tiff_are_read(tmp_path, order):
+    heights = np.random.default_rng(2).random((5, 7))
+    data = heights.astype(f"{order}f8").tobytes()
+    tags = [
+        (256, 3, 1, 7),
+        (257, 3, 1, 5),
+        (258, 3, 1, 64),
+        (259, 3, 1, 1),
+        (262, 3, 1, 1),
+        (273, 4, 1, 8),
+        (277, 3, 1, 1),
+        (278, 3, 1, 5),
+        (279, 4, 1, len(data)),
+        (339, 3, 1, 3),
+    ]
+    entries = b"".join(
+        struct.pack(f"{order}HHI{'H2x' if kind == 3 else 'I'}", tag, kind, count, value)
+        for tag, kind, count, value in tags
+    )
+    head = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", 8 + len(data))
+    path = tmp_path / "doubles.tif"
+    path.write_bytes(head + data + struct.pack(f"{order}H", len(tags)) + entries + bytes(4))
+    found = HeightField.load(path, pixel_size=0.1, level="none").heights
+    np.testing.assert_array_equal(found, heights[::-1])
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(DiffractionError):
+        HeightField.load(path, pixel_size=0.1)

@@ -206,3 +206,19 @@ def test_damaged_headers_load_or_are_one_clear_line(tmp_path, data):
         HeightField.load(path)
     except DiffractionError as error:
         assert "\n" not in str(error)
+
+
+def test_the_header_s_aspect_ratio_wins_over_the_library_and_is_said(tmp_path):
+    counts = np.round(3000 * np.sin(np.arange(24) / 3.0))[:, None] * np.ones(48)
+    square, strip = "10 10 ~m", "10 10 ~m\r\n\\Aspect Ratio: 2:1"
+    path = tmp_path / "strip.spm"
+    path.write_bytes(nanoscope(counts, scan_size=strip))
+    with pytest.warns(DiffractionWarning, match=r"10 x 5 µm .aspect ratio 2:1.* 10 x 10 µm"):
+        field = HeightField.load(path)
+    assert field.extent == pytest.approx((10.0, 5.0))
+    for stated in (square, "10 5 ~m"):
+        path.write_bytes(nanoscope(counts, scan_size=stated))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DiffractionWarning)
+            extent = HeightField.load(path, level="none").extent
+        assert extent == pytest.approx([float(word) for word in stated.split()[:2]])

@@ -14,7 +14,7 @@ from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
-from tests.support.directions import polar
+from tests.support.directions import polar, rough_patch
 from tests.support.reflecting import ALUMINIUM, MATERIALS, grating, index_of, rough
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
@@ -70,6 +70,26 @@ def test_a_flat_surface_reflects_what_fresnel_says():
             exact = fresnel.reflectance(np.cos(np.radians(theta)), index or np.inf)
             # the lobe's width at 75°, and bilinear tables
             assert raw_albedo(table, theta, 0.0, 550, material) == pytest.approx(exact, rel=4e-3)
+
+
+@pytest.mark.parametrize("coherence", ["ensemble", "patch"])
+def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence):
+    """Few orders with lobes of some degrees: neither single directions nor a smooth density."""
+    patch = rough_patch((40, 40), (0.2, 0.2), 0.12, 1.2)
+    table = md.DiffractionTable.build(patch, coherence_width=8.0, coherence=coherence)
+    angles, step = np.array([45.0, 75.0]), np.pi / 480
+    found, _ = SurfaceEnergy(table, reflector("kirchhoff", None)).albedos(
+        Conservation(), np.radians(angles), np.radians([20.0]), 550.0
+    )
+    theta, phi = np.meshgrid((np.arange(240) + 0.5) * step, (np.arange(240) + 0.5) * (4 * step))
+    wo = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    weights = np.sin(theta) * np.cos(theta) * 4 * step**2
+    exact = [
+        (table.brdf(polar(angle, 20.0), wo.reshape(-1, 3), 550.0) * weights.ravel()).sum()
+        for angle in angles
+    ]
+    # the quadrature has rings 2.5° apart, and reads the nearest samples of the density
+    assert found[0, :, 0] == pytest.approx(exact, abs=0.02)
 
 
 @pytest.mark.parametrize("surface", ["grating", "rough"])

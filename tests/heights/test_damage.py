@@ -1,0 +1,54 @@
+"""Damage of scans is named with what to do; sound scans and gratings have none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.heights.damage import damage
+from mitsuba_diffraction.heights.field import HeightField
+from tests.support.directions import rough_patch
+
+ROUGH = rough_patch((128, 128), (0.05, 0.05), 0.02).heights
+
+
+def scan(heights):
+    return HeightField(heights, 0.05, name="scan", cut_out=True)
+
+
+@pytest.mark.parametrize("level", ["none", "plane"])
+@pytest.mark.parametrize(
+    ("rows", "named"), [(slice(90, None), "last 38"), (slice(0, 30), "first 30")]
+)
+def test_an_aborted_scan_is_named_with_what_is_left(rows, named, level):
+    aborted = ROUGH.copy()
+    aborted[rows] = 0.0
+    (line,) = damage(scan(aborted).treated(level=level))
+    assert named in line
+
+
+def test_repeated_rows_are_counted():
+    stuck = ROUGH.copy()
+    stuck[60:66] = stuck[59]
+    (line,) = damage(scan(stuck))
+    assert "6 of 128 rows repeat" in line
+
+
+def test_a_bow_is_named_and_removed():
+    y, x = np.mgrid[-1:1:128j, -1:1:128j]
+    bent = scan(ROUGH + 0.1 * x**2 + 0.05 * y * x - 0.07 * x)
+    (line,) = damage(bent)
+    assert "level=quadratic" in line
+    even = bent.treated(level="quadratic")
+    assert damage(even) == []
+    # a paraboloid takes 6 of the some hundred independent heights of the rough waves
+    left = even.heights - even.heights.mean() - (ROUGH - ROUGH.mean())
+    assert left.std() < 0.3 * ROUGH.std()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_sound_scans_and_gratings_have_no_damage(turned):
+    made = (gratings.lamellar(2.5, 0.3, periods=4, rows=64), gratings.sinusoidal(1.6, 0.1, rows=64))
+    for heights in (ROUGH, *(one.heights for one in made), np.zeros((32, 32))):
+        assert damage(scan(heights.T if turned else heights)) == []
