@@ -13,7 +13,7 @@ from ..files import FileKind, kind_of
 from ..system import peak_memory
 from . import options
 from .console import Bar
-from .report import Figures, check_outputs
+from .report import Figures, check_outputs, output_name
 from .workers import add_workers, client_of, on_workers
 
 if TYPE_CHECKING:
@@ -67,8 +67,10 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
 
     recipe, output = source.recipe, args.output
     make_folder = recipe is not None and output is None
-    if output is None:
-        output = Path(f"{source.files[0].stem}.exr") if recipe is None else recipe.output
+    if recipe is None:
+        output = output_name(output, Path(f"{source.files[0].stem}.exr"))
+    else:
+        output = output or recipe.output
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
     check_outputs([output], make_folder=make_folder)

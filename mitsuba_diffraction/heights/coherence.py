@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import next_fast_len
+import scipy
 
 from ..settings import COHERENCES, USUAL_WIDTH, TableSettings
 from .field import HeightField
@@ -76,7 +76,7 @@ def window_places(pixels: int, window: float) -> tuple[list[int], int]:
     if pixels < SEVERAL * wanted:
         return [(pixels - wanted) // 2], wanted
     # not longer, or a look-up would read more orders
-    length = next(n for n in range(wanted, 0, -1) if next_fast_len(n) == n)
+    length = next(n for n in range(wanted, 0, -1) if scipy.fft.next_fast_len(n) == n)
     count = 1 + max(1, round((pixels - length) / (0.5 * length)))
     return np.linspace(0, pixels - length, count).round().astype(int).tolist(), length
 

@@ -71,7 +71,7 @@ def test_the_cache_keeps_no_name_of_a_file(folder):
     Builder(dataclasses.replace(PATCH, name="secret.npy")).table()
     (file,) = folder.iterdir()
     assert b"secret" not in file.read_bytes()
-    store._tables.clear()
+    source._tables.clear()
     build = Builder(dataclasses.replace(PATCH, name="copy.npy"))
     assert build.table().source["name"] == "copy.npy"
     assert build.built == 0
