@@ -74,13 +74,15 @@ def method_for(grating: Grating) -> str:
     """Return the solver for a grating.
 
     Chandezon's method for slopes, also under films; coupled waves for other films, for slices and
-    for lamellar profiles of metal, else the integral method.
+    for lamellar profiles of metal no deeper than twice their period, else the integral method.
     """
     flat = grating.profile.depth == 0.0
     sloped = not (grating.is_perfect or grating.thin or flat or refused(grating.profile))
     if sloped and not grating.structure.is_beneath:
         return "chandezon"
-    lamellar = grating.profile.is_lamellar and not (grating.is_perfect or grating.thin)
+    profile = grating.profile
+    shallow = profile.is_lamellar and profile.depth <= 2.0 * profile.period
+    lamellar = shallow and not (grating.is_perfect or grating.thin)
     return "coupled" if grating.structure or lamellar else "integral"
 
 

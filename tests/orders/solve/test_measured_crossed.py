@@ -67,7 +67,7 @@ def test_one_wavelength_makes_a_table(tmp_path):
     ("change", "message"),
     [
         (lambda text: text.replace("order_y", "order_z", 1), "no column order_y"),
-        (lambda text: text.replace(",R_s,R_p", ",R_s,R_p,T_s,T_p", 1), "expected numbers"),
+        (lambda text: text.replace(",R_s,R_p", ",R_s,R_p,T_s,T_p", 1), "no column R_s"),
         (lambda text: text.replace("500,0,0,1,0,", "500,0,0,1.5,0,"), "whole number"),
         (lambda text: text.replace("500,0,0,1,0,", "500,0,0,2,0,"), r"\(2, 0\) does not"),
         (lambda text: "".join(line for line in text.splitlines(True)
