@@ -201,7 +201,7 @@ class OrderTable:
         has the nearest efficiencies: longer light at the same s and K, shorter light in the
         same direction. Other light has none.
     response : efficiencies or Mueller matrices, of all light (`CellResponse`) or of a
-        list (`ListedResponse`).         Matrices are about the axes of `polarised`.
+        list (`ListedResponse`). Matrices are about the axes of `polarised`.
     superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
         thick to interfere, as the polycarbonate of a CD.
     header : facts for people and programs, JSON: `solver`, `solver_version`, `settings`,
