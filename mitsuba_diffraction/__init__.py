@@ -7,7 +7,6 @@ gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 TableSource        table of a file, recipe or height field, built once for all that ask
 OrderTable         solved efficiencies of a grating's orders
-CrossedTable       efficiencies of a crossed grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
@@ -57,22 +56,21 @@ if TYPE_CHECKING:
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .heights import HeightField, gratings
+    from .orders import OrderTable
+    from .orders.listed import read_orders
+    from .orders.solve import profiles
+    from .orders.solve.crossed import solve_crossed
+    from .orders.solve.orders import solve_orders
     from .plugin.dictionary import bsdf_dict
     from .plugin.presets import preset
     from .realtime import glsl, shader_comparison, web
     from .scene.hologram import hologram
-    from .solve import profiles
-    from .solve.crossed import solve_crossed
-    from .solve.measured import read_orders
-    from .solve.orders import solve_orders
     from .tables import DiffractionTable, TableSource
-    from .tables.orders import CrossedTable, OrderTable
     from .thesis import period_fit
 
     __version__: str
 
 __all__ = [
-    "CrossedTable",
     "DiffractionError",
     "DiffractionTable",
     "DiffractionWarning",
@@ -110,24 +108,23 @@ _MODULES = {
     "maps": "analysis.maps",
     "osl": "osl",
     "period_fit": "thesis.period_fit",
-    "profiles": "solve.profiles",
+    "profiles": "orders.solve.profiles",
     "reference": "reference",
     "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
 _NAMES = {
-    "CrossedTable": "tables.orders",
     "DiffractionTable": "tables",
     "HeightField": "heights",
-    "OrderTable": "tables.orders",
+    "OrderTable": "orders",
     "TableSource": "tables",
     "bsdf_dict": "plugin.dictionary",
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
-    "read_orders": "solve.measured",
-    "solve_crossed": "solve.crossed",
-    "solve_orders": "solve.orders",
+    "read_orders": "orders.listed",
+    "solve_crossed": "orders.solve.crossed",
+    "solve_orders": "orders.solve.orders",
     "spectrum": "analysis.spectra",
 }
 
@@ -151,7 +148,7 @@ def __dir__() -> list[str]:
 def _register() -> None:
     from .plugin.registration import register_in_all
 
-    register_in_all()
+    register_in_all(f"{__name__}.orders.bsdf.diffraction_orders")
 
 
 select_llvm()  # before Dr.Jit picks a library by itself: some would end the process

@@ -24,7 +24,7 @@ from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energ
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
-from tests.support.variants import VARIANTS, obstacle
+from tests.support.variants import ALL, VARIANTS, obstacle, runs
 
 pytest_plugins = ["tests.support.processor_time"]
 
@@ -203,3 +203,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         counts[reason] += 1
     for reason, count in counts.most_common():
         terminalreporter.write_line(f"skipped {count:4d}: {reason}")
+
+
+@pytest.fixture(params=ALL)
+def every_variant(request: pytest.FixtureRequest) -> str:
+    """A variant, set."""
+    if not runs(request.param):
+        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
+    import mitsuba as mi
+
+    mi.set_variant(request.param)
+    return str(request.param)

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.optics import boundary
-from mitsuba_diffraction.solve import jobs
+from mitsuba_diffraction.orders.solve import jobs
 from tests.support.clone import small_clone
 from tests.support.pages import PAGES, blocks
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solve.grating_index import material_of
+from ..orders.solve.grating_index import material_of
 from ..tables.energy.conservation import Energy, SurfaceEnergy
 from ..tables.energy.conserved import Reflector, Transmitter
 from ..tables.table import DiffractionTable

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionWarning
+from ..orders import OrderTable
 from ..progress import Progress, silent
 from ..settings import TableSettings
-from ..tables.orders import CrossedTable, OrderTable
 from ..tables.source import TableSource
 from ..tables.table import DiffractionTable
 
@@ -29,7 +29,7 @@ def table_of(
         return source.table(settings, progress=progress)
 
 
-def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: Any) -> Any:
+def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
     """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
 
     parameters : of the plugin, e.g. material="Al".
@@ -38,14 +38,14 @@ def bsdf_of(table: DiffractionTable | OrderTable | CrossedTable, **parameters: A
     """
     import mitsuba as mi
 
+    from ..orders.bsdf.diffraction_orders import DiffractionOrders
     from ..plugin.diffraction import Diffraction
-    from ..plugin.orders.orders_block import diffraction_orders
 
     with tempfile.TemporaryDirectory() as folder:
-        solved = isinstance(table, OrderTable | CrossedTable)
+        solved = isinstance(table, OrderTable)
         file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
         props = mi.Properties("diffraction_orders" if solved else "diffraction")
         for name, value in {"table": str(file), **parameters}.items():
             props[name] = value
-        return diffraction_orders(props) if solved else Diffraction(props)
+        return DiffractionOrders(props) if solved else Diffraction(props)

@@ -282,9 +282,9 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     import mitsuba as mi
 
     from ..analysis.media import medium_index
+    from ..orders.bsdf.diffraction_orders import DiffractionOrders
     from ..plugin.dictionary import ORDERS, bsdf_dict
     from ..plugin.diffraction import Diffraction
-    from ..plugin.orders.orders_block import diffraction_orders
     from ..plugin.presets import preset
 
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
@@ -305,7 +305,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     props = mi.Properties(kind)
     for name, value in values.items():
         props[name] = value
-    return diffraction_orders(props) if kind == ORDERS else Diffraction(props)
+    return DiffractionOrders(props) if kind == ORDERS else Diffraction(props)
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:

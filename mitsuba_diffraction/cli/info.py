@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.source import Source
-    from ..tables.orders import load_any_orders
+    from ..orders.file import load_orders
 
     source = Source.of(file, options.load_options(args))
     kind = source.kind
@@ -94,7 +94,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         return {"kind": "table", **DiffractionTable.load(file).summary()}
     if kind is FileKind.ORDERS:
         _refuse_heights_options(args, "a table of orders")
-        return {"kind": "table of orders", **load_any_orders(file).summary()}
+        return {"kind": "table of orders", **load_orders(file).summary()}
     return _heights(source, args)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
     from ..analysis.spectrometer import MeasurementGeometry
     from ..analysis.treatments import Treatment
-    from ..tables.orders import OrderTable
+    from ..orders import OrderTable
     from ..tables.source import TableSource
 
 
@@ -43,13 +43,13 @@ class Measurement:
 
     def of_file(self, file: Path) -> list[Spectra]:
         """Measure the spectra of one file, or of its crops."""
-        from ..tables.orders import load_any_orders
+        from ..orders.file import load_orders
         from ..tables.source import TableSource, loaded_table
 
         how = self._treatment(file).options
         source = TableSource.of(file, how)
         if source.kind is FileKind.ORDERS:
-            return [self._of_table(load_any_orders(file), file)]
+            return [self._of_table(load_orders(file), file)]
         if source.kind is FileKind.TABLE:
             return [self._of_table(loaded_table(file), file)]
         if self.args.crops is not None:

@@ -52,12 +52,12 @@ def run(args: argparse.Namespace) -> Figures:
     """List the orders, and return the figures."""
     import numpy as np
 
-    from ..solve.listing import list_orders
-    from ..tables.orders import load_any_orders
+    from ..orders.file import load_orders
+    from ..orders.listing import list_orders
 
     output = output_name(args.output, Path(f"{args.table.stem}.csv"))
     check_outputs([output])
-    table = load_any_orders(args.table)
+    table = load_orders(args.table)
     low, high = table.wavelengths
     steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)
     wavelengths = args.wavelength or np.linspace(low, high, steps + 1)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import functools
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,16 +18,16 @@ from .solve_crossed import solve_crossed_cell
 from .workers import add_workers, executor_for
 
 if TYPE_CHECKING:
-    from ..solve.films import Layers
-    from ..solve.orders import Estimate
-    from ..solve.recipes import SolvedRecipe
-    from ..tables.orders import CrossedTable, OrderTable
+    from ..orders import OrderTable
+    from ..orders.solve.films import Layers
+    from ..orders.solve.recipes import SolvedRecipe
+    from ..orders.solve.settings import Estimate
 
 #: Options that an imported file does not have.
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
-    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "theta", "phi",
-    "step", "jobs", "workers", "scheduler",
+    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "theta", "phi", "step",
+    "jobs", "workers", "scheduler",
 )  # fmt: skip
 #: Options that override fields of a recipe.
 _OF_A_RECIPE = (
@@ -112,14 +111,12 @@ def run(args: argparse.Namespace) -> Figures:
     source = Path(args.source)
     output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
-        from ..solve.measured import read_orders
+        from ..orders.listed import read_orders
 
         _check_import(args)
         check_outputs([output])
         period = (args.period, args.period_y) if args.period_y else args.period
-        table: OrderTable | CrossedTable = read_orders(
-            source, period, superstrate=args.superstrate or 1.0
-        )
+        table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
     elif args.crossed:
         check_outputs([output])
         table = solve_crossed_cell(source, output, args)
@@ -147,8 +144,8 @@ def _check_import(args: argparse.Namespace) -> None:
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     """Return the problem of a recipe and of the options that override it."""
-    from ..solve.orders import Settings
-    from ..solve.recipes import SolvedRecipe, profile_of
+    from ..orders.solve.recipes import SolvedRecipe, profile_of
+    from ..orders.solve.settings import Settings
 
     source = Path(args.source)
     options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
@@ -173,27 +170,15 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     """Solve a recipe on the requested processes; partial solutions are stored beside the output."""
-    from ..solve.accuracy import WORST
-    from ..solve.beam import solve_beam
-    from ..solve.block import solve_block
-    from ..solve.jobs import Jobs, remove_results
-    from ..solve.orders import solve_orders
+    from ..orders.solve.accuracy import WORST
+    from ..orders.solve.jobs import Jobs, remove_results
+    from ..orders.solve.orders import solve_orders
 
-    medium: dict[str, Any] = {
-        name: getattr(recipe, name) for name in ("superstrate", "layers", "beneath", "substrate")
-    }
-    solve: Callable[..., OrderTable] = functools.partial(solve_orders, thin=recipe.thin, **medium)
+    light: dict[str, Any] = {}
     if recipe.block:
         _check_block(recipe, args)
-        solve = solve_block
-    elif args.theta is not None:
-        _check_beam(recipe, args)
-        light: dict[str, Any] = {
-            "theta": args.theta,
-            "phi": args.phi or 0.0,
-            "step": args.step or 5.0,
-        }
-        solve = functools.partial(solve_beam, **light, **medium)
+    if args.theta is not None:
+        light = {"theta": args.theta, "phi": args.phi or 0.0, "step": args.step or 5.0}
     elif args.phi is not None or args.step is not None:
         args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
@@ -211,9 +196,16 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
                 f"'{folder}'{limits}"
             )
 
-        table = solve(
+        table = solve_orders(
             recipe.profile,
             recipe.material,
+            superstrate=recipe.superstrate,
+            thin=recipe.thin,
+            block=recipe.block,
+            layers=recipe.layers,
+            beneath=recipe.beneath,
+            substrate=recipe.substrate,
+            **light,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -222,21 +214,11 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     return table
 
 
-def _check_beam(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
-    """Refuse thin sheets and matrices with `--theta`, with a usage error."""
-    for name, used in (("thin", recipe.thin), ("polarised", recipe.settings.polarised)):
-        if used:
-            args.parser.error(
-                f"argument --theta: not allowed with --{name}: reflected shares alone"
-            )
-
-
 def _check_block(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
     """Refuse what blocks do not have, with a usage error."""
     for name, used in (
         ("thin", recipe.thin), ("superstrate", recipe.superstrate != 1.0),
         ("layer", recipe.layers), ("beneath", recipe.beneath), ("substrate", recipe.substrate),
-        ("theta", args.theta is not None),
     ):  # fmt: skip
         if used:
             args.parser.error(
@@ -245,7 +227,7 @@ def _check_block(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
             )
 
 
-def _report(table: OrderTable | CrossedTable, output: Path) -> Iterator[tuple[str, str]]:
+def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
     """Yield lines on the table, each with its label."""
     facts: dict[str, Any] = dict(table.header)
     low, high = table.wavelengths
@@ -283,7 +265,7 @@ def _pair(text: str) -> tuple[float, float]:
 
 def _layer(text: str) -> Layers:
     if text.endswith(".toml"):
-        from ..solve.films import read_layers
+        from ..orders.solve.films import read_layers
 
         try:
             return read_layers(text)

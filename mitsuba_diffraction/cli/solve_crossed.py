@@ -12,7 +12,7 @@ from .console import Bar, say
 from .workers import executor_for
 
 if TYPE_CHECKING:
-    from ..tables.orders import CrossedTable
+    from ..orders import OrderTable
 
 #: Options that crossed gratings do not have.
 _GROOVES_ONLY = (
@@ -21,11 +21,11 @@ _GROOVES_ONLY = (
 )  # fmt: skip
 
 
-def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> CrossedTable:
+def solve_crossed_cell(source: Path, output: Path, args: argparse.Namespace) -> OrderTable:
     """Solve a crossed grating."""
     from ..heights.read import LoadOptions, read_heights
-    from ..solve.crossed import solve_crossed
-    from ..solve.jobs import remove_results
+    from ..orders.solve.crossed import solve_crossed
+    from ..orders.solve.jobs import remove_results
 
     options.refuse(args, _GROOVES_ONLY, ": not allowed with --crossed")
     if args.period is None:

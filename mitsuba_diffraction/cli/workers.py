@@ -123,7 +123,7 @@ def executor_for(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
             with executor_of(client) as workers:
                 yield workers, count
         return
-    from ..solve.jobs import processes
+    from ..orders.solve.jobs import processes
 
     jobs, most = args.jobs or 1, 4 * cores()
     if jobs > most:

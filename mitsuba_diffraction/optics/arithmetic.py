@@ -63,6 +63,15 @@ class Arithmetic(Protocol):
     complex: Callable[[Number, Number], Number]
     #: Whether a number is complex by its type.
     is_complex: Callable[[Number], bool]
+    #: x clipped to [low, high]; NaN becomes low, so that its integer part is an index.
+    bounded: Callable[[Number, Number, Number], Number]
+    #: Integer part of x ≥ 0 as an index, a mask as index 0 or 1, and an index as a number.
+    index: Callable[[Number], Number]
+    flag: Callable[[Mask], Number]
+    number: Callable[[Number], Number]
+    #: x without its derivative.
+    constant: Callable[[Number], Number]
+    arctan2: Callable[[Number, Number], Number]
 
 
 class _Arrays:
@@ -70,8 +79,22 @@ class _Arrays:
 
     sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
     floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
-    arcsin, power = np.arcsin, np.power
-    where, clip, expm1 = np.where, np.clip, np.expm1
+    arcsin, power, arctan2 = np.arcsin, np.power, np.arctan2
+    where, clip, expm1, constant = np.where, np.clip, np.expm1, np.asarray
+
+    @staticmethod
+    def bounded(x: Number, low: Number, high: Number) -> Number:
+        return np.where(x > low, np.minimum(x, high), low)
+
+    @staticmethod
+    def index(x: Number) -> Number:
+        return np.asarray(x).astype(np.int64)
+
+    flag = index
+
+    @staticmethod
+    def number(index: Number) -> Number:
+        return np.asarray(index).astype(np.float64)
 
     @staticmethod
     def is_complex(x: Number) -> bool:
@@ -97,7 +120,12 @@ class _Plain:
     floor, absolute, minimum, maximum = math.floor, abs, min, max
     arcsin, power = math.asin, pow
     reciprocal, fma, expm1 = _Arrays.reciprocal, _Arrays.fma, math.expm1
-    complex = complex
+    complex, arctan2 = complex, math.atan2
+    index, flag, number, constant = int, int, float, float
+
+    @staticmethod
+    def bounded(x: float, low: float, high: float) -> float:
+        return min(x, high) if x > low else low
 
     @staticmethod
     def exp2(x: float) -> float:

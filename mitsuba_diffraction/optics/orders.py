@@ -1,6 +1,6 @@
 """Orders of a grating: coordinates of their efficiencies, and lobes under the coherence window.
 
-Formulas for any numbers of `arithmetic`. `tables.orders.cells` explains the coordinates. Period d,
+Formulas for any numbers of `arithmetic`. `orders.cells` explains the coordinates. Period d,
 medium of index n, vacuum wavelength λ, wavenumber k = 2π/λ; (u, v) is the tangential part of
 ωi + ωo, in the patch's frame.
 """

@@ -19,9 +19,9 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES, linear_srgb, response
+from ..orders import OrderTable
 from ..plugin.description import Consumer, Feature, Surface
 from ..tables.exr import write_channels
-from ..tables.orders import OrderTable
 from .formulas import order_formulas, patch_formulas, shader_file
 from .patch import (
     energy_texture,

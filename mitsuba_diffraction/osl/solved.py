@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.orders import least_c
-from ..tables.orders import OrderTable, cells
-from ..tables.orders.grids import leaving_transmittance, middles, rows
-from ..tables.orders.table import Counts
+from ..orders import OrderTable, cells
+from ..orders.cells import Counts
+from ..orders.rows import constant, kinds_of, leaving_transmittance, middles, rows
 from .spectrum import NODES, drawn_spectrum
 
 #: Cells along τ, ρ and w of a table in air, and under a clear layer; fewer in large tables.
@@ -50,19 +50,17 @@ def order_texture(table: OrderTable) -> OrderTexture:
     """
     counts = _counts(table)
     starts, parts, total = [], [], 0
-    for band in table.bands:
-        for kind in (cells.A, cells.B):
-            starts.append(total)
-            if kind == cells.B and band.b is None:
-                continue
-            within = rows(table, band, kind, counts).within
-            channels = within.shape[-1]
-            packs = -(-channels // 4)
-            padded = np.pad(within, [(0, 0)] * 4 + [(0, 4 * packs - channels)])
-            # (τ, ρ, w, j, pack, 4) to tiles (j, pack, w) of (ρ, τ, 4)
-            split = padded.reshape(*within.shape[:4], packs, 4)
-            parts.append(split.transpose(3, 4, 2, 1, 0, 5).reshape(-1, *split.shape[1::-1], 4))
-            total += channels * packs
+    for of in kinds_of(table):
+        starts.append(total)
+        within = rows(table, of, counts).within
+        packs = -(-of.ports // 4)
+        padded = np.pad(within, [(0, 0)] * 4 + [(0, 4 * packs - of.ports)])
+        # (τ, ρ, w, j, pack, 4) to tiles (j, pack, w) of (ρ, τ, 4)
+        split = padded.reshape(*within.shape[:4], packs, 4)
+        parts.append(split.transpose(3, 4, 2, 1, 0, 5).reshape(-1, *split.shape[1::-1], 4))
+        total += of.ports * packs
+        if (of.band, of.kind) == (0, cells.A):
+            starts.append(total)  # kind B of band 0 has no light
     tiles = np.concatenate(parts)
     height, width = counts.rho + 1, counts.tau + 1
     across = math.ceil(math.sqrt(len(tiles) * height / width))
@@ -78,16 +76,15 @@ def interpolation_error(table: OrderTable, texture: OrderTexture) -> dict[str, f
     """Return errors of the centres of the texture's cells, as shares of the incident light."""
     finer = Counts(*(2 * count for count in texture.counts))
     differences = []
-    for band in table.bands:
-        for kind, _ in enumerate(band.kinds):
-            exact = rows(table, band, kind, finer)
-            corners = exact.within[::2, ::2, ::2].astype(np.float16).astype(np.float64)
-            centre, through = (part[1::2, 1::2, 1::2] for part in exact)
-            # transmittance of the face for light of a channel; what cannot leave is never seen
-            face = (through / np.maximum(centre, 1e-30)).max(axis=-2)
-            face = np.where(face > _TRAPPED, face, 0.0)
-            error = np.abs(middles(corners) - centre) * face[..., :, None] * face[..., None, :]
-            differences.append(error[np.broadcast_to(face[..., :, None] > 0.0, error.shape)])
+    for of in kinds_of(table):
+        exact = rows(table, of, finer)
+        corners = exact.within[::2, ::2, ::2].astype(np.float16).astype(np.float64)
+        centre, through = (part[1::2, 1::2, 1::2] for part in exact)
+        # transmittance of the face for light of a channel; what cannot leave is never seen
+        face = (through / np.maximum(centre, 1e-30)).max(axis=-2)
+        face = np.where(face > _TRAPPED, face, 0.0)
+        error = np.abs(middles(corners) - centre) * face[..., :, None] * face[..., None, :]
+        differences.append(error[np.broadcast_to(face[..., :, None] > 0.0, error.shape)])
     joined = np.concatenate(differences)
     return {"mean": float(joined.mean()), "largest of 99.9 %": float(np.quantile(joined, 0.999))}
 
@@ -147,11 +144,9 @@ def _mean_remainder(table: OrderTable) -> float:
 def _counts(table: OrderTable) -> Counts:
     """Return the numbers of cells that fit into the texture."""
     counts = _CELLS if table.superstrate == 1.0 else _UNDER_LAYER
-    if table.superstrate == 1.0 and all(band.counts == (1, 1, 1) for band in table.bands):
+    if table.superstrate == 1.0 and constant(table):
         return Counts(1, 1, 1)
-    tiles = sum(
-        kind.shape[3] * -(-kind.shape[3] // 4) for band in table.bands for kind in band.kinds
-    )
+    tiles = sum(of.ports * -(-of.ports // 4) for of in kinds_of(table))
     while tiles * math.prod(n + 1 for n in counts) > _MOST_PIXELS and max(counts) > 2:
         counts = Counts(*(max(2, 3 * n // 4) for n in counts))
     return counts

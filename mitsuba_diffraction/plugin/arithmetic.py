@@ -8,7 +8,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..optics import arithmetic
-from .types import Float, Index, Number
+from .memory import index_between
+from .types import Float, Index, Mask, Number
 
 
 def maximum(x: Float, least: Float) -> Float:
@@ -54,8 +55,14 @@ class _Kernel:
     sqrt, exp, exp2, log2, sin, cos = dr.sqrt, dr.exp, dr.exp2, dr.log2, dr.sin, dr.cos
     floor, absolute, reciprocal, fma, where = dr.floor, dr.abs, dr.rcp, dr.fma, dr.select
     minimum, maximum, clip = staticmethod(minimum), staticmethod(maximum), staticmethod(clip)
-    arcsin, power = dr.asin, dr.power
+    arcsin, power, arctan2 = dr.asin, dr.power, dr.atan2
     is_complex = dr.is_complex_v
+    bounded, constant = staticmethod(index_between), dr.detach
+    index, number = staticmethod(index_of), staticmethod(float_of)
+
+    @staticmethod
+    def flag(mask: Mask) -> Index:
+        return dr.select(mask, mi.UInt32(1), mi.UInt32(0))
 
     @staticmethod
     def complex(real: Float, imag: Float) -> Number:

@@ -18,7 +18,6 @@ from ..errors import DiffractionError, warn
 from ..heights.field import HeightField
 from ..optics.geometry import sigma_of
 from ..tables.directional import DirectionalTable
-from ..tables.orders import CrossedTable, OrderTable
 from ..tables.table import DiffractionTable
 from .types import BSDF, Interaction, Texture
 
@@ -81,6 +80,26 @@ class Quantity:
 Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
+class SolvedOrders(Protocol):
+    """Table of solved orders, as far as this room knows it; see `orders.table.OrderTable`."""
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Periods along x and y, µm; infinite along y for grooves."""
+
+    @property
+    def header(self) -> Mapping[str, Any]:
+        """Facts about the table."""
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Wavelengths between which light has efficiencies, nm."""
+
+    @property
+    def crossed(self) -> bool:
+        """Whether the grating repeats along y as well."""
+
+
 def unscaled(height_scale: float) -> DirectionalTable | None:
     """Return None: all values are 1 at every height scale."""
     return None
@@ -123,7 +142,7 @@ class Surface:
     transmits : whether light goes through.
     """
 
-    table: DiffractionTable | OrderTable | CrossedTable
+    table: DiffractionTable | SolvedOrders
     text: str
     coherence_width: float
     orientation: Quantity
@@ -152,9 +171,9 @@ class Surface:
         return self.table
 
     @property
-    def orders(self) -> OrderTable | None:
-        """Table of solved orders of grooves, or None."""
-        return self.table if isinstance(self.table, OrderTable) else None
+    def orders(self) -> Any:
+        """Table of solved orders, or None."""
+        return self.table if self.solved else None
 
     @property
     def solved(self) -> bool:
@@ -182,8 +201,8 @@ class Surface:
         known = {"": None, "small_slope": Feature.SMALL_SLOPE, "kirchhoff": Feature.KIRCHHOFF}
         turned, tall, wide = self.orientation, self.height_scale, self.lateral_scale
         present = {
-            Feature.ORDERS: self.orders is not None,
-            Feature.CROSSED: isinstance(self.table, CrossedTable),
+            Feature.ORDERS: self.solved and not self.orders.crossed,
+            Feature.CROSSED: self.solved and self.orders.crossed,
             Feature.HEIGHTS: not self.solved,
             Feature.LIMITED: not self.solved and self.patch.limited,
             Feature.TRANSMISSION: self.transmits,

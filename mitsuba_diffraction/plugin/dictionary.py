@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import mitsuba as mi
 
 from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
-from ..tables.orders import CrossedTable, OrderTable
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -26,16 +25,28 @@ class HeightData(mi.Object):
         self.field = field
 
 
-class OrderData(mi.Object):
-    """Table of orders in an object that a dictionary of Mitsuba's can hold."""
+@runtime_checkable
+class Pluggable(Protocol):
+    """Table with a BSDF of its own, such as an `OrderTable`.
 
-    def __init__(self, table: OrderTable | CrossedTable) -> None:
+    Attributes
+    ----------
+    plugin : name of the BSDF.
+    """
+
+    plugin: str
+
+
+class TableData(mi.Object):
+    """Such a table in an object that a dictionary of Mitsuba's can hold."""
+
+    def __init__(self, table: Pluggable) -> None:
         super().__init__()
         self.table = table
 
 
 def bsdf_dict(
-    field: HeightField | OrderTable | CrossedTable | str | os.PathLike[str],
+    field: HeightField | Pluggable | str | os.PathLike[str],
     plugin: str = "diffraction",
     **parameters: Any,
 ) -> dict[str, Any]:
@@ -58,8 +69,8 @@ def bsdf_dict(
     """
     check_choice("bsdf_dict: plugin", plugin, PLUGINS)
     arguments = {name: value for name, value in parameters.items() if value is not None}
-    if isinstance(field, OrderTable | CrossedTable):
-        return {"type": ORDERS, "data": OrderData(field), **arguments}
+    if isinstance(field, Pluggable):
+        return {"type": field.plugin, "data": TableData(field), **arguments}
     if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
         return {"type": ORDERS, "table": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):

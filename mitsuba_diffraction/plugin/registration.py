@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Sequence
 
 import mitsuba as mi
 
@@ -15,31 +16,31 @@ from . import arithmetic, installed
 
 # Base classes first
 _MODULES = (
-    "base", "surface", "diffraction", "diffraction_dielectric",
-    "orders.diffraction_orders", "orders.orders_sheet", "orders.orders_block", "diffraction_mix",
-    "presets",
+    "base", "surface", "diffraction", "diffraction_dielectric", "diffraction_mix", "presets",
 )  # fmt: skip
 
 
-def register(old: str | None, new: str | None) -> None:
+def register(modules: Sequence[str], variant: str | None) -> None:
     """Define the plugins for the variant just set: their base class is another in each."""
-    if new is None:
+    if variant is None:
         return
-    for module in (f"{__package__}.{name}" for name in _MODULES):
+    for module in modules:
         if module in sys.modules:
             importlib.reload(sys.modules[module])
         else:
             importlib.import_module(module)
 
 
-def register_in_all() -> None:
+def register_in_all(*more: str) -> None:
     """Register the plugins in the current variant, and in every one that is set later.
 
     Mitsuba then looks for files in its own folder first (`installed`).
+
+    more : modules of rooms above, which define plugins.
     """
     installed.search_first()
     installed.reserve_names()
     arithmetic.register()
-    mi.detail.add_variant_callback(register)
-    if mi.variant() is not None:
-        register(None, mi.variant())
+    modules = (*(f"{__package__}.{name}" for name in _MODULES), *more)
+    mi.detail.add_variant_callback(lambda old, new: register(modules, new))
+    register(modules, mi.variant())

@@ -11,10 +11,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.orders import CrossedTable, OrderTable
-from ..tables.table import DiffractionTable
 from .arithmetic import clip
-from .description import Surface, describe
+from .description import SolvedOrders, Surface, describe
 from .properties import number
 from .textures import is_attribute, uv_square
 from .types import BSDF, Float, Interaction, Mask, Properties, Texture
@@ -135,7 +133,7 @@ class DepthWeights(Weights):
         self._depths = {name: _depth_of(name, table) for name, table in tables.items()}
         first = next(iter(tables))
         for name, table in tables.items():
-            if _periods(table) != _periods(tables[first]):
+            if table.periods != tables[first].periods:
                 raise DiffractionError(
                     f"{DEPTH}: the periods of {first} and {name} differ, so their orders leave in "
                     "other directions; give one profile at several depths"
@@ -170,23 +168,19 @@ class DepthWeights(Weights):
         return [dr.select(active, weights[name], 0.0) for name in self._depths]
 
 
-def _table_of(name: str, bsdf: BSDF) -> OrderTable | CrossedTable:
+def _table_of(name: str, bsdf: BSDF) -> SolvedOrders:
     """Return the solved orders of a surface."""
     described = describe(bsdf)
-    table = described.table if isinstance(described, Surface) else None
-    if table is None or isinstance(table, DiffractionTable):
+    if not isinstance(described, Surface) or not described.solved:
         raise DiffractionError(
             f"{DEPTH}: {name} has no solved orders; a depth blends surfaces of type "
             "'diffraction_orders', and weights blend any others"
         )
-    return table
+    orders: SolvedOrders = described.orders
+    return orders
 
 
-def _periods(table: OrderTable | CrossedTable) -> tuple[float, ...]:
-    return table.periods if isinstance(table, CrossedTable) else (table.period,)
-
-
-def _depth_of(name: str, table: OrderTable | CrossedTable) -> float:
+def _depth_of(name: str, table: SolvedOrders) -> float:
     """Return the depth of a surface's profile, µm."""
     depth = table.header.get(DEPTH)
     if not isinstance(depth, int | float):

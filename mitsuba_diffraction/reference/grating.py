@@ -25,7 +25,7 @@ from .fresnel import reflectance
 Real = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 #: Efficiency of order m: from x, y, the wavelength (nm) and m, arrays of one shape. x and y are
-#: direction cosines within the layer of the mirror direction, −ωi; see `tables.orders.cells`.
+#: direction cosines within the layer of the mirror direction, −ωi; see `orders.cells`.
 Efficiency = Callable[[Real, Real, Real, Real], Real]
 
 

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
+from ..orders.file import load_orders
 from ..plugin.dictionary import ORDERS, PLUGINS
 from ..plugin.parameters import NAMES
 from ..plugin.presets import MATERIALS, find_preset
 from ..plugin.presets import PLUGIN as PRESET_PLUGIN
-from ..tables.orders import load_any_orders
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .orbit import ORBIT
 from .orientation.mesh_files import write_ply
@@ -339,7 +339,7 @@ def _value(text: str) -> float | bool | str:
 def _two_sided(state: Any, surface: Any) -> Any:
     """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
     name = surface.plugin_name()
-    if name == TRANSMITTING or (name == ORDERS and load_any_orders(surface["table"]).sides == 2):
+    if name == TRANSMITTING or (name == ORDERS and load_orders(surface["table"]).sides == 2):
         return surface
     props = mi.Properties("twosided")
     props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))

@@ -9,8 +9,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS
+from mitsuba_diffraction.orders import Band, OrderTable
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
-from mitsuba_diffraction.tables.orders import Band, OrderTable
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
 from tests.support.patches import DEFAULTS, PATCH

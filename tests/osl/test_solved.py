@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, OrderTable
+from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.osl.solved import interpolation_error, order_constants, order_texture
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
-from mitsuba_diffraction.tables.orders import cells
 from tests.support.orders import thin_grating
 
 TABLE = thin_grating()

@@ -10,16 +10,6 @@ import pytest
 
 from mitsuba_diffraction.tables.energy.settings import use_energy_settings
 from tests.support.coarse import coarse_energy
-from tests.support.variants import ALL, runs
-
-
-@pytest.fixture(params=ALL)
-def every_variant(request: pytest.FixtureRequest) -> str:
-    """A variant, set."""
-    if not runs(request.param):
-        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
-    mi.set_variant(request.param)
-    return str(request.param)
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.tables.orders import Band, OrderTable, blocks, cells
-from mitsuba_diffraction.tables.orders.table import Counts
+from mitsuba_diffraction.orders import Band, Cells, OrderTable, blocks, cells
+from mitsuba_diffraction.orders.cells import Counts
 from tests.support.directions import Array
 
 
@@ -22,7 +22,7 @@ def block_grating(
 
     def kind(k: int, kind: int) -> np.ndarray:
         channels = np.arange(k + 1 - kind)
-        tau, rho, w = (blocks.even_nodes(n)[..., None] for n in counts)
+        tau, rho, w = (cells.even_nodes(n)[..., None] for n in counts)
         tau, rho = tau[:, None, None], rho[:, None]
         lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, optical)
         light = cells.from_cell(k, kind, channels, tau, rho, lam, optical)
@@ -32,13 +32,14 @@ def block_grating(
         values = np.select([order == 0, order == 1], [zeroth, strength], 0.0) * scale
         values /= np.maximum(values.sum(axis=-1, keepdims=True), 1.0)
         values[..., port, port] = np.maximum(1.0 - values.sum(axis=-1), 0.0)
-        return np.repeat(values[..., None], 2, axis=-1).astype(np.float32)
+        return values[..., None].astype(np.float32)
 
     bands = tuple(
         Band(k, kind(k, cells.A), kind(k, cells.B) if k else None)
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
-    return OrderTable(period, wavelengths, bands, header={"profile": "weak"}, block=index)
+    response, header = Cells(bands, even=True), {"profile": "weak"}
+    return OrderTable((period, np.inf), wavelengths, response, header=header, block=index)
 
 
 BLOCK = block_grating()

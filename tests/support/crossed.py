@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import jv
 
-from mitsuba_diffraction import CrossedTable
-from mitsuba_diffraction.solve.efficiencies import Efficiencies
-from mitsuba_diffraction.solve.measured_crossed import crossed_table
-from mitsuba_diffraction.tables.orders.crossed import most_orders, propagates
+from mitsuba_diffraction.optics.orders import crossed_square
+from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders.listed import imported_table
+from mitsuba_diffraction.orders.lists import Efficiencies
+from mitsuba_diffraction.orders.solve.crossed import most_orders
 
 PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
 #: Reflectance; and amplitudes of the sine waves along x and y, µm.
@@ -21,7 +22,8 @@ def efficiency(x, y, wavelength, m, n):
     cosines = [np.sqrt(np.maximum(1.0 - a * a - b * b, 0.0)) for a, b in ((x, y), out)]
     phase = 2e3 * np.pi / wavelength * sum(cosines)
     powers = jv(m, DEPTHS[0] * phase) ** 2 * jv(n, DEPTHS[1] * phase) ** 2
-    return np.where(propagates(x, y, wavelength, m, n, PERIODS), REFLECTANCE * powers, np.nan)
+    shifts = (1e-3 * k * wavelength / d for k, d in zip((m, n), PERIODS, strict=True))
+    return np.where(crossed_square(x, y, *shifts) > 0.0, REFLECTANCE * powers, np.nan)
 
 
 def listed(theta, phi, wavelengths):
@@ -37,11 +39,11 @@ def listed(theta, phi, wavelengths):
     return Efficiencies(np.asarray(wavelengths), theta, phi, pairs.T, values)
 
 
-def table() -> CrossedTable:
+def table() -> OrderTable:
     """Its table."""
     grid = listed(np.arange(0.0, 86.0, 5.0), np.arange(0.0, 360.0, 15.0), np.arange(450, 651, 20.0))
     header = {"solver": "closed form", "material": "mirror", "profile": "sine waves"}
-    return crossed_table(grid, PERIODS, "the closed form", header)
+    return imported_table(grid, PERIODS, 1.0, "the closed form", header)
 
 
 def save_csv(grid: Efficiencies, path) -> None:

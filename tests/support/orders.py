@@ -12,9 +12,9 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.orders import Band, Cells, OrderTable, cells
+from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, small_slope, turn
-from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
-from mitsuba_diffraction.tables.orders.table import Counts
 from tests.support.directions import Array, as_single, uniform_directions
 
 PERIOD = 1.6  # µm
@@ -56,14 +56,14 @@ def thin_grating(
         values = np.where(order == 0, reflectance * jv(0, phase) ** 2, power)
         if thin:
             values = np.kron(SHARES, values)
-        return np.repeat(values[..., None], 2, axis=-1).astype(np.float32)
+        return np.stack([values, 0.0 * values], axis=-1).astype(np.float32)
 
     bands = tuple(
         Band(k, kind(k, cells.A), kind(k, cells.B) if k else None)
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
     header = {"profile": "thin sinusoid"}
-    return OrderTable(period, wavelengths, bands, superstrate, header, thin)
+    return OrderTable((period, np.inf), wavelengths, Cells(bands), superstrate, header, thin)
 
 
 def shallow_grating(
@@ -101,11 +101,10 @@ def shallow_grating(
     bands = []
     for k in range(cells.largest_band(wavelengths, optical) + 1):
         of_kinds = [matrices(k, kind) for kind in ((cells.A, cells.B) if k else (cells.A,))]
-        first = [of_kind[..., 0, :2] for of_kind in of_kinds]
-        powers = [np.stack([m[..., 0] + m[..., 1], m[..., 0] - m[..., 1]], -1) for m in first]
-        singles = [[part.astype(np.float32) for part in parts] for parts in (powers, of_kinds)]
-        bands.append(Band(k, *singles[0], mueller=tuple(singles[1])))
-    return OrderTable(period, wavelengths, tuple(bands), superstrate, {"profile": "shallow"})
+        flat = [m.reshape(*m.shape[:-2], 16).astype(np.float32) for m in of_kinds]
+        bands.append(Band(k, *flat))
+    response, header = Cells(tuple(bands)), {"profile": "shallow"}
+    return OrderTable((period, np.inf), wavelengths, response, superstrate, header)
 
 
 def groove_matrices(wi: Array, wo: Array, jones: Array) -> Array:

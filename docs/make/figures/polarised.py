@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.tables.orders import OrderTable
+from mitsuba_diffraction.orders import OrderTable
 
 from . import pages
 from .pages import exit_code, write_jpeg

@@ -15,12 +15,12 @@ import numpy as np
 
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics.geometry import sigma_of
-from mitsuba_diffraction.solve.grating_index import material_of
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.profiles import Profile, sinusoidal
-from mitsuba_diffraction.solve.sheet import sheet_efficiencies
-from mitsuba_diffraction.solve.stations import Grating
-from mitsuba_diffraction.tables.orders import cells
+from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.profiles import Profile, sinusoidal
+from mitsuba_diffraction.orders.solve.sheet import sheet_efficiencies
+from mitsuba_diffraction.orders.solve.stations import Grating
 
 from . import pages
 from .pages import exit_code

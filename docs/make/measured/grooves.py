@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.solve.profiles import Profile
+from mitsuba_diffraction.orders.solve.profiles import Profile
 
 # samples of a rounded profile
 _SAMPLES = 1600

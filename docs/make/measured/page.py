@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from docs.make.validation.pages.markdown import table
-from mitsuba_diffraction.solve.coupled import CoupledWaves
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.profiles import Profile
+from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.profiles import Profile
 
 from . import cases, outside, predict, shapes
 from .cases import Case

@@ -12,11 +12,11 @@ from docs.make.validation.model import efficiencies, in_plane
 from docs.make.validation.published import light_of
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.solve.chandezon import Chandezon
-from mitsuba_diffraction.solve.grating_index import material_of
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.profiles import Profile
-from mitsuba_diffraction.solve.stations import Solver, Station
+from mitsuba_diffraction.orders.solve.chandezon import Chandezon
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.profiles import Profile
+from mitsuba_diffraction.orders.solve.stations import Solver, Station
 
 from .grooves import heights_of
 

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.solve.chandezon import Chandezon
-from mitsuba_diffraction.solve.coupled import CoupledWaves
-from mitsuba_diffraction.solve.grating_index import material_of
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.recipes import SolvedRecipe
-from mitsuba_diffraction.solve.stations import Grating, Solver, Station
-from mitsuba_diffraction.tables.orders import cells
+from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve.chandezon import Chandezon
+from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
+from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
 from .cases import PIXELS
 from .model import efficiencies

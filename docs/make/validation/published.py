@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.solve.chandezon import Chandezon
-from mitsuba_diffraction.solve.coupled import CoupledWaves
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
-from mitsuba_diffraction.solve.stations import Solver, Station
+from mitsuba_diffraction.orders.solve.chandezon import Chandezon
+from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.stations import Solver, Station
 
 #: Metal of the lamellar gratings.
 _METAL = 0.22 + 6.71j

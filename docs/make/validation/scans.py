@@ -25,7 +25,7 @@ LIGHT = 45.0  # degrees; the detector is at the normal
 #: Degrees from the mirror direction of light from 30°, at which crops are compared.
 BESIDE = (7.0, 10.0, 15.0, 20.0, 30.0)
 _STEP = 2.0  # nm
-_PIXELS = 192  # a side
+_FINEST = 0.2  # µm: a pixel that resolves the orders of all wavelengths
 #: Angle from the mirror, side of a crop and pixels of the whole: crops of 10 µm of 133 µm.
 _CROP, _WHOLE, _PIXEL = 77, 1024, 0.13
 
@@ -91,9 +91,10 @@ def hue(side: float, period: float, turn: float, order: int, phase: float) -> Hu
     lam = np.arange(middle - reach, middle + reach, _STEP)
     k, up = 2e3 * np.pi / lam, 1.0 + np.cos(np.radians(LIGHT))
     half = order / (2e3 * np.pi / middle * up)  # µm: as high as this order is strong
-    x, y = np.meshgrid(*(np.arange(_PIXELS) * side / _PIXELS,) * 2)
+    count = max(128, round(side / _FINEST))
+    x, y = np.meshgrid(*(np.arange(count) * side / count,) * 2)
     heights = half * np.sin(2 * np.pi * (cos * x + sin * y) / period + phase)
-    scan = HeightField(heights, side / _PIXELS, cut_out=True)
+    scan = HeightField(heights, side / count, cut_out=True)
     wi = np.array([cos * sine, sin * sine, up - 1.0])
     seen = reference.brdf(scan, wi, [0.0, 0.0, 1.0], lam)
     sigma = sigma_of(usual_window(side))

@@ -9,16 +9,16 @@ import numpy as np
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.coat import face_transmittance
-from mitsuba_diffraction.solve.block import solve_block
-from mitsuba_diffraction.solve.crossed import UnitCell, reflected
-from mitsuba_diffraction.solve.films import structure_of
-from mitsuba_diffraction.solve.grating_index import material_of
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.jobs import AUTO, problem_of, solver_of
-from mitsuba_diffraction.solve.orders import Settings
-from mitsuba_diffraction.solve.profiles import Profile, lamellar, sinusoidal
-from mitsuba_diffraction.solve.stations import Grating
-from mitsuba_diffraction.tables.orders import cells
+from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve.crossed import UnitCell, reflected
+from mitsuba_diffraction.orders.solve.films import structure_of
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.jobs import AUTO, problem_of, solver_of
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.orders.solve.stations import Grating
 
 from . import crossed
 
@@ -127,9 +127,8 @@ def _closed_forms() -> Iterator[Compared]:
         quarter_wave_reflectance(low, high, 1.52, pairs), "closed form",
     )  # fmt: skip
     index = 1.5
-    block = solve_block(
-        lamellar(0.4, 1e-7), index, settings=Settings((500.0, 560.0), tolerance=0.1, resolution=4)
-    )
+    flat = Settings((500.0, 560.0), tolerance=0.1, resolution=4)
+    block = solve_orders(lamellar(0.4, 1e-7), index, block=True, settings=flat)
     for theta, from_within in ((30.0, False), (80.0, False), (30.0, True), (41.0, True)):
         x = np.sin(np.radians(theta)) * (index if from_within else 1.0)
         cosine = float(np.sqrt(1.0 - x * x))
@@ -181,7 +180,9 @@ def _ridges() -> Iterator[Compared]:
 
 def _sine() -> Iterator[Compared]:
     profile, index, limits = sinusoidal(0.4, 0.05), 1.5, (500.0, 560.0)
-    table = solve_block(profile, index, settings=Settings(limits, tolerance=0.02, resolution=8))
+    table = solve_orders(
+        profile, index, settings=Settings(limits, tolerance=0.02, resolution=8), block=True
+    )
     # the block below, as a thin sheet's upper side, with channels of the light above
     side = Grating(profile, material_of(index, limits), 1.0, limits, thin=True)
     station = side.station(1, 0, 0.3, 0.4, [0.3])

@@ -12,11 +12,11 @@ from scipy.special import ndtr
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...optics.orders import least_c
+from ...orders import OrderTable
+from ...orders.cells import Counts
+from ...orders.daylight import ENDS, daylight_weights
+from ...orders.rows import kinds_of, leaving_transmittance, rows
 from ...plugin.description import Surface
-from ...tables.orders import OrderTable, cells
-from ...tables.orders.daylight import ENDS, daylight_weights
-from ...tables.orders.grids import leaving_transmittance, rows
-from ...tables.orders.table import Counts
 from .lobes import AZIMUTHS, RINGS, pack_lobes
 from .texels import PAGE, Packed, Texture
 
@@ -98,16 +98,15 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
     """
     counts = cells_within(table, most_bytes)
     tiles = []
-    for band in table.bands:
-        for kind in (cells.A, cells.B)[: len(band.kinds)]:
-            values = rows(table, band, kind, counts)
-            whole = values.through.sum(axis=-1, keepdims=True)
-            within = np.minimum(values.within, MOST_WITHIN)
-            row = np.concatenate([within, whole], axis=-1).astype(np.float16)
-            groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
-            # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
-            row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
-            tiles.append(row.reshape(-1, counts.tau + 1, groups.shape[0] * (counts.rho + 1), 4))
+    for of in kinds_of(table):
+        values = rows(table, of, counts)
+        whole = values.through.sum(axis=-1, keepdims=True)
+        within = np.minimum(values.within, MOST_WITHIN)
+        row = np.concatenate([within, whole], axis=-1).astype(np.float16)
+        groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
+        # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
+        row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
+        tiles.append(row.reshape(-1, counts.tau + 1, groups.shape[0] * (counts.rho + 1), 4))
     joined = np.concatenate(tiles)
     columns = PAGE // joined.shape[2]
     joined = np.pad(joined, [(0, -len(joined) % columns), (0, 0), (0, 0), (0, 0)])
@@ -133,7 +132,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
 def cells_within(table: OrderTable, most_bytes: int) -> Counts:
     """Return the numbers of cells of a texture of this size at most."""
     counts = CELLS if table.superstrate == 1.0 else CELLS_UNDER_LAYER
-    tiles = sum(n * (n + 1) for band in table.bands for n in (kind.shape[3] for kind in band.kinds))
+    tiles = sum(of.ports * (of.ports + 1) for of in kinds_of(table))
     while max(counts) > 4:
         half_floats = (counts.tau + 1) * (counts.rho + 1) * (counts.w // 3) * 4
         if 2 * half_floats * tiles <= most_bytes:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
+from ...orders import OrderTable, cells
+from ...orders.cells import Counts
+from ...orders.rows import kinds_of, middles, rows, wavelength_of
 from ...plugin.description import Surface
 from ...progress import Progress
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
-from ...tables.orders import OrderTable, cells
-from ...tables.orders.grids import middles, rows, wavelength_of
-from ...tables.orders.table import Counts
 from ...tables.powers import power_series, powers_at
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
@@ -110,14 +110,14 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
 def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.float64]:
     """Return the ΔE2000 (n,) of orders in the middles of cells, which are farthest from nodes."""
     losses = []
-    step = max(1, len(table.bands) // _BANDS)
-    for band in table.bands[::step]:
-        fine = rows(table, band, cells.A, Counts(*(2 * n for n in counts)))
+    of_bands = [of for of in kinds_of(table) if of.kind == cells.A]
+    for of in of_bands[:: max(1, len(of_bands) // _BANDS)]:
+        fine = rows(table, of, Counts(*(2 * n for n in counts)))
         nodes = np.minimum(fine.within, MOST_WITHIN)[::2, ::2, ::2]
         lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
         exact, face = (values[1::2, 1::2, 1::2] for values in fine)
         rho, w = ((np.arange(n) + 0.5) / n for n in (counts.rho, counts.w))
-        lam = wavelength_of(table, (band.k + cells.sine_squared(rho))[:, None], w)
+        lam = wavelength_of(table, (of.band + cells.sine_squared(rho))[:, None], w)
         colours = linear_srgb(response(lam.ravel())).reshape(*lam.shape, 1, 1, 3)
         passed = (face / np.maximum(exact, 1e-12))[..., None] * colours
         difference = delta_e(exact[..., None] * passed, middles(lines)[..., None] * passed)

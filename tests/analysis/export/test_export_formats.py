@@ -15,7 +15,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.export import bird, rgl, zemax
 from mitsuba_diffraction.analysis.export.cells import ExportGrid
 from mitsuba_diffraction.optics.colour import delta_e
-from mitsuba_diffraction.tables.orders import OrderTable
+from mitsuba_diffraction.orders import OrderTable
 from tests.support.orders import thin_grating
 from tests.support.variants import obstacle
 

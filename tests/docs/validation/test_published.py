@@ -7,11 +7,11 @@ import pytest
 
 from docs.make.validation.published import PUBLISHED, light_of
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.solve.chandezon import Chandezon
-from mitsuba_diffraction.solve.coupled import CoupledWaves
-from mitsuba_diffraction.solve.integral import IntegralSolver
-from mitsuba_diffraction.solve.profiles import blazed, lamellar, sinusoidal
-from mitsuba_diffraction.solve.stations import reversed_light
+from mitsuba_diffraction.orders.solve.chandezon import Chandezon
+from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.stations import reversed_light
 
 pytest.importorskip("gratinglab")
 

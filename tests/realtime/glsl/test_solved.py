@@ -12,6 +12,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.realtime.glsl.context import Bindings
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
@@ -20,7 +21,6 @@ from mitsuba_diffraction.realtime.glsl.packing import pack_responses
 from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from mitsuba_diffraction.tables.orders import OrderTable
 from tests.support.orders import load, thin_grating
 from tests.support.shaders import DAYLIGHT, difference, probed
 

@@ -1,5 +1,5 @@
-// Efficiencies of solved orders, like plugin/orders/lookup.py: the cell of the incident light
-// (tables/orders/cells.py), and its tile in a texture (solved.py).
+// Efficiencies of solved orders, like orders/lookup.py: the cell of the incident light
+// (orders/cells.py), and its tile in a texture (solved.py).
 
 uniform sampler2D efficiencies;  // tiles of ρ × τ, side by side for groups of four w
 uniform vec3 order_cells;        // cells of a tile along τ, ρ and w
@@ -11,7 +11,7 @@ uniform float least_c;           // least c of light from outside the layer
 uniform vec2 solved_range;       // shortest and longest wavelength of the table, µm
 uniform vec2 solved_reach;       // ends of the light that it reflects, µm
 
-// Row of efficiencies of one direction and wavelength (Row of plugin/orders/lookup.py).
+// Row of efficiencies of one direction and wavelength (Row of orders/lookup.py).
 vec2 row_incident;               // tangential part of ωi in the patch's frame
 float row_wavelength;            // in vacuum, µm
 float row_face;                  // share of the light that the layer's face reflects

@@ -1,4 +1,4 @@
-// Light of all solved orders under the coherence window, like plugin/orders/lobes.py:
+// Light of all solved orders under the coherence window, like orders/bsdf/lobes.py:
 // f = Σ_m η_m (k²σ²/π) exp(−σ²|q − q_m|²).
 
 #define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
@@ -46,7 +46,7 @@ vec3 daylight_at(float k, float variance)
     return textureLod(daylight, (clamp(place, 0.0, 1.0) * (size - 1.0) + 0.5) / size, 0.0).rgb;
 }
 
-// All lobes, summed over daylight (tables/orders/daylight.py).
+// All lobes, summed over daylight (orders/daylight.py).
 vec3 all_orders(vec2 uv, int light)
 {
     uv.x = abs(uv.x) < 1e-4 ? 1e-4 : uv.x;

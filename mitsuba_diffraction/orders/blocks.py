@@ -1,0 +1,83 @@
+"""Tables of blocks: a profile between a rarer medium above and a clear dielectric below.
+
+Channels belong to the dielectric, of index n, in which more orders propagate: with tangential parts
+(x, y) of wave vectors over 2π/λ, `cells` have x/n, y/n and the optical period n d.
+Port j is channel j within, port count + j the same tangential part above, which has light if
+x² + y² < 1. Nodes are even in τ, ρ and w, from 0 to 1.
+
+Efficiencies have further kinks where channels above become propagating: at the critical angle of
+total reflection. They vanish in reduced efficiencies e, which are interpolated linearly:
+
+    order m:  η = G_j G_q e,    order 0 through the face:  η = F e,
+
+with G of `optics.orders.port_power`, and the flat face's transmittance F of unpolarised light. A
+block loses no light: order 0 of the reflection has 1 − Σ η, which is exact for the flat face.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..optics.coat import face_transmittance
+from ..optics.orders import port_power
+from . import cells
+from .cells import Array
+from .table import Band, OrderTable
+
+#: Least normal parts, within over n and above, from which on reduced efficiencies are known at a
+#: node; nearer to grazing, where solutions keep a distance, they have the next node's.
+_LEAST_WITHIN, _LEAST_ABOVE = 0.04, 0.05
+
+
+class PortFactors(NamedTuple):
+    """Factors between ports, of channels (…, n).
+
+    Attributes
+    ----------
+    scale : (…, 2n, 2n) from e to η; 0 in order 0 of the reflection, and where a port has no light.
+    known : (…, 2n, 2n) whether both ports are far enough from grazing.
+    """
+
+    scale: Array
+    known: NDArray[np.bool_]
+
+
+def factors(x: Array, y: Array, index: float) -> PortFactors:
+    """Return the factors of channels; x (…, n) and y (…, 1) or (…, n), over 2π/λ."""
+    above = 1.0 - x * x - y * y
+    within = above + (index**2 - 1.0)
+    z_within, z_above = (np.sqrt(np.maximum(square, 0.0)) for square in (within, above))
+    power = np.concatenate([port_power(z_within, above), port_power(z_above, within)], -1)
+    scale = power[..., :, None] * power[..., None, :]
+    lower = np.arange(count := x.shape[-1])
+    upper = count + lower
+    scale[..., lower, lower] = scale[..., upper, upper] = 0.0
+    scale[..., lower, upper] = scale[..., upper, lower] = face_transmittance(z_above, index)
+    far = np.concatenate([z_within > _LEAST_WITHIN * index, z_above > _LEAST_ABOVE], -1)
+    return PortFactors(scale, far[..., :, None] & far[..., None, :] & (scale > 0.0))
+
+
+def reduced(table: OrderTable, band: Band, kind: int) -> Array:
+    """Return the reduced efficiencies e (τ, ρ, w, j, q); 0 in order 0 of the reflection."""
+    assert table.block is not None
+    values = band.kind(kind)[..., 0].astype(np.float64)
+    tau, rho, w = (cells.even_nodes(n)[..., None] for n in band.counts)
+    tau, rho = tau[:, None, None], rho[:, None]
+    optical = table.optical_period
+    lam = cells.wavelength_of(band.k + cells.sine_squared(rho), w, table.wavelengths, optical)
+    channels = np.arange(values.shape[-1] // 2)
+    light = cells.from_cell(band.k, kind, channels, tau, rho, lam, optical)
+    scale, known = factors(table.block * light.x, table.block * light.y, table.block)
+    divided = np.where(known, values / np.where(known, scale, 1.0), 0.0)
+    for j, q in np.ndindex(divided.shape[3:]):
+        here = known[..., j, q]
+        if here.any() and not here.all():
+            nearest = scipy.ndimage.distance_transform_edt(
+                ~here, return_distances=False, return_indices=True
+            )
+            divided[..., j, q] = divided[(*nearest, j, q)]
+    return np.asarray(divided)

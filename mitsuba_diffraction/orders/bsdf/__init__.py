@@ -1,0 +1,10 @@
+"""The BSDF `diffraction_orders`: gratings whose orders were solved (Dr.Jit).
+
+Contents
+--------
+diffraction_orders  `DiffractionOrders`: reflection, and both sides of a sheet or a block's face
+parameters          parameters of the plugin, read from Mitsuba's Properties and checked
+device              a table's look-up inside a kernel
+lobes               light of all orders in a variant's channels, and directions drawn by it
+polarised_lobes     Mueller matrices in polarised variants
+"""

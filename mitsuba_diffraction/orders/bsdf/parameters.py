@@ -1,0 +1,93 @@
+"""Parameters of the plugin `diffraction_orders`, read from Mitsuba's Properties and checked."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+
+from ...errors import DiffractionError
+from ...heights.lengths import is_auto
+from ...plugin.dictionary import ORDERS, TableData
+from ...plugin.parameters import mono_wavelength, nested_of, orientation_of, resolved_path
+from ...plugin.properties import class_of
+from ...plugin.types import BSDF, Properties
+from ...plugin.varying import Orientation
+from ...settings import USUAL_WIDTH, checked
+from ...tables.store import loaded_once
+from ..file import load_orders
+from ..table import OrderTable
+
+#: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
+LEAST_PERIODS = 2.0
+
+_tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters of `diffraction_orders`, checked.
+
+    Attributes
+    ----------
+    table : efficiencies of the orders.
+    coherence_width : 4σ of the amplitude window, µm.
+    orientation : angle from the first tangent to the patch's x axis.
+    wavelength : nm, of mono variants.
+    nested : the BSDF beneath, or None.
+    """
+
+    table: OrderTable
+    coherence_width: float
+    orientation: Orientation
+    wavelength: float
+    nested: BSDF | None
+
+
+def read_parameters(props: Properties) -> Parameters:
+    """Read and check everything, and load the table.
+
+    Raises a DiffractionError with the parameter, its value and the choices.
+    """
+    nested = nested_of(props, ORDERS)
+    table = _table(props)
+    if table.sides == 2 and nested is not None:
+        kind = "thin sheet" if table.thin else "block"
+        raise DiffractionError(
+            f"the table is that of a {kind}, beneath which no BSDF ({class_of(nested)}) lies; "
+            f"put a surface behind the {kind} instead"
+        )
+    return Parameters(
+        table=table,
+        coherence_width=_coherence_width(props, table),
+        orientation=orientation_of(props),
+        wavelength=mono_wavelength(props, table.wavelengths),
+        nested=nested,
+    )
+
+
+def _table(props: Properties) -> OrderTable:
+    if ("table" in props) == ("data" in props):
+        raise DiffractionError(
+            f"{ORDERS} takes one of table, a file of orders, and data, an "
+            "OrderTable of md.bsdf_dict"
+        )
+    if "data" in props:
+        data = props.get("data")
+        if not isinstance(data, TableData) or not isinstance(data.table, OrderTable):
+            raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
+        return data.table
+    name = props.get("table")
+    if not isinstance(name, str):
+        raise DiffractionError(f"table={name!r} must be the name of a file")
+    return loaded_once(resolved_path(name, "table"), load_orders, _tables)
+
+
+def _coherence_width(props: Properties, table: OrderTable) -> float:
+    value = props.get("coherence_width", "auto")
+    width = USUAL_WIDTH if is_auto(value) else checked("coherence_width", value)
+    if width < LEAST_PERIODS * table.period:
+        raise DiffractionError(
+            f"coherence_width={width:g} µm must be at least {LEAST_PERIODS:g} periods of the "
+            f"grating, {LEAST_PERIODS * table.period:g} µm: narrower windows have no orders"
+        )
+    return float(width)

@@ -1,0 +1,283 @@
+"""Efficiencies and Mueller matrices of a table, in NumPy: the numbers that the renderer reads."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError, warn
+from .cells import Array
+from .grid import Grid, grid_of
+from .listed_lookup import ListedLookup
+from .lookup import Arrays, BlockLookup, Lookup, Memory
+from .polarised import nearest_pure
+from .table import ALONG, LINEAR, UNPOLARISED, Listed, OrderTable
+
+#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
+_IN_PLANE = 1e-7
+#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
+MIN_ANGLE = 1e-4
+
+AnyLookup = Lookup | ListedLookup
+
+
+class _Light(NamedTuple):
+    """Light and the order that is looked up, as the parameters of `efficiency`."""
+
+    table: OrderTable
+    x: ArrayLike
+    y: ArrayLike
+    wavelength: ArrayLike
+    order: ArrayLike
+    order_y: ArrayLike = 0
+    from_below: bool = False
+    transmitted: bool = False
+
+
+def efficiency(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    order_y: ArrayLike = 0,
+    *,
+    from_below: bool = False,
+    transmitted: bool = False,
+) -> Array:
+    """Return the efficiency of an order for unpolarised light, as the renderer interpolates it.
+
+    Raises a DiffractionError if light below is asked for, and the table is of reflected light.
+
+    Parameters
+    ----------
+    x, y : direction cosines within the superstrate of the mirror direction of the incident
+        light, −(ωi)_x and −(ωi)_y; times the index for light within a block.
+    wavelength : in vacuum, nm. Beyond the table's by more than `table.MARGIN` octaves the table is
+        dark, with a warning; within that margin, the nearest wavelength's.
+    order, order_y : m_x and m_y; an order leaves at x + m_x λ/(n d_x) and y + m_y λ/(n d_y). m_y
+        is 0 for grooves.
+    from_below : whether the light comes from below a thin sheet, or from within a block.
+    transmitted : whether the order leaves on the other side of a thin sheet or a block's face.
+
+    Returns
+    -------
+    (…) share of the incident light, 0 for orders that do not propagate.
+    """
+    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
+    placed = _placed(light)
+    share = placed.lookup.share(placed.row, placed.order, placed.active, placed.below)
+    return share.efficiency.reshape(placed.shape)
+
+
+def polarised_efficiency(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    order_y: ArrayLike = 0,
+    *,
+    from_below: bool = False,
+    transmitted: bool = False,
+) -> Array:
+    """Return the efficiencies for incident light of s and of p polarisation, (…, 2).
+
+    s light has its E across the plane of incidence. Other arguments as for `efficiency`.
+
+    Raises a DiffractionError off the planes across and along the grooves, where s and p are
+    coherent sums of the table's components, if a solved table has no Mueller matrices; or as
+    `efficiency` does.
+    """
+    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
+    mean, cosine, sine = _linear(light)
+    turned = turned_axes(x, y)
+    difference = cosine * turned.cosine
+    if sine is None:
+        if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
+            raise DiffractionError(
+                "s and p of light off the plane across the grooves need Mueller matrices; solve "
+                "the profile with polarised=True, or take groove_efficiency: E or B along the "
+                "grooves"
+            )
+    else:
+        difference = difference + turned.sine * sine
+    difference = np.clip(difference, -mean, mean)
+    return np.stack([mean + difference, mean - difference], axis=-1)
+
+
+def groove_efficiency(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    order_y: ArrayLike = 0,
+    *,
+    from_below: bool = False,
+    transmitted: bool = False,
+) -> Array:
+    """Return the efficiencies of light whose E, or B, lies along the grooves, (…, 2).
+
+    As far as it can: see the axes of `polarised`. In the plane across the grooves they are s and p
+    (TE and TM). Other arguments as for `efficiency`.
+
+    Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
+    p; or as for `efficiency`.
+    """
+    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
+    mean, difference, _ = _linear(light)
+    turned = np.abs(turned_axes(x, y).sine) > _IN_PLANE
+    if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
+        raise DiffractionError(
+            "this table is imported, with s and p; of conical light it lacks the phases from which "
+            "E and B along the grooves would follow"
+        )
+    difference = np.clip(difference, -mean, mean)
+    return np.stack([mean + difference, mean - difference], axis=-1)
+
+
+class TurnedAxes(NamedTuple):
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
+
+    cosine: Array
+    sine: Array
+
+
+def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
+    """Return the angle between the axes of incident light by its mirror direction.
+
+    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
+    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
+    """
+    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    along, across = x, -y * np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    squared = along**2 + across**2
+    level = squared < _IN_PLANE**2
+    cosine = np.where(level, 1.0, along**2 - across**2) / np.where(level, 1.0, squared)
+    return TurnedAxes(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
+
+
+def _linear(light: _Light) -> tuple[Array, Array, Array | None]:
+    """Return M₀₀, M₀₁ and M₀₂ of an order; None for the last one where it is not known."""
+    if light.table.response.elements == UNPOLARISED:
+        raise DiffractionError(
+            "this table has efficiencies of unpolarised light alone; take efficiency"
+        )
+    parts = np.moveaxis(_elements(light)[..., :LINEAR], -1, 0)
+    return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
+
+
+def mueller(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    order_y: ArrayLike = 0,
+) -> Array:
+    """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
+
+    M₀₀ is `efficiency`. Arguments as for `efficiency`.
+
+    Raises a DiffractionError if the table has no Mueller matrices.
+    """
+    if not table.polarised:
+        raise DiffractionError(
+            "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
+            "matrices"
+        )
+    elements = _elements(_Light(table, x, y, wavelength, order, order_y))
+    matrices = elements.reshape(*elements.shape[:-1], 4, 4)
+    return nearest_pure(matrices, efficiency(table, x, y, wavelength, order, order_y))
+
+
+class _Placed(NamedTuple):
+    """Light in a look-up, all flat, and the shape of the answer."""
+
+    lookup: AnyLookup
+    row: Any
+    order: Any
+    active: NDArray[np.bool_]
+    below: NDArray[np.bool_] | None
+    y: Array
+    shape: tuple[int, ...]
+
+
+def _elements(light: _Light) -> Array:
+    """Return the first elements of the Mueller matrices of an order, (…, n)."""
+    placed = _placed(light)
+    elements = placed.lookup.elements(
+        placed.row, placed.order, placed.y, placed.active, placed.below
+    )
+    return np.stack(elements, axis=-1).reshape(*placed.shape, -1)
+
+
+def _placed(light: _Light) -> _Placed:
+    table, x, y, wavelength, m_x, m_y, from_below, transmitted = light
+    if (from_below or transmitted) and table.sides == 1:
+        raise DiffractionError(
+            "this table has reflected light alone; solve the profile with thin for that below"
+        )
+    parts = np.broadcast_arrays(
+        *(np.asarray(value, np.float64) for value in (x, y, wavelength, m_x, m_y))
+    )
+    shape = parts[0].shape
+    x, y, lam, m_x, m_y = (part.ravel() for part in parts)
+    second = from_below != bool(table.block)  # whether the light's ports are the second half
+    sine = x * x + y * y
+    active = _lit(table, lam) & (sine <= (table.block or 1.0) ** 2)
+    if table.block and not from_below:
+        active &= sine < 1.0
+    if not table.crossed:
+        active &= m_y == 0
+    lookup = lookup_of(table)
+    row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, lam)
+    below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
+    order = (m_x, m_y) if table.crossed else m_x
+    return _Placed(lookup, row, order, active, below, y, shape)
+
+
+def lookup_in(
+    table: OrderTable, memory: Callable[[Grid], Memory], *, coated: bool, elements: bool
+) -> AnyLookup:
+    """Return the look-up of a table, with its grid in a memory.
+
+    coated, elements : as for `grid.grid_of`.
+    """
+    grid = grid_of(table, coated=coated, elements=elements)
+    held = memory(grid)
+    coated = coated and table.superstrate != 1.0
+    if isinstance(table.response, Listed) and not coated:
+        return ListedLookup(table, grid, held)
+    if table.block:
+        return BlockLookup(table, grid, held)
+    return Lookup(table, grid, held, coated=coated)
+
+
+_lookups: weakref.WeakKeyDictionary[OrderTable, AnyLookup] = weakref.WeakKeyDictionary()
+
+
+def lookup_of(table: OrderTable) -> AnyLookup:
+    """Return the look-up of the grating alone, without its coat, in NumPy's memory."""
+    if table not in _lookups:
+        _lookups[table] = lookup_in(table, Arrays, coated=False, elements=True)
+    return _lookups[table]
+
+
+def _lit(table: OrderTable, wavelength: Array) -> NDArray[np.bool_]:
+    """Whether wavelengths are close enough to the table's; warn of the others."""
+    least, most = table.reach
+    lit = (wavelength >= least) & (wavelength <= most)
+    if not lit.all():
+        low, high = table.wavelengths
+        warn(
+            f"wavelength {wavelength[~lit][0]:g} nm is outside the table of orders ({low:g} to "
+            f"{high:g} nm); its efficiencies are 0 below {least:.0f} and above {most:.0f} nm; "
+            "solve it with a wider range of wavelengths"
+        )
+    return np.asarray(lit)

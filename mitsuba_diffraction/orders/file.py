@@ -1,0 +1,289 @@
+"""Tables of orders as NetCDF files (classic format), which most programs read.
+
+Numbers are single precision: the first n elements of Mueller matrices (`element`), row by row; the
+first is the efficiency. Over cells, the variable `kind_a_K` holds kind A of band K, with the
+dimensions `tau_K`, `rho_K`, `w_K`, `j_a_K`, `q_a_K` and `element` of `Band.a`; `kind_b_K` holds
+kind B. Of listed light, `efficiency` has the dimensions `wavelength`, `theta`, `phi`, `side`,
+`port` and `element` of `Listed.values`, with coordinate variables `wavelength` (nm, in vacuum),
+`theta` and `phi` (degrees), and `order_x` and `order_y` of the ports of a side.
+
+Global attributes hold the rest: `period` (µm), `period_y` (of a crossed grating; else left out),
+`wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
+ports of `cells`), `block` (index of a block, with the ports of `blocks`), `even` (1 for even nodes,
+else Chebyshev nodes), `in_plane` (1 for listed light of one plane), `header` (JSON), `version`, and
+`sha256` of all of these and the numbers. Attributes that do not apply are left out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import os
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import netcdf_file
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError, one_line
+from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
+from ..limits import MOST_EFFICIENCIES
+from ..tables.fields import mapping
+from .table import Band, Cells, Listed, OrderTable
+
+#: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
+#: and crossed gratings, which have other lights now.
+FORMAT_VERSION = 2
+SUFFIX = ".nc"
+_AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
+_LISTED = "efficiency"
+
+
+def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
+    """Write a NetCDF file; numbers are those of the table, bit by bit.
+
+    Raises a DiffractionError if it cannot be written; no half-written file is left.
+    """
+    if Path(path).suffix.lower() != SUFFIX:
+        raise DiffractionError(
+            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
+        )
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        file.title = "Efficiencies of the orders of a grating"
+        file.header = json.dumps(dict(table.header), sort_keys=True)
+        setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
+        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
+        file.period, file.period_units = np.float64(table.periods[0]), "um"
+        if table.crossed:
+            file.period_y = np.float64(table.periods[1])
+        file.superstrate = np.float64(table.superstrate)
+        if table.thin:
+            file.thin = np.int32(1)
+        if table.block:
+            file.block = np.float64(table.block)
+        _add_response(file, table)
+        file.sha256 = _checksum(file)
+        file.flush()
+        data = content.getvalue()
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _add_response(file: Any, table: OrderTable) -> None:
+    response = table.response
+    if isinstance(response, Listed):
+        if response.in_plane:
+            file.in_plane = np.int32(1)
+        axes = zip(
+            ("wavelength", "theta", "phi"), response.axes, ("nm", *["degree"] * 2), strict=True
+        )
+        for name, values, unit in axes:
+            _add(file, name, (name,), values.astype(">f8"), unit)
+        for name, column in zip(("order_x", "order_y"), response.orders.T, strict=True):
+            _add(file, name, ("order",), column.astype(">i4"))
+        every = ("wavelength", "theta", "phi", "side", "port", "element")
+        _add(file, _LISTED, every, response.values.astype(">f4"))
+        return
+    if response.even:
+        file.even = np.int32(1)
+    for band in response.bands:
+        for kind, numbers in zip("ab", band.kinds, strict=False):
+            names = (
+                *(f"{axis}_{band.k}" for axis in ("tau", "rho", "w")),
+                *(f"{axis}_{kind}_{band.k}" for axis in ("j", "q")),
+                "element",
+            )
+            _add(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
+
+
+def _add(
+    file: Any, name: str, axes: tuple[str, ...], numbers: NDArray[Any], units: str = "1"
+) -> None:
+    """Add a variable, and the dimensions that the file lacks."""
+    for axis, size in zip(axes, numbers.shape, strict=True):
+        if axis not in file.dimensions:
+            file.createDimension(axis, size)
+    variable = file.createVariable(name, numbers.dtype.str, axes)
+    variable[:] = numbers
+    variable.units = units
+
+
+def load_orders(path: str | os.PathLike[str]) -> OrderTable:
+    """Read a file that `save_orders` wrote.
+
+    Raises a DiffractionError if the file is missing, no table of orders, damaged, or of another
+    version.
+    """
+    data = read_bytes(path)
+    if kind_of(path) is not FileKind.ORDERS:
+        raise DiffractionError(f"'{path}' is not a table of orders; {_advice(Path(path))}")
+    try:
+        with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
+            version = int(getattr(file, ORDERS_ATTRIBUTE))
+            if version == 1:
+                return _first_version(file)
+            if version != FORMAT_VERSION:
+                raise DiffractionError(
+                    f"its format version is {version}, this program reads 1 and {FORMAT_VERSION}"
+                )
+            return _table(file)
+    except DiffractionError as error:
+        raise DiffractionError(f"'{path}' is not a table of orders: {error}; {_AGAIN}") from error
+    except Exception as error:  # whatever SciPy makes of damaged bytes
+        raise DiffractionError(
+            f"'{path}' is a damaged table of orders ({one_line(str(error))[:100]}); {_AGAIN}"
+        ) from error
+
+
+def _advice(path: Path) -> str:
+    """Return the remedy for a file of another kind than a table of orders."""
+    if kind_of(path) is FileKind.RECIPE:
+        return (
+            f"run the command 'solve {shlex.quote(str(path))}', and give the table (.nc) that it "
+            "writes"
+        )
+    if kind_of(path) is FileKind.TABLE:
+        return "tables of heights (EXR) belong to the BSDF 'diffraction'"
+    return (
+        "make one with the command 'solve' (solve_orders), or of efficiencies of other programs "
+        "with 'solve --import' (read_orders)"
+    )
+
+
+def _table(file: Any) -> OrderTable:
+    """Return the table of an open file."""
+    _check_sizes(file)
+    if file.sha256 != _checksum(file).encode():
+        raise ValueError("its checksum is of another one")
+    if _LISTED in file.variables:
+        axes = [np.array(file.variables[name][:], float) for name in ("wavelength", "theta", "phi")]
+        orders = [file.variables[name][:].astype(np.int64) for name in ("order_x", "order_y")]
+        response: Cells | Listed = Listed(
+            (axes[0], axes[1], axes[2]), np.column_stack(orders), _floats(file, _LISTED),
+            bool(getattr(file, "in_plane", False)),
+        )  # fmt: skip
+    else:
+        response = Cells(_bands(file), even=bool(getattr(file, "even", False)))
+    return _with_outline(file, response)
+
+
+def _check_sizes(file: Any) -> None:
+    for name, variable in file.variables.items():
+        if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
+            raise ValueError(f"{name} claims {variable.shape} numbers")
+
+
+def _floats(file: Any, name: str) -> NDArray[np.float32]:
+    return np.array(file.variables[name][:], np.float32)
+
+
+def _bands(file: Any) -> tuple[Band, ...]:
+    numbers = sorted({int(name.rpartition("_")[2]) for name in file.variables})
+    return tuple(
+        Band(
+            k,
+            _floats(file, f"kind_a_{k}"),
+            _floats(file, f"kind_b_{k}") if f"kind_b_{k}" in file.variables else None,
+        )
+        for k in numbers
+    )
+
+
+def _with_outline(file: Any, response: Cells | Listed) -> OrderTable:
+    """Return the table with the attributes of an open file."""
+    header = mapping(json.loads(_text(file.header)), "header")
+    low, high = map(float, file.wavelengths)
+    return OrderTable(
+        (float(file.period), float(getattr(file, "period_y", math.inf))),
+        (low, high),
+        response,
+        float(file.superstrate),
+        header,
+        bool(getattr(file, "thin", False)),
+        float(file.block) if hasattr(file, "block") else None,
+    )
+
+
+def _text(attribute: str | bytes) -> str:
+    """Return an attribute of a file that is written, or read: bytes then."""
+    return attribute if isinstance(attribute, str) else attribute.decode("utf-8")
+
+
+def _checksum(file: Any) -> str:
+    """Return the checksum of an open file's attributes and numbers."""
+    content = hashlib.sha256(_text(file.header).encode())
+    for name in ("wavelengths", "period", "period_y", "superstrate", "thin", "block", "even",
+                 "in_plane"):  # fmt: skip
+        if hasattr(file, name):
+            content.update(name.encode() + np.asarray(getattr(file, name), ">f8").tobytes())
+    for name in sorted(file.variables):
+        variable = file.variables[name]
+        content.update(repr((name, tuple(map(int, variable.shape)))).encode())
+        content.update(np.ascontiguousarray(variable[:]).data)
+    return content.hexdigest()
+
+
+# ---------------------------------------------------------------------- version 1
+
+
+def _first_version(file: Any) -> OrderTable:
+    """Return the table of a file of version 1, with efficiencies in steps of 1/30000.
+
+    They are those of light whose E, then B, lies along the grooves; matrices follow where there are
+    any.
+    """
+    if hasattr(file, "crossed") or getattr(file, "components", b"grooves") != b"grooves":
+        raise DiffractionError(
+            "it holds imported efficiencies, or a crossed grating, of a former format, whose "
+            "listed light was not kept"
+        )
+    _check_sizes(file)
+    numbers = {name: variable[:] for name, variable in file.variables.items()}
+    if file.sha256 != _first_checksum(file, numbers).encode():
+        raise ValueError("its checksum is of another one")
+    block = hasattr(file, "block")
+
+    def kind(name: str, k: int) -> NDArray[np.float32] | None:
+        if f"kind_{name}_{k}" not in numbers:
+            return None
+        scale = file.variables[f"kind_{name}_{k}"].scale_factor
+        if (matrices := numbers.get(f"mueller_{name}_{k}")) is not None:
+            values = matrices * scale
+            return values.reshape(*values.shape[:-2], -1).astype(np.float32)
+        along_e, along_b = np.moveaxis(numbers[f"kind_{name}_{k}"] * scale, -1, 0)
+        mean, half = 0.5 * (along_e + along_b), 0.5 * (along_e - along_b)
+        return np.stack([mean] if block else [mean, half], axis=-1).astype(np.float32)
+
+    bands = []
+    for k in sorted({int(name.rpartition("_")[2]) for name in numbers}):
+        a = kind("a", k)
+        if a is None:
+            raise ValueError(f"it lacks kind A of band {k}")
+        bands.append(Band(k, a, kind("b", k)))
+    return _with_outline(file, Cells(tuple(bands), even=block))
+
+
+def _first_checksum(file: Any, numbers: dict[str, NDArray[Any]]) -> str:
+    always = (
+        float(file.period), tuple(map(float, file.wavelengths)), float(file.superstrate),
+        _text(file.header),
+    )  # fmt: skip
+    content = hashlib.sha256(repr(always).encode())
+    if getattr(file, "thin", False):
+        content.update(b"thin")
+    if hasattr(file, "block"):
+        content.update(repr(("block", float(file.block))).encode())
+    packed = {}
+    for name, values in numbers.items():
+        first, kind, k = name.split("_")
+        packed[int(k), kind + (" mueller" if first == "mueller" else "")] = values
+    for key in sorted(packed):
+        content.update(repr((key, packed[key].shape)).encode())
+        content.update(np.ascontiguousarray(packed[key], ">i2").data)
+    return content.hexdigest()

@@ -1,0 +1,134 @@
+"""Records of a table, which its look-up interpolates linearly, in NumPy as in kernels.
+
+Numbers are half floats times a power of two, so that the largest is near their limit: orders down
+to 1e-8 of the light are as exact, relatively, as strong ones.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import blocks
+from .cells import Array, Counts
+from .polarised import smooth_elements
+from .rows import Kind, cells_of, kinds_of, on_cells, resampled, rows
+from .table import MUELLER, Listed, OrderTable
+
+#: Largest number that a half float shall hold; 65504 is its limit.
+_LARGEST = 32768.0
+
+
+class Grid(NamedTuple):
+    """Records of a table at the corners of cells.
+
+    Attributes
+    ----------
+    cells : numbers of cells along the three coordinates of light.
+    starts : first record of each kind of each band; one number for listed light.
+    corners : (records, 8 × parts) float32, M₀₀ at the corners 000, 001, 010 … 111 of a cell: of n
+        ports a cell has rows of n + 1 records, the ports' and their sum, one for each port that
+        light comes through; of listed light one for each side. Under a coat two parts:
+        efficiencies within it, and chances of drawing.
+    elements : (records, n) float32, the first n elements of the Mueller matrix at each node and
+        pair of ports; over cells the odd ones over y. None without polarisation.
+    element_starts : as `starts`, of `elements`.
+    scale : factor from stored numbers to efficiencies.
+    """
+
+    cells: Counts
+    starts: NDArray[np.uint32]
+    corners: NDArray[np.float32]
+    elements: NDArray[np.float32] | None
+    element_starts: NDArray[np.uint32]
+    scale: float
+
+    @property
+    def parts(self) -> int:
+        """Numbers that a port has at a corner."""
+        return self.corners.shape[1] // 8
+
+
+def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> Grid:
+    """Return the records of a table.
+
+    coated : whether the reflections between the flat face of its superstrate and the grating are
+        in the efficiencies; otherwise these are of the grating alone.
+    elements : whether the grid has elements of Mueller matrices, where the table has any.
+    """
+    response = table.response
+    if isinstance(response, Listed) and not (coated and table.superstrate != 1.0):
+        return _listed(response, elements)
+    table = on_cells(table)
+    counts = cells_of(table)
+    if table.block:
+        counts = Counts(*(n - 1 for n in table.bands[0].counts))
+
+    def records(of: Kind) -> Array:
+        if table.block:
+            return corner_records(blocks.reduced(table, table.bands[of.band], of.kind))
+        of_kind = rows(table, of, counts, coated=coated)
+        parts = of_kind if coated and table.superstrate != 1.0 else of_kind[:1]
+        return np.concatenate([corner_records(part) for part in parts], axis=-1)
+
+    def nodes(of: Kind) -> Array:
+        values = table.bands[of.band].kind(of.kind).astype(np.float64)
+        if values.shape[-1] == MUELLER:
+            values = smooth_elements(table, of.band, values)
+        return resampled(table, of.band, values, counts).reshape(-1, values.shape[-1])
+
+    starts, corners = _stacked(table, records)
+    matrices, element_starts = None, starts
+    if elements and table.response.elements > 1:
+        element_starts, matrices = _stacked(table, nodes)
+    return _scaled(counts, starts, corners, matrices, element_starts)
+
+
+def _listed(response: Listed, elements: bool) -> Grid:
+    """Return the records of listed light; single lights along an axis are a cell of equal ends."""
+    values = response.values.astype(np.float64)
+    for axis in range(3):
+        if values.shape[axis] == 1:
+            values = np.repeat(values, 2, axis=axis)
+    counts, starts = Counts(*(n - 1 for n in values.shape[:3])), np.zeros(1, np.uint32)
+    matrices = values.reshape(-1, values.shape[-1]) if elements and values.shape[-1] > 1 else None
+    return _scaled(counts, starts, corner_records(values[..., 0]), matrices, starts)
+
+
+def _scaled(
+    counts: Counts, starts: NDArray[np.uint32], corners: Array, elements: Array | None,
+    element_starts: NDArray[np.uint32],
+) -> Grid:  # fmt: skip
+    scale = half_scale(corners)
+    stored = None if elements is None else (elements / scale).astype(np.float32)
+    return Grid(counts, starts, (corners / scale).astype(np.float32), stored, element_starts, scale)
+
+
+def half_scale(values: NDArray[Any]) -> float:
+    """Return the power of two by which numbers are divided before they are stored."""
+    return float(2.0 ** math.ceil(math.log2(max(float(values.max()), 1e-30) / _LARGEST)))
+
+
+def corner_records(values: Array) -> Array:
+    """Return efficiencies (…, ports), then their sum, at the corners of all cells, (n, 8).
+
+    Cells lie along the first three axes; corners are 000, 001, 010 … 111.
+    """
+    whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+    pairs = itertools.product((slice(-1), slice(1, None)), repeat=3)
+    return np.stack([whole[pair] for pair in pairs], axis=-1).reshape(-1, 8)
+
+
+def _stacked(
+    table: OrderTable, records: Callable[[Kind], Array]
+) -> tuple[NDArray[np.uint32], Array]:
+    """Return the first record of each kind of each band, and all records."""
+    parts = [records(of) for of in kinds_of(table)]
+    parts[1:1] = [parts[0][:0]]  # kind B of band 0 has none
+    starts = np.cumsum([0, *map(len, parts[:-1])])
+    return starts.astype(np.uint32), np.concatenate(parts)

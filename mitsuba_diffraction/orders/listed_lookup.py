@@ -1,0 +1,201 @@
+"""Look-up of listed light, in NumPy and in kernels; see `lookup`."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..optics.arithmetic import Mask, Number, of
+from ..optics.orders import crossed_square
+from .cells import Array
+from .grid import Grid
+from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
+from .polarised import ODD
+from .table import Listed, OrderTable
+
+_DEGREE = 180.0 / np.pi
+#: Against division by 0 along the grooves.
+_LEAST_C = 1e-4
+
+
+class ListedRow(NamedTuple):
+    """Light placed among the listed lights; names as of `lookup.Row`.
+
+    Attributes
+    ----------
+    second : 1 for light that comes from the second side, else 0.
+    """
+
+    cell: Index
+    start: Index
+    second: Index
+    weights: list[Number]
+    lit: Mask
+    x: Number
+    y: Number
+    wavelength: Number
+    face: Number
+
+
+class ListedLookup:
+    """Rows of a table of listed light, without a coat.
+
+    Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings.
+
+    Attributes
+    ----------
+    index, coated, sides, numbers : as of `lookup.Lookup`.
+    count : number of orders.
+    """
+
+    coated = False
+
+    def __init__(self, table: OrderTable, grid: Grid, memory: Memory) -> None:
+        response = table.response
+        assert isinstance(response, Listed)
+        self.memory, self._cells, self._scale = memory, grid.cells, grid.scale
+        self._axes = [_Axis(nodes) for nodes in response.axes]
+        self._in_plane, self._crossed = response.in_plane, table.crossed
+        self.sides, self.index = table.sides, table.block or 1.0
+        self._medium = table.block or table.superstrate
+        self._steps = [1e-3 / (period * table.superstrate) for period in table.periods]
+        self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
+        self._reach = table.reach
+        self._first = response.orders[0].tolist()
+        self._size = (response.orders[-1] - response.orders[0] + 1).tolist()
+        self.count = len(response.orders)
+
+    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> ListedRow:
+        """See `lookup.Lookup.row`; x and y belong to wave vectors over 2π/λ."""
+        xp = of(x, wavelength)
+        second = xp.flag(cos_i < 0.0) if self.sides == 2 else xp.index(0.0 * x)
+        light = self._angles(x, y, cos_i, wavelength)
+        places = [axis.place(value) for axis, value in zip(self._axes, light, strict=True)]
+        cell, weights = corner_weights(places, self._cells, self._scale)
+        lit = (wavelength >= self._reach[0]) & (wavelength <= self._reach[1])
+        start = (cell * self.sides + second) * (self.count * self.sides + 1)
+        return ListedRow(cell, start, second, weights, lit, x, y, wavelength, 0.0 * x)
+
+    def _angles(
+        self, x: Number, y: Number, cos_i: Number, wavelength: Number
+    ) -> tuple[Number, Number, Number]:
+        """Return the wavelength, θ and φ of ωi, degrees; of light in the plane, see `Listed`."""
+        xp = of(x, wavelength)
+        if self.index != 1.0:  # side 0 of a block lies within, tangential parts are n sinθ
+            inverse = xp.where(cos_i < 0.0, 1.0, 1.0 / self.index)
+            x, y = x * inverse, y * inverse
+        if self._in_plane:
+            c = xp.sqrt(xp.maximum(1.0 - y * y, _LEAST_C**2))
+            x, y = x * xp.reciprocal(c), 0.0 * y
+            wavelength = wavelength * xp.reciprocal(c)
+        sine = xp.sqrt(xp.minimum(x * x + y * y, 1.0))
+        # mirror images of grooves are alike
+        phi = xp.arctan2(y if self._crossed else xp.absolute(y), x) * _DEGREE
+        if self._crossed:
+            phi = phi + xp.where(phi < 0.0, 360.0, 0.0)
+        return wavelength, xp.arcsin(sine) * _DEGREE, phi
+
+    def ports(self, row: ListedRow) -> Index:
+        """See `lookup.Lookup.ports`."""
+        return self.count * self.sides + 0 * row.start
+
+    def order_at(self, row: ListedRow, port: Index) -> tuple[Any, Mask]:
+        """See `lookup.Lookup.order_at`."""
+        below = port >= self.count
+        place = port
+        if self.sides == 2:
+            place = port - of(row.wavelength).where(below, self.count + 0 * port, 0 * port)
+        order = self.order_of_port(place, of(row.wavelength))
+        return (order if self._crossed else order[0]), below
+
+    def order_of_port(self, place: Index, xp: Any = None) -> tuple[Number, Number]:
+        """Return m_x and m_y of a place among the orders of a side."""
+        xp = xp or of(place)
+        along = place // self._size[0]
+        m_x = xp.number(place - along * self._size[0]) + float(self._first[0])
+        return m_x, xp.number(along) + float(self._first[1])
+
+    def port(
+        self, row: ListedRow, order: Any, active: Mask = True, below: Mask | None = None
+    ) -> tuple[Index, Mask]:
+        """See `lookup.Lookup.port`."""
+        xp = of(row.wavelength)
+        m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
+        shift_x, shift_y = (
+            m * row.wavelength * step for m, step in zip((m_x, m_y), self._steps, strict=True)
+        )
+        square = crossed_square(-row.x, -row.y, shift_x, shift_y)
+        if self.index != 1.0:
+            square = square + xp.where(below, 0.0, self.index**2 - 1.0)
+        leaves = active & (square > 0.0)
+        places = [m - float(first) for m, first in zip((m_x, m_y), self._first, strict=True)]
+        for place, size in zip(places, self._size, strict=True):
+            leaves = leaves & (place >= 0.0) & (place < float(size))
+        place = places[1] * float(self._size[0]) + places[0]
+        port = xp.index(xp.where(leaves, place, 0.0))
+        if below is not None:
+            port = port + xp.where(below, self.count + 0 * port, 0 * port)
+        return port, leaves
+
+    def share(
+        self, row: ListedRow, order: Any, active: Mask = True, below: Mask | None = None
+    ) -> Share:
+        """See `lookup.Lookup.share`."""
+        port, leaves = self.port(row, order, active, below)
+        efficiency = of(row.wavelength).where(leaves, self.at_port(row, port, 0, leaves), 0.0)
+        return Share(efficiency, efficiency)
+
+    def total(self, row: ListedRow, active: Mask = True) -> Number:
+        """See `lookup.Lookup.total`; with orders that do not propagate in this light."""
+        return self.at_port(row, self.ports(row), 0, active) * RAISED
+
+    def elements(
+        self, row: ListedRow, order: Any, y: Number, active: Mask = True,
+        below: Mask | None = None,
+    ) -> list[Number]:  # fmt: skip
+        """See `lookup.Lookup.elements`; only the sign of y is used, on grooves."""
+        xp = of(row.wavelength)
+        port, active = self.port(row, order, active & row.lit, below)
+        _, n_b, n_c = self._cells
+        a, b, c = row.cell // (n_b * n_c), (row.cell // n_c) % n_b, row.cell % n_c
+        ports = self.count * self.sides
+        totals: list[Any] = [0.0 * row.wavelength] * self.numbers
+        for n, weight in enumerate(row.weights):
+            i, j, k = n >> 2, (n >> 1) & 1, n & 1
+            node = ((a + i) * (n_b + 1) + b + j) * (n_c + 1) + c + k
+            place = (node * self.sides + row.second) * ports + port
+            record = self.memory.read("elements", place, self.numbers, active)
+            totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
+        if self._crossed:
+            return totals
+        sign = xp.where(y < 0.0, -1.0 + 0.0 * y, 1.0 + 0.0 * y)
+        odd = ODD.ravel()[: self.numbers]
+        return [x * sign if is_odd else x for x, is_odd in zip(totals, odd, strict=True)]
+
+    def at_port(self, row: ListedRow, port: Index, part: int, active: Mask) -> Number:
+        """See `lookup.Lookup.at_port`."""
+        corners = self.memory.read("corners", row.start + port, 8, active & row.lit)
+        return weighted(row.weights, corners)
+
+
+class _Axis:
+    """Ascending nodes, and the place of a value among them, from 0 to 1."""
+
+    def __init__(self, nodes: Array) -> None:
+        self._nodes = nodes
+        steps = np.diff(nodes)
+        self._even = len(nodes) < 3 or np.ptp(steps) <= 1e-6 * steps.max()
+        self._span = max(float(np.ptp(nodes)), 1e-12)
+
+    def place(self, value: Number) -> Number:
+        """Return the place; values outside are at the nearest end."""
+        xp = of(value)
+        first = float(self._nodes[0])
+        if self._even:
+            return xp.clip((value - first) * (1.0 / self._span), 0.0, 1.0)
+        # piecewise linear: a sum over kinks, of which a list has few
+        count, place = len(self._nodes) - 1, 0.0 * value
+        for low, high in zip(self._nodes[:-1].tolist(), self._nodes[1:].tolist(), strict=True):
+            place = place + xp.clip((value - low) * (1.0 / (high - low)), 0.0, 1.0)
+        return place * (1.0 / count)

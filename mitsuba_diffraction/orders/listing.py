@@ -1,0 +1,145 @@
+"""Efficiencies of a table's orders as the lines of a CSV, which `read_orders` reads back."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from ..optics.orders import crossed_square
+from .cells import Array as Real
+from .efficiency import MIN_ANGLE
+from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
+from .table import Listed, OrderTable, orders_between
+
+#: Lines at most: what `efficiencies` reads.
+_MOST_LINES = 2_000_000
+#: Squared cosine of an order below which it is not listed: rounding.
+_EDGE = 1e-9
+
+
+class Listing(NamedTuple):
+    """Lines of efficiencies.
+
+    Attributes
+    ----------
+    columns : names of the numbers: wavelength, θ, φ, order (of a crossed grating two), then shares
+        of s and of p light.
+    rows : (n, 6), or (n, 8) of a thin sheet, (n, 7) of a crossed grating.
+    """
+
+    columns: tuple[str, ...]
+    rows: Real
+
+    @property
+    def orders(self) -> str:
+        """First and last order, for people."""
+        ends = (self.rows[:, 3], self.rows[:, 4]) if PAIR[0] in self.columns else (self.rows[:, 3],)
+        low, high = (", ".join(f"{f(part):.0f}" for part in ends) for f in (np.min, np.max))
+        return f"orders ({low}) to ({high})" if len(ends) > 1 else f"orders {low} to {high}"
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a CSV; numbers have 7 digits.
+
+        Raises a DiffractionError if the file cannot be written; no half-written file is left.
+        """
+        numbers = ["%d" if name.startswith("order") else "%.7g" for name in self.columns[3:]]
+        with atomic_path(Path(path)) as temporary:
+            np.savetxt(
+                temporary, self.rows, ["%.9g", "%.9g", "%.9g", *numbers], ",",
+                header=",".join(self.columns), comments="", encoding="utf-8",
+            )  # fmt: skip
+
+
+def list_orders(
+    table: OrderTable,
+    wavelengths: ArrayLike,
+    theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    *,
+    polarised: bool = False,
+    from_below: bool = False,
+) -> Listing:
+    """List the efficiencies of all propagating orders, with the conventions of `lists`.
+
+    Raises a DiffractionError if an angle or wavelength is out of its range, there are over two
+    million lines, or the table has no s and p of conical light
+    (`OrderTable.polarised_efficiency`).
+
+    Parameters
+    ----------
+    wavelengths : in vacuum, nm, within the table's.
+    theta, phi : direction to the light, degrees, within the medium that it comes from: from the
+        normal, and from x towards y.
+    polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
+        unpolarised light.
+    from_below : whether the light comes from below a thin sheet, or from within a block.
+    """
+    lights = [np.unique(np.asarray(values, np.float64)) for values in (wavelengths, theta, phi)]
+    low, high = table.wavelengths
+    check_light(lights[0], lights[1], lights[2], "orders")
+    if lights[0][0] < low * (1 - 1e-9) or lights[0][-1] > high * (1 + 1e-9):
+        raise DiffractionError(
+            f"wavelengths from {lights[0][0]:g} to {lights[0][-1]:g} nm: the table has {low:g} to "
+            f"{high:g} nm"
+        )
+    orders = _orders(table, lights[0][0])
+    _check_count(lights, len(orders))
+    lam, polar, azimuth, n = (
+        axis.ravel() for axis in np.meshgrid(*lights, np.arange(len(orders)), indexing="ij")
+    )
+    m_x, m_y = orders[n].T
+    index = (table.block or 1.0) if from_below else 1.0
+    x, y = (index * part for part in _mirror(polar, azimuth, table.crossed))
+    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
+    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
+    square = crossed_square(x, y, *shifts)
+    # of a block, orders within it are more
+    leaves = square + (table.block or 1.0) ** 2 - 1.0 > _EDGE
+    parts = (lam, polar, azimuth, m_x, m_y, x, y)
+    lam, polar, azimuth, m_x, m_y, x, y = (part[leaves] for part in parts)
+    lookup = table.polarised_efficiency if polarised else table.efficiency
+    kinds = REFLECTED + (TRANSMITTED if table.sides == 2 else ())
+    below = {"from_below": True} if from_below else {}
+    shares = [
+        lookup(x, y, lam, m_x, m_y, transmitted=kind == TRANSMITTED[0], **below)
+        for kind in kinds[::2]
+    ]
+    if not polarised:
+        shares = [np.repeat(values[:, None], 2, axis=1) for values in shares]
+    numbers = [m_x, m_y] if table.crossed else [m_x]
+    columns = (*CSV_AXES[:3], *(PAIR if table.crossed else CSV_AXES[3:]), *kinds)
+    return Listing(columns, np.column_stack([lam, polar, azimuth, *numbers, *shares]))
+
+
+def _orders(table: OrderTable, shortest: float) -> NDArray[np.int64]:
+    """Return all orders (m, 2) that may propagate from some wavelength on, nm."""
+    if isinstance(table.response, Listed):
+        return table.response.orders
+    most = int(np.ceil(2e3 * table.optical_period / shortest))
+    return orders_between((-most, 0), (most, 0))
+
+
+def _mirror(polar: Any, azimuth: Any, crossed: bool) -> tuple[Real, Real]:
+    """Return (x, y) of the mirror direction of light, of grooves with y mirrored.
+
+    At the normal, φ decides what s is.
+    """
+    sine = np.sin(np.radians(np.where(polar == 0.0, MIN_ANGLE, polar)))
+    y = sine * np.sin(np.radians(azimuth))
+    return -sine * np.cos(np.radians(azimuth)), -y if crossed else y
+
+
+def _check_count(lights: list[Real], orders: int) -> None:
+    """Refuse more lines than can be read again."""
+    count = np.prod([len(axis) for axis in lights], dtype=float) * orders
+    if count > _MOST_LINES:
+        raise DiffractionError(
+            f"these wavelengths and angles make {count:.2g} lines, {_MOST_LINES} are allowed; "
+            "choose fewer"
+        )

@@ -1,0 +1,72 @@
+"""Mueller matrices of orders: from amplitudes, and between nodes.
+
+A Stokes vector of light along d is (|E_e|² + |E_f|², |E_e|² − |E_f|², 2 Re E_e E_f*, 2 Im E_e E_f*)
+as Mitsuba's, with e the direction of the grooves (y) made perpendicular to d, and f = d × e. These
+axes are smooth over all directions but y itself. The elements `ODD` change their sign with y, the
+direction cosine of the light along the grooves: what is smooth in the coordinates of `cells` is
+their ratio to y.
+
+An order is one plane wave for each incident one, so that its matrix is a Jones matrix', and
+fully polarised light stays so. Interpolation between nodes breaks that slightly; `nearest_pure`
+mends it, so that no matrix gains light or polarisation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..reference.boundary import mueller
+from . import cells
+from .cells import Array
+from .table import Cells, OrderTable
+
+#: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
+ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
+_MIN_AMPLITUDE = 1e-12
+
+
+def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
+    """Return the Mueller matrices (…, j, q, 4, 4) of a solver's amplitudes (…, j, 2, q, 2)."""
+    return mueller(np.moveaxis(amplitudes, -3, -1))
+
+
+def smooth_elements(table: OrderTable, k: int, values: Array) -> Array:
+    """Return elements (τ, ρ, w, j, q, 16) at nodes of a band, the odd ones over y."""
+    assert isinstance(table.response, Cells)
+    _, rho, w = table.response.nodes(k)
+    big_k = (k + cells.sine_squared(rho))[:, None]
+    lam = cells.wavelength_of(big_k, w, table.wavelengths, table.optical_period)
+    c = big_k * lam / (2e3 * table.optical_period)
+    y = np.sqrt(np.maximum(1.0 - c * c, cells.LEAST_ALONG**2))[:, :, None, None, None]
+    return np.where(ODD.ravel(), 1.0 / y, 1.0) * values
+
+
+def nearest_pure(matrices: Array, efficiency: Array) -> Array:
+    """Return about the nearest Mueller matrices (…, 4, 4) of Jones matrices, of an efficiency (…).
+
+    The Jones matrix is the largest eigenvector of the coherency matrix (Cloude 1986, Optik 75, 26),
+    by one step of the power method from its largest column: an error that `matrices` have out of
+    the set of pure ones is squared.
+    """
+    flat = matrices.reshape(-1, 16)
+    coherency = (flat @ _COHERENCY).reshape(-1, 4, 4)
+    lanes = np.arange(len(flat))
+    largest = np.diagonal(coherency, axis1=1, axis2=2).real.argmax(axis=1)
+    vector = np.einsum("nab,nb->na", coherency, coherency[lanes, :, largest])
+    power = 0.5 * np.sum(np.abs(vector) ** 2, axis=1)
+    scale = np.sqrt(np.maximum(efficiency.ravel(), 0.0) / np.maximum(power, _MIN_AMPLITUDE**2))
+    vector *= scale[:, None]
+    pairs = vector[:, :, None] * vector[:, None, :].conj()
+    return np.asarray((pairs.reshape(-1, 16) @ _MATRIX).real.reshape(matrices.shape))
+
+
+def _coherency() -> NDArray[np.complex128]:
+    """Return the map (16, 16) of flat Mueller matrices to J_ik J_jl* at row ik and column jl."""
+    stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
+    products = np.linalg.inv(stokes) @ np.eye(16).reshape(16, 4, 4) @ stokes  # ij and kl
+    return products.reshape(16, 2, 2, 2, 2).swapaxes(2, 3).reshape(16, 16)
+
+
+_COHERENCY = _coherency()
+_MATRIX = np.linalg.inv(_COHERENCY)

@@ -1,0 +1,207 @@
+"""Even grids of a table, with its coat included: rows that the renderer and shaders interpolate.
+
+Along w they reach over the wavelengths at which light of some K comes from outside of the coat:
+c is at least √(1 − 1/n²).
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.coat import face_transmittance
+from ..optics.orders import least_c
+from . import cells
+from .cells import Array, Counts
+from .table import Band, Cells, Listed, OrderTable
+
+#: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
+#: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
+#: critical angles of orders lie along w.
+CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
+#: Share of the light that a totally reflecting face sends back: trapped light would never end.
+_TRAPPED = 1.0 - 1e-4
+#: Least transmittance in probabilities, so that no order that leaves has none.
+_MIN_TRANSMITTANCE = 1e-3
+
+
+class Rows(NamedTuple):
+    """Efficiencies on an even grid, (τ, ρ, w, j, q) from 0 to 1.
+
+    Attributes
+    ----------
+    within : of the grating, with all reflections between the coat's face and the grating.
+    through : times the face's transmittance towards q.
+    """
+
+    within: Array
+    through: Array
+
+
+class Kind(NamedTuple):
+    """Kind of a band: the band's number, `cells.A` or `cells.B`, and its number of ports."""
+
+    band: int
+    kind: int
+    ports: int
+
+
+def kinds_of(table: OrderTable) -> Iterator[Kind]:
+    """Yield all kinds of a table's cells, kind A of a band before its kind B."""
+    for k in range(table.last_band + 1):
+        for kind in (cells.A, cells.B) if k else (cells.A,):
+            yield Kind(k, kind, table.sides * (k + 1 - kind))
+
+
+def middles(nodes: NDArray[Any]) -> NDArray[Any]:
+    """Interpolate values at the corners of cells (τ, ρ, w, …) linearly to the cells' middles."""
+    for axis in range(3):
+        along = np.moveaxis(nodes, axis, 0)
+        nodes = np.moveaxis(0.5 * (along[:-1] + along[1:]), 0, axis)
+    return nodes
+
+
+def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) -> Rows:
+    """Return the unpolarised efficiencies of a kind on a grid with so many cells."""
+    table = on_cells(table)
+    grid = _grid(table, of.band, counts)
+    unpolarised = table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64)
+    values = clamped(resampled(table, of.band, unpolarised, counts))
+    if table.superstrate == 1.0 or not coated:
+        return Rows(values, values)
+    channels = np.arange(values.shape[-1])
+    places = grid.tau[:, None, None, None], grid.rho[:, None, None]
+    lam = grid.wavelength[..., None]
+    light = cells.from_cell(of.band, of.kind, channels, *places, lam, table.optical_period)
+    through = leaving_transmittance(light.x**2 + light.y**2, table.superstrate)
+    # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
+    # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
+    back = _TRAPPED * (1.0 - through)
+    repeated = np.eye(len(channels)) - values * back[..., None, :]
+    within = np.asarray(np.linalg.solve(repeated, values), np.float64)
+    return Rows(within, within * np.maximum(through, _MIN_TRANSMITTANCE)[..., None, :])
+
+
+def resampled(table: OrderTable, k: int, values: NDArray[Any], counts: Counts) -> Array:
+    """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
+    assert isinstance(table.response, Cells)
+    matrix = cells.linear if table.response.even else cells.interpolation
+    known, grid = table.response.bands[k].counts, _grid(table, k, counts)
+    along_tau, along_rho = matrix(known.tau, grid.tau), matrix(known.rho, grid.rho)
+    summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
+    at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
+    along_w = matrix(known.w, at)
+    return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True), np.float64)
+
+
+def clamped(values: Array) -> Array:
+    """Clamp efficiencies (…, q) to at least 0, and their sums over q to at most 1."""
+    positive = np.maximum(values, 0.0)
+    total = positive.sum(axis=-1, keepdims=True)
+    return np.asarray(positive / np.maximum(total, 1.0))
+
+
+class _Grid(NamedTuple):
+    """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
+
+    tau: Array
+    rho: Array
+    big_k: Array
+    wavelength: Array
+
+
+def _grid(table: OrderTable, k: int, counts: Counts) -> _Grid:
+    tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
+    big_k = (k + cells.sine_squared(rho))[:, None]
+    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w))
+
+
+def wavelength_of(table: OrderTable, big_k: Array, w: Array) -> Array:
+    """Return the wavelength (vacuum, nm) at w of the even grids."""
+    period, least = table.optical_period, least_c(table.superstrate)
+    return cells.wavelength_of(big_k, w, table.wavelengths, period, least)
+
+
+def leaving_transmittance(squared_sine: Array, index: float) -> Array:
+    """Return the unpolarised transmittance of a coat's face for light within; 0 if all returns.
+
+    squared_sine : of the angle within the coat.
+    """
+    outside = index**2 * squared_sine
+    cosine = np.sqrt(np.maximum(1.0 - outside, 0.0))
+    return np.where(outside < 1.0, face_transmittance(np.maximum(cosine, 1e-9), index), 0.0)
+
+
+def cells_of(table: OrderTable) -> Counts:
+    """Return the numbers of the renderer's cells, which fit into memory."""
+    counts, size = (CELLS, 16) if table.superstrate == 1.0 else (CELLS_UNDER_COAT, 32)
+    if table.superstrate == 1.0 and constant(table):
+        counts = Counts(1, 1, 1)
+    records = sum(of.ports * (of.ports + 1) for of in kinds_of(table))
+    while size * records * math.prod(counts) > MOST_BYTES and max(counts) > 4:
+        counts = Counts(*(max(min(n, 4), 3 * n // 4) for n in counts))
+    return counts
+
+
+def constant(table: OrderTable) -> bool:
+    """Whether a table has a single node in each band."""
+    response = table.response
+    return isinstance(response, Cells) and all(b.counts == (1, 1, 1) for b in response.bands)
+
+
+_on_cells: weakref.WeakKeyDictionary[OrderTable, OrderTable] = weakref.WeakKeyDictionary()
+
+
+def on_cells(table: OrderTable) -> OrderTable:
+    """Return a table over cells, for readers that need all channels of a Bloch wave together.
+
+    Listed light is resampled, unpolarised, at even nodes: `CELLS_UNDER_COAT`, and it is no longer
+    exact at the listed lights. Crossed gratings have no cells.
+    """
+    response = table.response
+    if not isinstance(response, Listed):
+        return table
+    if table not in _on_cells:
+        counts = Counts(*(n + 1 for n in CELLS_UNDER_COAT))
+        parts: dict[int, list[NDArray[np.float32]]] = {}
+        for of in kinds_of(table):
+            parts.setdefault(of.band, []).append(_sampled(table, of, counts))
+        bands = tuple(Band(k, *of_band) for k, of_band in parts.items())
+        _on_cells[table] = OrderTable(
+            table.periods, table.wavelengths, Cells(bands, even=True), table.superstrate,
+            table.header, table.thin, table.block,
+        )  # fmt: skip
+    return _on_cells[table]
+
+
+def _sampled(table: OrderTable, of: Kind, counts: Counts) -> NDArray[np.float32]:
+    """Return the efficiencies (τ, ρ, w, j, q, 1) of listed light at even nodes of a kind."""
+    tau, rho, w = map(cells.even_nodes, counts)
+    big_k = (of.band + cells.sine_squared(rho))[:, None]
+    lam = cells.wavelength_of(big_k, w, table.wavelengths, table.optical_period)[..., None]
+    channels = np.arange(of.ports // table.sides)
+    light = cells.from_cell(
+        of.band, of.kind, channels, tau[:, None, None, None], rho[:, None, None], lam,
+        table.optical_period,
+    )  # fmt: skip
+    # just inside the horizon, where orders leave that end there
+    x, y = (part[..., None] * (1.0 - 1e-6) for part in (light.x, light.y))
+    index = table.block or 1.0
+    orders = channels[:, None] - channels
+    values = np.zeros((*counts, of.ports, of.ports))
+    size = len(channels)
+    for came in range(table.sides):
+        for left in range(table.sides):
+            side = {"from_below": (came == 1) != bool(table.block), "transmitted": came != left}
+            shares = table.efficiency(
+                index * x, index * y, light.wavelength[..., None], orders,
+                **(side if table.sides == 2 else {}),
+            )  # fmt: skip
+            rows_, columns = (slice(size * n, size * (n + 1)) for n in (came, left))
+            values[..., rows_, columns] = shares
+    return clamped(values)[..., None].astype(np.float32)

@@ -1,0 +1,24 @@
+"""Orders of periodic profiles by rigorous solvers, for the BSDF `diffraction_orders`.
+
+Contents
+--------
+orders      `solve_orders`: from a profile and a material to a table
+directions  the same of some directions of light alone, as of an echelle
+crossed     `solve_crossed`: orders of crossed gratings
+settings    settings of a solution, and estimates of its stages
+accuracy    error of a table, measured at random directions and wavelengths
+profiles    one period of the grooves as a polygon; generators and a reader
+grating_index  refractive index over wavelength, by name or number
+structure   films on a profile, slices beneath it, and the substrate
+films       their reader and checks
+stations    sets of directions with one system matrix
+integral    solver: boundary integral method
+chandezon   solver: coordinates that follow slopes
+coupled     solver: coupled waves, for dielectrics
+resolution  choice of the solver's resolution, by convergence
+nodes       choice of the numbers of nodes
+block       stations of a block's face near grazing
+sheet       the sum of reflections in a thin sheet with a flat lower side
+jobs        stations solved in processes, and stored until the table is written
+recipes     recipes with `method = "solved"`
+"""

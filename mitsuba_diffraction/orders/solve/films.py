@@ -1,0 +1,174 @@
+"""Films on a profile, and layers and slices beneath it: read, checked, and named."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from ...errors import DiffractionError, check_keys, quoted
+from ...files import read_toml
+from ...heights.lengths import count_between, number_between
+from ...limits import MOST_LAYERS, check_count
+from .grating_index import TabulatedIndex, material_of
+from .profiles import Profile
+from .stations import Grating
+from .structure import Part, ProfileFilm, Slice, Structure
+
+Substance = str | float | complex | TabulatedIndex
+#: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
+#: thickness and parts, of a material and the x in µm at which it begins and ends.
+Layers = Sequence[tuple[Any, ...]]
+
+
+def structure_of(
+    profile: Profile,
+    substance: TabulatedIndex,
+    wavelengths: tuple[float, float],
+    *,
+    layers: Layers = (),
+    beneath: Layers = (),
+    substrate: Substance | None = None,
+    thin: bool = False,
+) -> Structure:
+    """Return the films of layers on a profile, and the slices beneath it.
+
+    Raises a DiffractionError if a length or material is out of its range, parts of a slice overlap,
+    or the profile's material is a perfect conductor or a thin sheet.
+
+    Parameters
+    ----------
+    profile, substance : and its material.
+    wavelengths : shortest and longest, nm, for which indices must be known.
+    layers : on the profile.
+    beneath : layers and slices, from the substrate upwards.
+    substrate : below them; None is the profile's material.
+    """
+    films = tuple(_film(layer, f"layer {n}", wavelengths) for n, layer in enumerate(layers, 1))
+    slices = tuple(
+        _slice(layer, f"beneath {n}", wavelengths, profile.period)
+        for n, layer in enumerate(beneath, 1)
+    )
+    lowest = None if substrate is None else _index(substrate, "substrate", wavelengths)
+    structure = Structure(films, slices, lowest)
+    if structure and (thin or substance.values is None):
+        raise DiffractionError(
+            "layers lie on, and beneath, a material with an index, and not thin sheets or perfect "
+            "conductors"
+        )
+    return structure
+
+
+def read_layers(path: str | os.PathLike[str]) -> Layers:
+    """Read layers and slices from a file (TOML): `layers`, a list of them, and `repeat`.
+
+        layers = [["chitin", 0.09], [0.06, ["chitin", 0.1, 0.3], ["melanin", 0.3, 0.4]]]
+        repeat = 5
+
+    A thickness alone is a slice of the medium above. `layers` of `diffraction` reads such files,
+    without slices.
+
+    Raises a DiffractionError if the file cannot be read, or a key or value is not allowed.
+    """
+    shown = repr(os.fspath(path))
+    content = read_toml(path)
+    check_keys(shown, content, ("layers", "repeat"))
+    repeat = count_between(content.get("repeat", 1), f"{shown}: repeat", 1, MOST_LAYERS)
+    layers = checked_layers(content.get("layers"), f"{shown}: layers")
+    if not layers:
+        raise DiffractionError(f"{shown}: 0 layers; expected 1 to {MOST_LAYERS}")
+    check_count(len(layers) * repeat, MOST_LAYERS, shown, "layers")
+    return tuple(layers) * repeat
+
+
+def checked_layers(value: Any, shown: str) -> Layers:
+    """Return a list of TOML as layers and slices.
+
+    Raises a DiffractionError if it has another form.
+    """
+    if not (isinstance(value, list) and all(isinstance(layer, list) and layer for layer in value)):
+        raise DiffractionError(
+            f'{shown}: expected layers such as ["SiO2", 0.1], material and µm, or slices such as '
+            f'[0.1, ["SiO2", 0.2, 0.5]], µm and parts of material, begin and end; got '
+            f"{quoted(value)}"
+        )
+    return tuple(tuple(layer) for layer in value)
+
+
+def material_text(grating: Grating) -> str:
+    """Return the materials of a grating from the top, for people."""
+    structure = grating.structure
+    films = [f"{film.material.name} {film.thickness:g} µm" for film in reversed(structure.films)]
+    lower = [
+        f"{' and '.join(dict.fromkeys(part.material.name for part in layer.parts)) or 'gap'} "
+        f"{layer.thickness:g} µm"
+        for layer in reversed(structure.slices)
+    ]
+    if len(lower) > 4:
+        lower = [*lower[:2], f"{len(lower) - 3} layers", lower[-1]]
+    own = [grating.material.name] if grating.profile.depth or not structure.slices else []
+    lowest = structure.substrate or (grating.material if structure.slices else None)
+    return " on ".join([*films, *own, *lower, *([lowest.name] if lowest else [])])
+
+
+def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> ProfileFilm:
+    """Return a layer, (material, thickness), on a profile."""
+    if len(layer) != 2 or not isinstance(layer[1], float | int):
+        raise DiffractionError(
+            f"{where}: expected a material and a thickness in µm, got {quoted(layer)}; slices lie "
+            "beneath a profile"
+        )
+    return ProfileFilm(_index(layer[0], where, wavelengths), _thickness(layer[1], where))
+
+
+def _slice(
+    layer: Sequence[Any], where: str, wavelengths: tuple[float, float], period: float
+) -> Slice:
+    """Return a layer, (material, thickness), or a slice, (thickness, parts …)."""
+    if len(layer) == 2 and isinstance(layer[1], float | int):
+        material, thickness = _film(layer, where, wavelengths)
+        return Slice(thickness, (Part(material, 0.0, period),))
+    if not all(isinstance(part, list | tuple) and len(part) == 3 for part in layer[1:]):
+        raise DiffractionError(
+            f"{where}: parts are a material, and the x in µm at which it begins and ends, such as "
+            f'["SiO2", 0.2, 0.5]; got {quoted(layer[1:])}'
+        )
+    parts = tuple(
+        Part(
+            _index(material, where, wavelengths),
+            number_between(begin, f"{where}: begin", 0.0, period, " µm"),
+            number_between(end, f"{where}: end", 0.0, 2.0 * period, " µm"),
+        )
+        for material, begin, end in layer[1:]
+    )
+    _check_parts(parts, where, period)
+    return Slice(_thickness(layer[0], where), parts)
+
+
+def _check_parts(parts: Iterable[Part], where: str, period: float) -> None:
+    """Refuse parts without width, and such that overlap, also across the period's end."""
+    ordered = sorted(parts, key=lambda part: part.begin)
+    for n, part in enumerate(ordered):
+        following = ordered[n + 1].begin if n + 1 < len(ordered) else ordered[0].begin + period
+        if not part.begin < part.end <= following + 1e-9 * period:
+            raise DiffractionError(
+                f"{where}: {part.material.name} from {part.begin:g} to {part.end:g} µm must end "
+                f"after its beginning, and before the next part begins, at {following:g} µm"
+            )
+
+
+def _index(material: Any, where: str, wavelengths: tuple[float, float]) -> TabulatedIndex:
+    """Return a material that has an index."""
+    try:
+        if not isinstance(material, str | int | float | complex | TabulatedIndex):
+            raise DiffractionError(f"expected a material, got {quoted(material)}")
+        known = material_of(material, wavelengths)
+    except DiffractionError as error:
+        raise DiffractionError(f"{where}: {error}") from error
+    if known.values is None:
+        raise DiffractionError(f"{where}: a layer needs an index; a perfect conductor has none")
+    return known
+
+
+def _thickness(value: Any, where: str) -> float:
+    return number_between(value, f"{where}: thickness", 1e-4, 100, " µm")

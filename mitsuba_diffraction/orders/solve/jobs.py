@@ -1,0 +1,354 @@
+"""Stations solved here, in other processes or on a cluster, and stored as they are done."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from multiprocessing import active_children, get_context, parent_process
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError, check_choice, one_line
+from ...progress import Progress, silent
+from ...tables.store import Record, read_record, write_record
+from .chandezon import Chandezon, refused
+from .coupled import CoupledWaves
+from .integral import IntegralSolver
+from .nodes import Place
+from .sheet import sheet_efficiencies
+from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
+
+Item = TypeVar("Item", bound=Hashable)
+
+#: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
+#: solve layers, a structure.
+METHODS: dict[str, Callable[..., Solver]] = {
+    "integral": IntegralSolver, "coupled": CoupledWaves, "chandezon": Chandezon,
+}  # fmt: skip
+LAYERED = ("coupled", "chandezon")
+#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) of the solvers that lose
+#: digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its power.
+LEAST_COSINES = {"integral": 0.03}
+#: Choice of the solver by the grating, see `method_for`.
+AUTO = "auto"
+#: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
+MOST_RESOLUTION = {"integral": 1000, "coupled": 200, "chandezon": 250}
+# Threads that libraries of linear algebra start in each process, which would compete for the cores
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Grating, solver and its resolution; `digest` identifies the grating and the solver.
+
+    Raises a DiffractionError if the resolution is above `MOST_RESOLUTION`.
+    """
+
+    grating: Grating = field(compare=False)
+    method: str
+    resolution: int
+    digest: str
+
+    def __post_init__(self) -> None:
+        if self.resolution > MOST_RESOLUTION[self.method]:
+            raise DiffractionError(
+                f"{self.grating.profile.name} would be solved at resolution {self.resolution}, and "
+                f"method {self.method} solves up to {MOST_RESOLUTION[self.method]}: check that "
+                "its lengths are in µm; it may be too deep, or too rough, for the shortest "
+                "wavelength; slopes may be solved by method=chandezon"
+            )
+
+
+def method_for(grating: Grating) -> str:
+    """Return the solver for a grating.
+
+    Chandezon's method for slopes, also under films; coupled waves for other films, for slices and
+    for lamellar profiles of metal no deeper than twice their period, else the integral method.
+    """
+    flat = grating.profile.depth == 0.0
+    sloped = not (grating.is_perfect or grating.thin or flat or refused(grating.profile))
+    if sloped and not grating.structure.is_beneath:
+        return "chandezon"
+    profile = grating.profile
+    shallow = profile.is_lamellar and profile.depth <= 2.0 * profile.period
+    lamellar = shallow and not (grating.is_perfect or grating.thin)
+    return "coupled" if grating.structure or lamellar else "integral"
+
+
+def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
+    """Return a problem with its digest.
+
+    Raises a DiffractionError if the method is unknown.
+    """
+    if method == AUTO:
+        method = method_for(grating)
+    check_choice("method", method, (AUTO, *METHODS))
+    structure = grating.structure
+    if structure and (method not in LAYERED or (structure.is_beneath and method != "coupled")):
+        raise DiffractionError(
+            f"method {method} does not solve these layers; use method=coupled, or leave out "
+            "layers, beneath and substrate"
+        )
+    outline = "amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin
+    profile, material = grating.profile, grating.material
+    digest = digest_of(
+        outline + (("block",) if grating.block else ()),
+        profile.period, profile.x, profile.z, material.wavelengths, material.values,
+        structure.lengths,
+        *(part for medium in structure.materials for part in (medium.wavelengths, medium.values)),
+    )  # fmt: skip
+    return Problem(grating, method, resolution, digest)
+
+
+def digest_of(*parts: object) -> str:
+    """Return the SHA-256 of the numbers of arrays, and of the texts of other parts."""
+    content = hashlib.sha256()
+    for part in parts:
+        is_array = isinstance(part, np.ndarray)
+        content.update(np.ascontiguousarray(part).tobytes() if is_array else repr(part).encode())
+    return content.hexdigest()
+
+
+@lru_cache(maxsize=2)
+def solver_of(problem: Problem) -> Solver:
+    """Return the solver of a problem; a process keeps the last ones."""
+    grating = problem.grating
+    layers = [grating.structure] if grating.structure else []
+    return METHODS[problem.method](grating.profile, problem.resolution, *layers)
+
+
+# Suffix of files of results.
+_SUFFIX = ".solved"
+
+
+class Solved(NamedTuple):
+    """Numbers of a solution, and the processor seconds that they took.
+
+    values : of a place, amplitudes (w, j, 2, q, 2), see `stations.Solver`, of single precision. For
+        a sheet, whose light has no phase, they are roots of its efficiencies.
+    """
+
+    values: NDArray[Any]
+    seconds: float
+
+
+def solve_place(problem: Problem, place: Place) -> Solved:
+    """Solve a place.
+
+    Values are rounded as they are stored, so that a table is the same whether or not it was
+    interrupted.
+
+    Raises a DiffractionError if the solver fails on the profile.
+    """
+    solver = solver_of(problem)
+    start, grating = time.thread_time(), problem.grating
+    w = place.w[:1] if grating.is_perfect else place.w
+    least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
+    station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
+    try:
+        values = solver.amplitudes(station)
+    except DiffractionError:
+        raise
+    except (ValueError, np.linalg.LinAlgError) as error:  # numbers that are not finite
+        raise DiffractionError(
+            f"method {problem.method} cannot solve {grating.profile.name} "
+            f"({one_line(str(error))}); check that its line neither touches nor nearly touches "
+            "itself"
+        ) from error
+    if grating.thin:
+        values = np.sqrt(sheet_efficiencies(values, station))
+    if grating.block:
+        values = on_both_sides(values, station)
+    return Solved(values.astype(np.complex64), time.thread_time() - start)
+
+
+@dataclass
+class Jobs:
+    """Where stations are solved and stored.
+
+    Attributes
+    ----------
+    folder : of results, which another run finds again, made when needed; None stores nothing.
+    executor : processes or a cluster; None solves here.
+    progress : called as progress(done, total, text).
+    """
+
+    folder: Path | None = None
+    executor: Executor | None = None
+    progress: Progress = silent
+    _seconds: dict[str, float] = field(default_factory=dict, init=False)
+
+    def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
+        """Return the efficiencies at all places; see `amplitudes`."""
+        known = self.amplitudes(problem, places, text)
+        return {place: np.abs(values) ** 2 for place, values in known.items()}
+
+    def amplitudes(
+        self, problem: Problem, places: Sequence[Place], text: str
+    ) -> dict[Place, Complex]:
+        """Return the amplitudes at all places; see `results`."""
+
+        def key(place: Place) -> object:
+            return problem.digest, problem.resolution, tuple(place)
+
+        known = self.results(partial(solve_place, problem), places, key, text)
+        return {place: solved.values.astype(np.complex128) for place, solved in known.items()}
+
+    def results(
+        self,
+        task: Callable[[Item], Solved],
+        items: Iterable[Item],
+        key: Callable[[Item], object],
+        text: str,
+    ) -> dict[Item, Solved]:
+        """Return the results of a task for all items, of which those in the folder are read.
+
+        An exception or Ctrl-C leaves finished results in the folder.
+
+        key : all that the result of an item depends on, as text of which its file is named.
+
+        Raises a DiffractionError if the folder cannot be written.
+        """
+        names = {item: digest_of(key(item))[:24] for item in items}
+        files = {} if self.folder is None else {
+            item: self.folder / f"{name}{_SUFFIX}" for item, name in names.items()
+        }  # fmt: skip
+        results = {item: _read(file, names[item]) for item, file in files.items()}
+        known = {item: solved for item, solved in results.items() if solved is not None}
+        missing = [item for item in names if item not in known]
+        if self.folder is not None and missing:
+            make_folder(self.folder)
+        self.progress(len(known), len(names), text)
+        for item, solved in self._solved(task, missing):
+            known[item] = solved
+            if item in files:
+                record = Record({"seconds": solved.seconds}, [solved.values])
+                write_record(files[item], _title(names[item]), record)
+            self.progress(len(known), len(names), text)
+        self._seconds |= {names[item]: solved.seconds for item, solved in known.items()}
+        return known
+
+    @property
+    def processor_seconds(self) -> float:
+        """Processor seconds of all solutions so far, including solutions read from the folder."""
+        return sum(self._seconds.values())
+
+    def seconds(self, problem: Problem, place: Place) -> float:
+        """Return the seconds that a place takes."""
+        if self.executor is None:
+            return timed(problem, place)
+        return float(self.executor.submit(timed, problem, place).result())
+
+    def _solved(
+        self, task: Callable[[Item], Solved], items: Iterable[Item]
+    ) -> Iterator[tuple[Item, Solved]]:
+        if self.executor is None:
+            yield from ((item, task(item)) for item in items)
+            return
+        futures = {self.executor.submit(task, item): item for item in items}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def timed(problem: Problem, place: Place) -> float:
+    """Return the seconds that a place takes, without the start of the solver."""
+    solver_of(problem)
+    start = time.perf_counter()
+    solve_place(problem, place)
+    return time.perf_counter() - start
+
+
+@contextmanager
+def processes(count: int) -> Iterator[Executor]:
+    """Yield a pool of processes with one thread of linear algebra each.
+
+    Raises a DiffractionError if one of them is killed.
+    """
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
+    try:
+        yield pool
+    except BrokenExecutor as error:
+        raise DiffractionError(
+            "a process that solves was killed, maybe for lack of memory; use fewer of them, and "
+            "run the same command again, which resumes from the stored results"
+        ) from error
+    except BaseException:
+        # Ctrl-C does not wait for stations in progress
+        for process in active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _begin() -> None:
+    """Leave Ctrl-C, which reaches all processes of a terminal, to the first, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder of results.
+
+    Raises a DiffractionError if it cannot be written.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot write '{folder}': {error.strerror}; choose a folder that exists and is "
+            "writable"
+        ) from error
+
+
+def remove_results(folder: Path) -> None:
+    """Remove the results in a folder, and the folder once it is empty."""
+    with suppress(OSError):
+        for file in folder.glob(f"*{_SUFFIX}"):
+            file.unlink()
+        folder.rmdir()
+
+
+def _read(file: Path, name: str) -> Solved | None:
+    """Return a stored result; None if there is none, or a damaged one, which is solved again."""
+    try:
+        record = read_record(file, _title(name))
+        (values,) = record.arrays
+        solved = Solved(values, float(record.document["seconds"]))
+        return solved if np.isfinite(values).all() else None
+    except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError):
+        return None
+
+
+def _title(name: str) -> str:
+    """Return the first words of a result's file."""
+    return f"mitsuba_diffraction solution {name}"

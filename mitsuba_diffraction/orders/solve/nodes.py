@@ -1,0 +1,123 @@
+"""Numbers of nodes along τ, ρ and w that a tolerance requires, from lines across a band.
+
+Along a line through the band the efficiencies are solved at many Chebyshev nodes; their series says
+what fewer nodes leave out. Resonances of metals (surface plasmons) lie beside the ends of kind B in
+low bands, which need several times as many nodes as high ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from .. import cells
+from ..cells import Counts
+from .stations import Complex, Real, reversed_light
+
+#: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most.
+MAX_NODES = (36, 24, 8)
+MIN_NODES = (4, 3, 2)
+#: Where a band's lines cross (τ, ρ, w): away from its middle, where symmetry would hide odd terms.
+_CROSSINGS = ((0.31, 0.38, 0.35), (0.69, 0.72, 0.7))
+
+
+class Place(NamedTuple):
+    """Station of a table: its band, kind, τ and ρ; and the w (n,) that are solved there."""
+
+    band: int
+    kind: int
+    tau: float
+    rho: float
+    w: tuple[float, ...]
+
+
+def kinds_of(band: int) -> tuple[int, ...]:
+    """Return the kinds of a band: A, and, but for band 0, B."""
+    return (cells.A, cells.B) if band else (cells.A,)
+
+
+def places_of(band: int, counts: Counts, nodes: Callable[[int], Real] = cells.nodes) -> list[Place]:
+    """Return the stations of a band: up to τ = ½, of which reciprocity makes the other half."""
+    tau, rho, w = (nodes(count).tolist() for count in counts)
+    half = tau[: (counts.tau + 1) // 2]
+    return [Place(band, kind, t, r, tuple(w)) for kind in kinds_of(band) for t in half for r in rho]
+
+
+def places_at(
+    x: Real, y: Real, wavelength: Real, wavelengths: tuple[float, float], optical_period: float
+) -> tuple[cells.Cell, list[Place]]:
+    """Return the cell of each of some lights (n,), and its station, of one w.
+
+    x, y, wavelength, optical_period : as for `cells.to_cell`; wavelengths : of the table, nm.
+    """
+    cell = cells.to_cell(x, y, wavelength, optical_period)
+    w = cells.w_of(cell.k_continuous, wavelength, wavelengths, optical_period)
+    columns = (part.tolist() for part in (cell.band, cell.kind, cell.tau, cell.rho, w))
+    rows = zip(*columns, strict=True)
+    return cell, [Place(band, kind, tau, rho, (at,)) for band, kind, tau, rho, at in rows]
+
+
+def at_nodes(
+    kind: int,
+    places: Sequence[Place],
+    counts: Counts,
+    solved: Mapping[Place, Complex],
+    sides: int,
+    values_of: Callable[[Complex], Real],
+) -> NDArray[np.float32]:
+    """Return values (w, j, q, …) of amplitudes at all nodes of a kind, (τ, ρ, w, j, q, …).
+
+    places : of a band, of `places_of`.
+    """
+    of_kind = [place for place in places if place.kind == kind]
+    shape = values_of(solved[of_kind[0]]).shape
+    values = np.empty((counts.tau, counts.rho, *shape), np.float32)
+    for number, place in enumerate(of_kind):
+        n, m = divmod(number, counts.rho)
+        values[n, m] = values_of(solved[place])
+        back = values_of(reversed_light(solved[place], sides))
+        opposite = counts.tau - 1 - n
+        values[opposite, m] = back if opposite > n else 0.5 * (values[n, m] + back)
+    return values
+
+
+class Line(NamedTuple):
+    """Places along one variable (0 τ, 1 ρ, 2 w) of a kind, at Chebyshev nodes."""
+
+    axis: int
+    places: tuple[Place, ...]
+
+
+def lines(band: int, most: tuple[int, int, int] = MAX_NODES) -> Iterator[Line]:
+    """Yield the lines on which a band's numbers of nodes are chosen.
+
+    Along τ, half of the nodes are enough: reciprocity gives the others.
+    """
+    for kind in kinds_of(band):
+        for tau, rho, w in _CROSSINGS:
+            half = cells.nodes(most[0])[: most[0] // 2]
+            yield Line(0, tuple(Place(band, kind, float(t), rho, (w,)) for t in half))
+            across = cells.nodes(most[1])
+            yield Line(1, tuple(Place(band, kind, tau, float(r), (w,)) for r in across))
+            yield Line(2, (Place(band, kind, tau, rho, tuple(cells.nodes(most[2]))),))
+
+
+def count_for(values: NDArray[np.float64], fewest: int, error: float) -> int:
+    """Return the number of nodes whose interpolation misses `error` of the light at most.
+
+    values : (nodes, j, q, n) at Chebyshev nodes, whose norm over n is the unpolarised efficiency.
+
+    The terms that a number of nodes leaves out, and as much again for those it takes for lower
+    ones, are summed over q and averaged over j.
+    """
+    terms = dct(values, axis=0) / len(values)
+    light = max(float(np.linalg.norm(values, axis=-1).sum(axis=-1).mean()), 1e-12)
+    for count in range(fewest, len(values)):
+        left = np.sqrt(np.sum(terms[count:] ** 2, axis=(0, -1)))
+        if float(left.sum(axis=-1).mean()) <= error * light:
+            return count
+    return len(values)

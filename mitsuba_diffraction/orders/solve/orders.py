@@ -1,0 +1,380 @@
+"""`solve_orders`: from a profile and a material to a table of orders."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import DiffractionError, check_choice, quoted, warn
+from .. import cells
+from ..cells import Counts
+from ..polarised import ODD, mueller_of
+from ..table import MOST_NODES, Band, Cells, OrderTable, check_outline
+from .accuracy import WORST, diffuse_light, measured_error, powers
+from .block import to_node
+from .directions import Directions, solve_directions
+from .films import Layers, Substance, structure_of
+from .grating_index import TabulatedIndex, material_of
+from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
+from .nodes import (
+    MAX_NODES,
+    MIN_NODES,
+    Line,
+    Place,
+    at_nodes,
+    count_for,
+    kinds_of,
+    lines,
+    places_of,
+)
+from .profiles import Profile
+from .resolution import (
+    coarsest,
+    energy_error,
+    finer_problem,
+    places_to_test,
+    reciprocity_error,
+    resolved,
+)
+from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of, silent
+from .sheet import check_clear
+from .stations import Complex, Grating, Real, reversed_light
+
+#: Times that a table which misses its tolerance gets more nodes, and their factor.
+REFINEMENTS, _FINER = 2, 1.4
+#: Times that the resolution is raised, if solutions at nodes have light from nothing.
+_RAISED = 3
+#: Nodes of a block's first table; each refinement halves the distance between them.
+BLOCK_COUNTS = Counts(9, 7, 3)
+#: Bytes of a refined table at most.
+MOST_BYTES = 128 << 20
+
+
+def solve_orders(
+    profile: Profile,
+    material: str | float | complex | TabulatedIndex = "Al",
+    *,
+    superstrate: float = 1.0,
+    thin: bool = False,
+    block: bool = False,
+    layers: Layers = (),
+    beneath: Layers = (),
+    substrate: Substance | None = None,
+    theta: ArrayLike | None = None,
+    phi: ArrayLike = 0.0,
+    step: float = 5.0,
+    settings: Settings | None = None,
+    jobs: Jobs | None = None,
+    announce: Callable[[Estimate], None] | None = None,
+) -> OrderTable:
+    """Solve the orders of a grating, for all directions and wavelengths or for listed directions.
+
+    A table that misses its tolerance is refined up to twice, then returned with a warning; its
+    header has the measured error.
+
+    Raises a DiffractionError if an argument is out of its range, or the solver is not installed or
+    does not converge.
+
+    Parameters
+    ----------
+    profile : one period of the grooves, from `solve.profiles`.
+    material : a name that Mitsuba knows, an index n + ik, or "none" for a perfect conductor.
+    superstrate : index of the clear medium above.
+    thin : whether the material is a thin sheet, whose lower side is flat: the table then has the
+        light on both sides (`sheet`). Otherwise it has the reflected orders.
+    block : whether the profile is the face of a clear block, whose index is that of the material,
+        1.01 to 5, in light from above and from within (`blocks`); solved by coupled waves.
+    layers : films on the profile, from the material upwards, such as [("1.46", 0.1)]: material and
+        thickness along z, µm. They interfere; walls have none.
+    beneath : layers beneath the profile, from the substrate upwards, and slices (`films.Layers`).
+    substrate : below them; by default the material.
+    theta, phi : directions to the light, degrees, within the medium that it comes from: from the
+        normal, and from x towards y; a grid of both. None solves all directions.
+    step : between the wavelengths of listed directions, nm; the ends are solved exactly.
+    settings : wavelengths, tolerance, method; of listed directions, the tolerance bounds the
+        solver's error.
+    jobs : where stations are solved and stored; by default here, and stored nowhere.
+    announce : called with the estimate of each stage before it starts.
+    """
+    if not isinstance(profile, Profile):
+        raise DiffractionError(
+            f"solve_orders: expected a profile, as of md.profiles.lamellar, got {quoted(profile)}; "
+            "a recipe is solved by the command 'solve'"
+        )
+    how, work, tell = settings or Settings(), jobs or Jobs(), announce or silent
+    substance = material_of(material, how.wavelengths)
+    if thin or block:
+        check_clear(substance, how.wavelengths)
+        if how.polarised:
+            raise DiffractionError(
+                "polarised: tables of sheets and blocks have efficiencies alone; leave it out"
+            )
+    if block:
+        if thin or layers or beneath or substrate is not None or superstrate != 1.0:
+            raise DiffractionError(
+                "block: a block has no layers, superstrate or second face; leave these out"
+            )
+        grating = _block(profile, substance, how)
+    else:
+        structure = structure_of(
+            profile, substance, how.wavelengths,
+            layers=layers, beneath=beneath, substrate=substrate, thin=thin,
+        )  # fmt: skip
+        grating = Grating(profile, substance, superstrate, how.wavelengths, thin, structure)
+    problem = problem_of(grating, "coupled" if block else how.method, how.resolution or 0)
+    facts = {"material": substance.name} if block else {}
+    if theta is not None:
+        lights = Directions(theta, phi, step)
+        return solve_directions(problem, lights, how, work, tell, facts)
+    check_outline((profile.period, math.inf), how.wavelengths, *_media(grating))
+    return _solve_cells(problem, how, work, tell, facts)
+
+
+def _block(profile: Profile, substance: TabulatedIndex, how: Settings) -> Grating:
+    """Return the grating of a block's face: upside down, with the block above.
+
+    The block has more channels, and light of the rarer medium has some of them (`blocks`). Coupled
+    waves solve both at once; they conserve the energy of clear materials to rounding.
+    """
+    check_choice("method", how.method, (AUTO, "coupled"))
+    known = substance.index(np.asarray(how.wavelengths))
+    assert known is not None
+    if (np.diff(profile.x) < 0).any():
+        raise DiffractionError(
+            f"{profile.name} is undercut: blocks are solved by coupled waves, whose lines never "
+            "turn back; use another profile"
+        )
+    index = float(known[0].real)
+    check_outline((profile.period, math.inf), how.wavelengths, block=index, listed=True)
+    turned = Profile(profile.x, -profile.z, profile.period, profile.name)
+    return Grating(turned, material_of(1.0, how.wavelengths), index, how.wavelengths, block=True)
+
+
+def _media(grating: Grating) -> tuple[float, bool, float | None]:
+    """Return superstrate, thin and block of a grating's table."""
+    if grating.block:
+        return 1.0, False, grating.superstrate
+    return grating.superstrate, grating.thin, None
+
+
+def _solve_cells(
+    problem: Problem, how: Settings, work: Jobs, tell: Callable[[Estimate], None],
+    facts: Mapping[str, Any],
+) -> OrderTable:  # fmt: skip
+    """Solve all directions and wavelengths."""
+    grating = problem.grating
+    bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
+    chosen = resolved(problem, work, places_to_test(bands), how.tolerance / 2)
+    coarse = problem = chosen.problem
+    if how.resolution is None and problem.method == "integral":  # others cost about the same
+        coarse = replace(problem, resolution=coarsest(problem))
+    if grating.block:
+        counts = dict.fromkeys(bands, BLOCK_COUNTS)
+    else:
+        counts = _counts(coarse, work, bands, how, tell)
+    header = header_of(chosen, how) | dict(facts)
+    superstrate, thin, block = _media(grating)
+    for refinement in range(REFINEMENTS + 1):
+        problem, solved = _solved_at_nodes(problem, counts, work, tell)
+        header |= {
+            "solver": solver_of(problem).name,
+            "reciprocity_error": _reciprocity(problem, work, bands),
+        }
+        if thin:
+            header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
+        made = tuple(_band(grating, k, counts[k], solved, how.polarised) for k in bands)
+        table = OrderTable(
+            (grating.profile.period, math.inf), how.wavelengths, Cells(made, even=bool(block)),
+            superstrate, header, thin, block,
+        )  # fmt: skip
+        error = measured_error(table, problem, work)
+        if error.within(how.tolerance) or refinement == REFINEMENTS:
+            break
+        finer = _refined_counts(counts, error.bands, grating.block)
+        if table.nbytes * np.prod(finer[0]) / np.prod(counts[0]) > MOST_BYTES:
+            break
+        counts = finer
+    header |= error.facts() | {"processor_seconds": round(work.processor_seconds, 1)}
+    if not error.within(how.tolerance):
+        warn(
+            f"the table misses {error.mean:.2%} of the light in its orders on average (tolerance "
+            f"{how.tolerance:.2%}) and {error.most:.2%} in 5 % of directions (tolerance "
+            f"{WORST * how.tolerance:.2%}); use a larger tolerance, or fewer wavelengths"
+        )
+    return table
+
+
+def _solved_at_nodes(
+    problem: Problem,
+    counts: Mapping[int, Counts],
+    jobs: Jobs,
+    announce: Callable[[Estimate], None],
+) -> tuple[Problem, dict[Place, Complex]]:
+    """Solve all nodes, at a higher resolution if solutions have light from nothing."""
+    along = _nodes(problem.grating)
+    places = [place for band in counts for place in places_of(band, counts[band], along)]
+    for _ in range(_RAISED):
+        announce_stage(announce, "solving", problem, jobs, places)
+        solved = jobs.amplitudes(problem, places, "solving orders")
+        excess = max(float(powers(values).sum(axis=2).max()) for values in solved.values())
+        if excess <= MOST_EXCESS:
+            return problem, solved
+        problem = finer_problem(problem)
+    raise DiffractionError(
+        f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
+        "use another method, a higher resolution, or a smoother profile"
+    )
+
+
+def _nodes(grating: Grating) -> Callable[[int], Real]:
+    """Return the nodes of a grating's table: even ones of blocks, else Chebyshev's."""
+    return cells.even_nodes if grating.block else cells.nodes
+
+
+def _refined_counts(counts: Mapping[int, Counts], missed: Real, block: bool) -> dict[int, Counts]:
+    """Return more nodes for the bands that miss most, at least a mean band's share.
+
+    Even nodes of blocks are halved in all bands, so that the old ones are nodes again.
+    """
+    if block:
+        return {k: Counts(*(2 * n - 1 for n in of_band)) for k, of_band in counts.items()}
+    return {
+        k: Counts(*(n if n == 1 else min(int(np.ceil(_FINER * n)), MOST_NODES) for n in of_band))
+        if missed[k] >= missed.mean()
+        else of_band
+        for k, of_band in counts.items()
+    }
+
+
+def _counts(
+    problem: Problem,
+    jobs: Jobs,
+    bands: Iterable[int],
+    how: Settings,
+    announce: Callable[[Estimate], None],
+) -> dict[int, Counts]:
+    """Choose the numbers of nodes of each band by series along lines across it."""
+    most = Counts(*MAX_NODES[:2], 1 if problem.grating.is_perfect else MAX_NODES[2])
+    drawn = {band: list(lines(band, most)) for band in bands}
+    places = [place for of_band in drawn.values() for line in of_band for place in line.places]
+    announce_stage(announce, "choosing nodes", problem, jobs, places)
+    solved = jobs.amplitudes(problem, places, "choosing nodes")
+    values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
+    # three variables share the tolerance; rarely seen bands may miss more
+    shares, sides = _band_shares(problem.grating, len(drawn)), problem.grating.sides
+    return {
+        band: _count(
+            of_band, most, solved, values_of, how.tolerance / np.sqrt(3 * len(drawn) * share), sides
+        )
+        for (band, of_band), share in zip(drawn.items(), shares, strict=True)
+    }
+
+
+def _band_shares(grating: Grating, bands: int) -> Real:
+    """Return the share of diffuse white light in each band, at least 1/(16 bands).
+
+    If a band of share p misses 1/√(n p) of a tolerance, all n bands together miss the tolerance at
+    most (Cauchy and Schwarz).
+    """
+    x, y, lam = diffuse_light(4096, grating.wavelengths)
+    band = cells.to_cell(x, y, lam, grating.optical_period).band
+    counted = np.bincount(np.minimum(band, bands - 1), minlength=bands) / len(band)
+    return np.maximum(counted, 1.0 / (16 * bands))
+
+
+def _count(
+    drawn: Sequence[Line],
+    most: Counts,
+    solved: Mapping[Place, Complex],
+    values_of: Callable[[Place, Complex], Real],
+    error: float,
+    sides: int,
+) -> Counts:
+    """Return the numbers of nodes that all lines of a band need, for values (w, j, q, n)."""
+    needed = [1 if size == 1 else least for size, least in zip(most, MIN_NODES, strict=True)]
+    for line in drawn:
+        if most[line.axis] == 1:
+            continue
+        values = [values_of(place, solved[place]) for place in line.places]
+        if line.axis == 0:
+            values += [
+                values_of(place, reversed_light(solved[place], sides))
+                for place in reversed(line.places)
+            ]
+        # order 0 is no colour, and is left out
+        along = np.concatenate(values)
+        if (channels := along.shape[1] // sides) > 1:
+            along *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
+        needed[line.axis] = max(needed[line.axis], count_for(along, MIN_NODES[line.axis], error))
+    return Counts(*needed)
+
+
+def _unpolarised(place: Place, amplitudes: Complex) -> Real:
+    """Return unpolarised efficiencies (w, j, q, 1)."""
+    return powers(amplitudes).mean(axis=-1, keepdims=True)
+
+
+def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
+    """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
+    y = grating.station(*place).along[:, None, None, None, None]
+    elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
+    return elements.reshape(*elements.shape[:3], 16)
+
+
+def _band(
+    grating: Grating, band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool
+) -> Band:
+    """Assemble the response of a band from its stations."""
+    places = places_of(band, counts, _nodes(grating))
+    if grating.block:
+        moved = {place: solved[place] * to_node(grating, place) for place in places}
+        values_of = _lossless
+    else:
+        moved = {place: solved[place] for place in places}
+        values_of = _limited_mueller if polarised else _along_grooves
+    return Band(
+        band,
+        *(
+            at_nodes(kind, places, counts, moved, grating.sides, values_of)
+            for kind in kinds_of(band)
+        ),
+    )
+
+
+def _along_grooves(amplitudes: Complex) -> Real:
+    """Return M₀₀ and M₀₁ (w, j, q, 2) of amplitudes, scaled where powers sum to more than 1."""
+    along = powers(amplitudes)
+    along_e, along_b = np.moveaxis(along / np.maximum(along.sum(axis=2, keepdims=True), 1.0), -1, 0)
+    return np.stack([0.5 * (along_e + along_b), 0.5 * (along_e - along_b)], axis=-1)
+
+
+def _lossless(amplitudes: Complex) -> Real:
+    """Return M₀₀ (w, j, q, 1), of which the mirror's order has the remainder of each port."""
+    values = powers(amplitudes).mean(axis=-1)
+    port = np.arange(values.shape[-1])
+    lit = values.sum(axis=-1) > 0.0
+    others = values.copy()
+    others[..., port, port] = 0.0
+    others /= np.maximum(others.sum(axis=-1, keepdims=True), 1.0)
+    others[..., port, port] = np.maximum(lit - others.sum(axis=-1), 0.0)
+    return others[..., None]
+
+
+def _limited_mueller(amplitudes: Complex) -> Real:
+    """Return the Mueller matrices of amplitudes, scaled where their powers sum to more than 1."""
+    total = powers(amplitudes).sum(axis=2)
+    matrices = mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
+    return matrices.reshape(*matrices.shape[:-2], 16)
+
+
+def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
+    """Return the largest violation of reciprocity in any band; see `resolution`."""
+    places = [Place(band, kind, 0.5, 0.41, (0.5,)) for band in bands for kind in kinds_of(band)]
+    solved = jobs.solve(problem, places, "checking reciprocity")
+    return reciprocity_error(solved, problem.grating.sides)

@@ -1,0 +1,157 @@
+"""Resolution of a solver, chosen by its convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import DiffractionError
+from .films import material_text
+from .jobs import MOST_RESOLUTION, Jobs, Problem
+from .nodes import Place, kinds_of
+from .stations import Real, reversed_light
+
+#: Factor between resolutions that are compared, and comparisons at most.
+_STEP, _MOST = 1.35, 12
+#: Light from nothing that a solution may have where resolutions are compared, or a tenth of the
+#: tolerance if that is more: the table scales it away, which changes colours by as much.
+_EXCESS = 5e-4
+#: Reflected share of light, on average, below which there are no efficiencies to tabulate.
+_DARK = 1e-7
+#: Points for each wavelength in the material, at first; meshes graded at corners are half as fine
+#: between them.
+_POINTS_PER_WAVELENGTH = 2.5
+_FEWEST_POINTS, _POINTS_PER_CORNER = 48, 12
+#: Harmonics on either side beyond the orders that propagate, at first.
+_HARMONICS = 8
+
+
+class Chosen(NamedTuple):
+    """Problem with a resolution, and its error: the change to the next resolution."""
+
+    problem: Problem
+    error: float
+
+
+def chosen_resolution(
+    problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float
+) -> Chosen:
+    """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
+
+    places : where resolutions are compared, such as `test_places`.
+
+    Raises a DiffractionError if it does not converge.
+    """
+    coarse = replace(problem, resolution=coarsest(problem))
+    values = jobs.solve(coarse, places, "choosing the resolution")
+    for number in range(_MOST):
+        if number and np.ceil(coarse.resolution * _STEP) > MOST_RESOLUTION[problem.method]:
+            break
+        fine, finer, error = _refined(coarse, values, jobs, places)
+        excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
+        if problem.grating.thin:  # which loses no light either
+            excess = energy_error(values.values())
+        one_way = reciprocity_error(values, problem.grating.sides)
+        allowed = max(_EXCESS, 0.1 * tolerance)
+        if error <= tolerance and excess <= allowed and one_way <= 2 * tolerance:
+            return Chosen(coarse, error)
+        coarse, values = fine, finer
+    raise DiffractionError(
+        f"method {problem.method} does not converge on {problem.grating.profile.name}: at "
+        f"resolution {coarse.resolution} the last step changed {error:.2%} of the light, sums over "
+        f"orders are above 1 by {max(excess, 0.0):.2%}, and reversed light differs by "
+        f"{one_way:.2%}; smooth the profile, use a larger tolerance or another method, or set "
+        "the resolution"
+    )
+
+
+def resolved(problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float) -> Chosen:
+    """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
+    if problem.resolution == 0:
+        return chosen_resolution(problem, jobs, places, tolerance)
+    return Chosen(problem, resolution_error(problem, jobs, places))
+
+
+def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
+    """Return the share of the light at some places that the next resolution changes."""
+    values = jobs.solve(problem, places, "checking the resolution")
+    return _refined(problem, values, jobs, places)[2]
+
+
+def _refined(
+    problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
+) -> tuple[Problem, dict[Place, Real], float]:
+    """Return the problem at the next resolution, its efficiencies, and the share that changes.
+
+    Raises a DiffractionError if the grating reflects nothing.
+    """
+    fine = finer_problem(problem)
+    finer = jobs.solve(fine, places, "choosing the resolution")
+    missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
+    light = sum(float(finer[p].sum()) for p in places)
+    if light < _DARK * sum(values[p].shape[1] for p in places):
+        raise DiffractionError(
+            f"{problem.grating.profile.name} of {material_text(problem.grating)} reflects no "
+            "light; choose materials that differ from the medium above, and layers that light "
+            "passes"
+        )
+    return fine, finer, missed / light
+
+
+def finer_problem(problem: Problem) -> Problem:
+    """Return the problem at the next resolution."""
+    return replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+
+
+def places_to_test(bands: Sequence[int]) -> list[Place]:
+    """Return places where resolutions are compared; resonances of metals lie in low bands."""
+    some = sorted({*bands[:2], bands[len(bands) // 2], bands[-1]})
+    return [
+        Place(band, kind, tau, 0.41, (0.05, 0.95))
+        for band in some
+        for kind, tau in zip(kinds_of(band), (0.5, 0.2), strict=False)
+    ]
+
+
+def reciprocity_error(solved: Mapping[Place, Real], sides: int) -> float:
+    """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
+
+    They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
+    light of one channel, summed over the outgoing ones; 0 without such places.
+    """
+    differences = [
+        np.abs(values - reversed_light(values, sides))
+        for place, values in solved.items()
+        if place.tau == 0.5
+    ]
+    sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in differences)
+    return max(sums, default=0.0)
+
+
+def energy_error(solved: Iterable[Real]) -> float:
+    """Return the mean difference from 1 of the sums over the orders of a clear sheet."""
+    return float(np.mean([np.abs(values.sum(axis=(3, 4)) - 1.0).mean() for values in solved]))
+
+
+def coarsest(problem: Problem) -> int:
+    """Return the resolution to begin with, which shows where efficiencies vary."""
+    grating = problem.grating
+    profile, (low, high) = grating.profile, grating.wavelengths
+    lam = np.linspace(low, high, 32)
+    index = grating.material.index(lam)
+    dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
+    waves = float((1e3 * dense / lam).max())  # per µm
+    if problem.method in ("coupled", "chandezon"):
+        return int(np.ceil(profile.period * grating.superstrate * 1e3 / low)) + _HARMONICS
+    sides = 2.0 if profile.corners else 1.0
+    points = _POINTS_PER_WAVELENGTH * sides * profile.length * waves
+    # the sums over orders of half as many terms must reach the waves in the material
+    return int(
+        np.ceil(
+            max(points, _FEWEST_POINTS, _POINTS_PER_CORNER * profile.corners,
+                2.2 * profile.period * waves)
+        )
+    )  # fmt: skip

@@ -1,0 +1,65 @@
+"""Orders of some directions of light alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
+
+#: One wavelength.
+GREEN = Settings(wavelengths=(550.0, 550.0))
+
+
+def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table = solve_orders(sinusoidal(0.6, 1e-6), "Al", theta=40.0, phi=60.0, settings=GREEN)
+    theta, phi = np.radians(40.0), np.radians(60.0)
+    x, y = -np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
+    index = material_of("Al", GREEN.wavelengths).index(550.0)
+    truth = np.abs(np.stack(fresnel(np.cos(theta), index))) ** 2
+    # 10⁻³ nm of the depth; single precision
+    np.testing.assert_allclose(table.polarised_efficiency(x, y, 550.0, 0), truth, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"theta": 95.0}, "theta 95 must be"),
+        ({"theta": np.arange(80), "phi": np.arange(80), "step": 0.1}, "choose fewer directions"),
+    ],
+)
+def test_light_that_cannot_be_solved_is_refused(options, message):
+    with pytest.raises(DiffractionError, match=message):
+        solve_orders(sinusoidal(0.6, 0.05), "Al", **options)
+
+
+def test_efficiencies_of_one_direction_are_those_solved():
+    """Also of a few wavelengths, which are narrower than the distance of usual nodes."""
+    profile, settings = lamellar(0.376, 0.36, 0.6), Settings((522.0, 542.0))
+    mirror = [("1.46", 0.104), ("1.95", 0.073)] * 8
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table, between = (
+            solve_orders(
+                profile, 1.46, theta=45.0, step=4.0, beneath=mirror,
+                settings=replace(settings, wavelengths=ends, resolution=8),
+            )
+            for ends in ((522.0, 542.0), (524.0, 540.0))
+        )  # fmt: skip
+    # half way between wavelengths, by the other table's own nodes
+    x = -np.sin(np.radians(45.0))
+    for wavelength in np.linspace(524.0, 540.0, 5):
+        expected, got = (
+            np.stack([each.polarised_efficiency(x, 0.0, wavelength, m) for m in (0, 1)])
+            for each in (between, table)
+        )
+        # single precision, and the smooth curve through steps of 4 nm
+        np.testing.assert_allclose(got, expected, atol=1e-3)

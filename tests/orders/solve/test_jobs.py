@@ -1,0 +1,64 @@
+"""Results of solvers in a folder: a damaged or foreign file is solved again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.orders.solve.jobs import Jobs, Solved, remove_results
+from mitsuba_diffraction.tables.store import Record, write_record
+
+ITEMS = (1, 2)
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """`solved()`: the results of two items, and the items that were solved for them."""
+
+    def call():
+        made = []
+
+        def task(item):
+            made.append(item)
+            return Solved(np.full(3, item, np.complex64), 1.5)
+
+        found = Jobs(tmp_path / "kept").results(task, ITEMS, lambda item: item, "items")
+        return {item: result.values.tolist() for item, result in found.items()}, made
+
+    return call
+
+
+def test_results_are_read_again(solved):
+    first, made = solved()
+    assert made == [*ITEMS]
+    assert solved() == (first, [])
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda file: file.write_bytes(b""),
+        lambda file: file.write_bytes(file.read_bytes()[:-1]),
+        lambda file: file.write_bytes(b"PK\x03\x04" + bytes(500)),
+        lambda file: write_record(file, "another", Record({"seconds": 1}, [np.zeros(3)])),
+        lambda file: [file.write_bytes(other.read_bytes()) for other in file.parent.iterdir()],
+    ],
+    ids=["empty", "cut", "no result", "another's title", "another item"],
+)  # fmt: skip
+def test_a_damaged_result_is_solved_again(solved, tmp_path, damage):
+    first, _ = solved()
+    damage(next((tmp_path / "kept").iterdir()))
+    again, made = solved()
+    assert again == first
+    assert len(made) == 1
+
+
+def test_only_results_are_removed_from_their_folder(solved, tmp_path):
+    solved()
+    (tmp_path / "kept" / "profile.txt").write_text("0 0\n")
+    remove_results(tmp_path / "kept")
+    assert [file.name for file in (tmp_path / "kept").iterdir()] == ["profile.txt"]
+    solved()
+    (tmp_path / "kept" / "profile.txt").unlink()
+    remove_results(tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()

@@ -1,0 +1,90 @@
+"""Lists of efficiencies: round trip, s and p, and refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders.listing import list_orders
+from mitsuba_diffraction.reference.boundary import small_slope
+from tests.support.orders import shallow_grating, thin_grating
+
+INDEX = 1.2 + 6.0j
+
+
+@pytest.mark.parametrize("thin", [False, True])
+def test_a_list_is_imported_as_the_table_that_it_came_from(thin, tmp_path):
+    table = thin_grating(0.8, counts=(8, 8, 4), wavelengths=(500.0, 640.0), thin=thin)
+    listing = list_orders(
+        table, np.linspace(500, 640, 8), np.linspace(0, 85, 18), np.arange(0, 181, 15)
+    )
+    listing.save(tmp_path / "list.csv")
+    back = md.read_orders(tmp_path / "list.csv", 0.8)
+    rng = np.random.default_rng(2)
+    x, y, lam = rng.uniform(-0.6, 0.6, 60), rng.uniform(-0.6, 0.6, 60), rng.uniform(500, 640, 60)
+    for m in (-1, 0, 1):
+        for through in (False, True)[: table.sides]:
+            there, here = (t.efficiency(x, y, lam, m, transmitted=through) for t in (back, table))
+            # linear interpolation over 5°, 15° and 20 nm, as the import's header says
+            assert np.abs(there - here).mean() < max(0.01, back.header["error_mean"])
+
+
+def test_lists_have_true_s_and_p_of_conical_light(tmp_path):
+    table = shallow_grating(INDEX, counts=(32, 24, 6))
+    theta, phi = np.radians(40.0), np.radians(60.0)
+    wi = np.array([[np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]])
+    truth = (np.abs(small_slope(wi, wi * [-1, -1, 1], INDEX)[0]) ** 2).sum(axis=0)
+    row = list_orders(table, 550.0, 40.0, 60.0, polarised=True).rows
+    mirror = row[row[:, 3] == 0, 4:][0]
+    # nodes of the table
+    np.testing.assert_allclose(mirror, truth, atol=1e-3)
+    along = table.groove_efficiency(-wi[:, 0], -wi[:, 1], 550.0, 0)[0]
+    assert np.abs(along - truth).max() > 0.003
+
+
+def test_s_and_p_need_matrices_but_in_planes_of_symmetry():
+    table = thin_grating(0.8, counts=(2, 2, 1), wavelengths=(500.0, 640.0))
+    for phi in (0.0, 90.0):
+        assert len(list_orders(table, 550.0, 30.0, phi, polarised=True).rows)
+    with pytest.raises(DiffractionError, match="polarised=True"):
+        list_orders(table, 550.0, 30.0, 45.0, polarised=True)
+
+
+def test_imported_tables_keep_s_and_p(tmp_path):
+    path = tmp_path / "list.csv"
+    lines = [f"550,{t},{p},0,0.8,0.6\n" for t in (0, 20, 40) for p in range(0, 181, 15)]
+    path.write_text("wavelength_nm,theta_deg,phi_deg,order,R_s,R_p\n" + "".join(lines))
+    table = md.read_orders(path, 0.25)
+    table.save(tmp_path / "table.nc")
+    loaded = md.OrderTable.load(tmp_path / "table.nc")
+    listed = -np.sin(np.radians(20)) * np.array([np.cos(np.radians(60)), np.sin(np.radians(60))])
+    np.testing.assert_allclose(loaded.polarised_efficiency(*listed, 550, 0), [0.8, 0.6], atol=1e-6)
+    # axes turn by 33° between listed azimuths: linear interpolation loses 1 − cos 16.5° of 0.1
+    between = loaded.polarised_efficiency(0.3, 0.4, 550, 0)
+    np.testing.assert_allclose(between, [0.8, 0.6], atol=4.2e-3)
+    with pytest.raises(DiffractionError, match="imported"):
+        loaded.groove_efficiency(0.3, 0.4, 550, 0)
+
+
+def test_light_beyond_the_table_gets_none_and_a_warning():
+    table = thin_grating(0.8, counts=(2, 2, 1), wavelengths=(500.0, 640.0))
+    assert table.efficiency(0.1, 0.0, 490.0, 0) == table.efficiency(0.1, 0.0, 500.0, 0)
+    with pytest.warns(md.DiffractionWarning, match="420 nm is outside the table of orders"):
+        assert table.efficiency(0.1, 0.0, 420.0, 0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("light", "message"),
+    [
+        ((450.0, 0.0, 0.0), "the table has 500 to 640 nm"),
+        ((550.0, 95.0, 0.0), "theta 95 must be"),
+        ((550.0, 0.0, np.nan), "phi nan must be"),
+        ((np.linspace(500, 640, 3000), np.arange(90), np.arange(90)), "lines"),
+    ],
+)
+def test_light_that_has_no_efficiencies_is_refused(light, message):
+    table = thin_grating(0.8, counts=(2, 2, 1), wavelengths=(500.0, 640.0))
+    with pytest.raises(DiffractionError, match=message):
+        list_orders(table, *light)

@@ -1,0 +1,156 @@
+"""Tables of solved orders: their error, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve import orders
+from mitsuba_diffraction.orders.solve.accuracy import measured_error
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
+from mitsuba_diffraction.orders.solve.nodes import count_for
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import (
+    Profile,
+    lamellar,
+    polygon,
+    read_profile,
+    sinusoidal,
+)
+from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.orders.solve.stations import Grating
+
+pytest.importorskip("gratinglab")
+
+# two bands and a perfect conductor, which has no third variable: a second's work
+PROFILE = sinusoidal(0.5, 0.05)
+LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
+SPIKE = np.array([[0, 0.4, 0.4, 0.4, 0.9], [0, 0, 0.1, 0, 0]])
+SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05, polarised=True)
+
+
+@pytest.fixture(scope="module")
+def table():
+    return solve_orders(PROFILE, "none", settings=SETTINGS)
+
+
+def test_the_measured_error_is_within_the_tolerance(table):
+    assert table.header["error_mean"] <= SETTINGS.tolerance
+    assert table.header["error_polarised"] <= SETTINGS.tolerance
+    assert table.header["reciprocity_error"] <= SETTINGS.tolerance
+
+
+def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
+    for x, y, lam in ((0.1, 0.2, 540.0), (-0.6, 0.3, 600.0), (0.0, 0.8, 630.0)):
+        total = sum(float(table.efficiency(x, y, lam, m)) for m in range(-3, 4))
+        # interpolation, beside the tolerance of 5 % of the orders
+        assert total == pytest.approx(1, abs=0.02)
+
+
+def test_few_nodes_are_chosen_for_smooth_efficiencies():
+    at = cells.nodes(24)[:, None, None, None]
+    smooth, rough = 1 + 0.1 * at**2, 1 + 0.1 / (1 + 900 * (at - 0.4) ** 2)
+    assert count_for(smooth, 2, 1e-6) == 3
+    assert count_for(rough, 2, 1e-3) > 12
+
+
+def test_the_error_compares_with_new_solutions(table):
+    perfect = material_of("none", SETTINGS.wavelengths)
+    problem = problem_of(Grating(PROFILE, perfect, 1.0, SETTINGS.wavelengths), "integral", 64)
+    # within the tolerance of the nodes and that of the solver
+    assert measured_error(table, problem, Jobs()).mean < 1.5 * SETTINGS.tolerance
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: lamellar(1.0, -1.0), "depth"),
+        (lambda: lamellar(1.0, 0.1, 1.5), "duty"),
+        (lambda: Profile(np.array([0, 2.0]), np.zeros(2), 1.0), "one period"),
+        (lambda: Profile(np.array([0, np.nan]), np.zeros(2), 1.0), "finite"),
+        (lambda: Profile(LOOP[0], LOOP[1], 1.0), "cross"),
+        (lambda: Profile(SPIKE[0], SPIKE[1], 1.0), "turns back"),
+        (lambda: md.solve_orders(PROFILE, "Unobtainium"), "is unknown"),
+        (lambda: md.solve_orders(PROFILE, "-1"), "index"),
+        (lambda: md.solve_orders(PROFILE, "Al", settings=Settings((50.0, 700.0))), "nm"),
+        (lambda: Settings(tolerance=2.0), "tolerance"),
+        (lambda: md.solve_orders(PROFILE, settings=Settings(method="guess")), "unknown"),
+        (lambda: md.solve_orders(lamellar(1.0, 90.0)), "lengths are in µm"),
+        (lambda: md.solve_orders(lamellar(900.0, 0.1)), "directions of light alone"),
+        (lambda: md.solve_orders("cd.toml"), "expected a profile"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_solved_is_refused_in_one_line(make, message):
+    with pytest.raises(DiffractionError, match=message) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_line_is_read_with_its_undercut(tmp_path):
+    file = tmp_path / "groove.csv"
+    file.write_text("x_um,z_um\n0,0.1\n0.5,0.1\n0.4,0\n0.9,0\n1.0,0.1\n")
+    profile = read_profile(file, 1.0)
+    # the end of the period is the beginning of the next
+    assert len(profile.x) == 4
+    assert profile.depth == pytest.approx(0.1)
+    assert (np.diff(profile.x) < 0).any()
+
+
+def test_a_ridge_that_leans_over_the_next_period_is_moved():
+    leaning = polygon([(0, 0), (0.5, 0), (0.9, 0.3), (1.2, 0.3), (0.9, 0)], 1.0)
+    np.testing.assert_allclose(leaning.x, [0, 0.4, 0.7, 0.4, 0.5])
+    np.testing.assert_allclose(leaning.z, [0, 0.3, 0.3, 0, 0])
+    with pytest.raises(DiffractionError, match="crosses itself"):
+        polygon([(0, 0), (0.5, 0.1), (0.9, 0.3), (1.45, 0.02), (0.9, 0)], 1.0)
+
+
+def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
+    monkeypatch.setattr(orders, "REFINEMENTS", 0)
+    monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
+    exact = replace(SETTINGS, tolerance=1e-3)
+    with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
+        coarse = solve_orders(PROFILE, "none", settings=exact)
+    monkeypatch.setattr(orders, "REFINEMENTS", 1)
+    with pytest.warns(md.DiffractionWarning, match="on average"):
+        finer = solve_orders(PROFILE, "none", settings=exact)
+    assert finer.header["error_mean"] < coarse.header["error_mean"]
+
+
+def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_coupled_waves():
+    aluminium = material_of("Al", SETTINGS.wavelengths)
+    for profile, method in ((PROFILE, "chandezon"), (lamellar(0.5, 0.05), "coupled")):
+        grating = Grating(profile, aluminium, 1.0, SETTINGS.wavelengths)
+        assert problem_of(grating, "auto", 0).method == method
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ("0,1\n800,1\n800,0\n", "one period is 0 to 1.6 µm"),
+        ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
+        ("x,z\n0,1\n0.3\n", "line 3"),
+        ("0,1,2\n", "line 1"),
+        ("0,nan\n1,0\n", "line 1"),
+        ("# nothing\n", "no points"),
+        ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "read_orders"),
+    ],
+)
+def test_lines_that_are_no_period_are_refused(points, message, tmp_path):
+    file = tmp_path / "groove.csv"
+    file.write_text(points)
+    with pytest.raises(DiffractionError, match=message) as caught:
+        read_profile(file, 1.6)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_line_whose_ends_differ_gets_a_wall_and_a_warning(tmp_path):
+    file = tmp_path / "groove.csv"
+    file.write_text("0,0\n0.5,0.1\n1,0.02\n")
+    with pytest.warns(md.DiffractionWarning, match="vertical wall"):
+        assert read_profile(file, 1.0).depth == pytest.approx(0.1)

@@ -1,0 +1,131 @@
+"""Tables that miss their tolerance; solutions in other processes; the command."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of, processes, solve_place
+from mitsuba_diffraction.orders.solve.nodes import Place
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
+from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.orders.solve.stations import Grating
+from tests.support import ROOT
+from tests.support.orders import digest_in_file
+
+pytestmark = pytest.mark.thorough
+pytest.importorskip("gratinglab")
+
+PROFILE, RANGE = sinusoidal(0.5, 0.05), (520.0, 640.0)
+SETTINGS = Settings(RANGE, tolerance=0.1)
+
+
+def test_an_interrupted_table_goes_on_and_is_the_same(tmp_path):
+    class Enough(Exception):
+        pass
+
+    def interrupt(done, total, text):
+        if text == "solving orders" and done == total // 2:
+            raise Enough
+
+    with pytest.raises(Enough):
+        solve_orders(PROFILE, "none", settings=SETTINGS, jobs=Jobs(tmp_path, None, interrupt))
+    table = solve_orders(PROFILE, "none", settings=SETTINGS)
+    first: dict[str, int] = {}
+    again = solve_orders(
+        PROFILE, "none", settings=SETTINGS,
+        jobs=Jobs(tmp_path, None, lambda done, total, text: first.setdefault(text, done)),
+    )  # fmt: skip
+    assert first["solving orders"] > 0
+    assert digest_in_file(again, tmp_path) == digest_in_file(table, tmp_path)
+
+
+def test_a_tolerance_that_is_missed_is_refused():
+    coarse = Settings(wavelengths=RANGE, tolerance=1e-4, resolution=48)
+    with pytest.raises(DiffractionError, match="of the light in its orders on average"):
+        solve_orders(PROFILE, "none", settings=coarse)
+
+
+def test_a_solution_is_the_same_in_this_process_and_another():
+    problem = problem_of(Grating(PROFILE, material_of("none", RANGE), 1.0, RANGE), "integral", 48)
+    place = Place(1, 0, 0.3, 0.4, (0.5,))
+    with processes(1) as pool:
+        elsewhere = Jobs(executor=pool).amplitudes(problem, [place], "")[place]
+    # sums of BLAS in another order, rounded to single precision
+    assert np.allclose(elsewhere, solve_place(problem, place).values, atol=1e-7)
+
+
+RECIPE = """method = "solved"
+profile = "sinusoidal"
+material = "none"
+wavelengths = [520, 640]
+tolerance = 0.1
+output = "groove.nc"
+[arguments]
+period = 0.5
+depth = 0.05
+"""
+
+
+def test_the_command_says_what_it_will_do_writes_the_table_and_clears_up(tmp_path, capsys):
+    recipe = tmp_path / "groove.toml"
+    recipe.write_text(RECIPE)
+    assert main(["solve", str(recipe), "--json", str(tmp_path / "groove.json")]) == 0
+    captured = capsys.readouterr()
+    assert "solutions at" in captured.err
+    assert "about" in captured.err
+    assert "reciprocity" in captured.out
+    assert OrderTable.load(tmp_path / "groove.nc").period == 0.5
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "groove.json", "groove.nc", "groove.toml",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["lamellar", "--depth", "0.1"], "period"),
+        (["lamellar", "--period", "1"], "depth"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "--duty", "0.5"], "duty"),
+        (["missing.csv", "--period", "1"], "missing.csv"),
+        (["heap", "--period", "1"], "expected one of"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "--material", "Unob"], "Unob"),
+        (["sinusoidal", "--period", "1", "--depth", "0.1", "-o", "none/x.nc"], "folder"),
+    ],
+)
+def test_what_is_missing_is_named_in_one_line(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["solve", *arguments]) == 1
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert message in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words", [["precompute"], ["info"], ["brdf-map"], ["evaluate"], ["spectrum"]], ids=" ".join
+)
+def test_other_commands_name_the_one_for_recipes_of_solved_orders(words, tmp_path, capsys):
+    recipe = tmp_path / "groove.toml"
+    recipe.write_text(RECIPE)
+    assert main([*words, str(recipe)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"run 'mitsuba-diffraction solve {recipe}'" in line
+
+
+def test_the_shipped_tables_are_those_of_their_recipes():
+    for file in sorted((ROOT / "precompute" / "orders").glob("*.nc")):
+        table, recipe = OrderTable.load(file), SolvedRecipe.load(file.with_suffix(".toml"))
+        assert file.stat().st_size < 2e6
+        assert table.period == recipe.profile.period
+        assert table.header["profile"] == recipe.profile.name
+        assert table.wavelengths == recipe.settings.wavelengths
+        assert table.superstrate == recipe.superstrate
+        assert table.header["error_mean"] <= recipe.settings.tolerance
+        assert table.header["reciprocity_error"] < 0.01

@@ -1,0 +1,128 @@
+"""Thin sheets: both solvers on both sides, Fresnel's sheet, energy, reciprocity, and tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.orders.solve.sheet import sheet_efficiencies
+from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
+from mitsuba_diffraction.reference.fresnel import reflectance
+from mitsuba_diffraction.reference.through import flat_transmittances
+
+pytest.importorskip("gratinglab")
+
+RANGE, INDEX = (400.0, 700.0), 1.58
+WALLS = lamellar(0.8, 0.1, 0.3)
+
+
+def station(profile, tau=0.3, w=0.2):
+    """Three channels outside, five within, in a conical mount."""
+    surface = Grating(profile, material_of(INDEX, RANGE), 1.0, RANGE, thin=True)
+    return surface.station(2, 0, tau, 0.6, [w])
+
+
+def solved(profile, tau=0.3):
+    light = station(profile, tau)
+    return sheet_efficiencies(CoupledWaves(profile, 8).amplitudes(light), light)[0]
+
+
+@pytest.mark.parametrize("profile", [WALLS, sinusoidal(0.8, 0.06)], ids=lambda p: p.name[:7])
+def test_two_solvers_agree_on_light_from_above_and_from_within(profile):
+    light = station(profile)
+    assert len(light.inside) == 5
+    integral = IntegralSolver(profile, 100).amplitudes(light)
+    coupled = CoupledWaves(profile, 14).amplitudes(light)
+    # phases too: 100 points are within 1e-3 of 200; 14 slices of a sinusoid within 4e-3 of 40
+    assert np.abs(integral - coupled).max() < 6e-3
+    sums = (np.abs(coupled) ** 2).sum(axis=(3, 4))
+    # a clear material keeps all light; coupled waves do so to rounding
+    assert np.allclose(sums, 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("from_within", [False, True])
+def test_shallow_waves_transmit_as_first_order_perturbation_says(from_within):
+    profile = sinusoidal(0.8, 2e-3)
+    light, n = station(profile), 3
+    powers = np.abs(IntegralSolver(profile, 100).amplitudes(light)[0]) ** 2
+    y, lam = light.along[0], 1e3 * light.wavelengths[0]
+    x, inside = (
+        np.sqrt(1.0 - y * y) * light.sines_of(numbers) for numbers in (np.arange(n), light.inside)
+    )
+    heights = 1e-3 * np.sin(2.0 * np.pi * (np.arange(32) + 0.5) / 32)
+    field = md.HeightField(np.tile(heights, (4, 1)), 0.025, periodic=True)
+    width = 2e3 * np.pi / lam * sigma_of(30.0)
+    for j, q in ((0, 2), (1, 1), (1, 3), (2, 2)):  # one order apart
+        above = np.array([-x[j], -y, np.sqrt(1.0 - x[j] ** 2 - y**2)])
+        below = np.array([inside[q], y, -np.sqrt(INDEX**2 - inside[q] ** 2 - y**2)]) / INDEX
+        share = powers[n + q, :, j] if from_within else powers[j, :, n + q]
+        # the lobe's power, from the value at its centre
+        value = md.reference.btdf(
+            field, above, below, lam, eta=INDEX, coherence_width=30.0, model="small_slope"
+        )
+        expected = float(value[0]) * np.pi / width**2
+        # 100 points are within 0.2 % of 200; the second order of heights adds 1e-4
+        assert 0.5 * share.sum() == pytest.approx(expected, rel=5e-3)
+
+
+def test_a_flat_sheet_is_fresnel_s():
+    light, powers = station(lamellar(0.8, 1e-7)), solved(lamellar(0.8, 1e-7))
+    c = np.sqrt(1.0 - light.along[0] ** 2)
+    cosines = c * np.sqrt(1.0 - light.sines**2)
+    through = flat_transmittances(cosines, INDEX, True, 0).mean(axis=0)
+    back = 1.0 - through
+    assert np.all(back > reflectance(cosines, INDEX))
+    found = 0.5 * powers.sum(axis=(1, 3))
+    expected = np.block([[np.diag(back), np.diag(through)], [np.diag(through), np.diag(back)]])
+    assert np.allclose(found, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("profile", [WALLS, blazed(0.8, 0.2)], ids=lambda p: p.name[:7])
+def test_a_sheet_keeps_all_light_and_sends_it_back_as_it_came(profile):
+    there, back = solved(profile), solved(profile, 0.7)
+    assert np.allclose(there.sum(axis=(2, 3)), 1.0, atol=1e-6)
+    assert np.abs(there - reversed_light(back[None], 2)[0]).max() < 1e-6
+    # light of other orders goes through
+    assert there[1, :, [3, 5]].sum() > 0.02
+
+
+def test_a_sheet_is_solved_into_a_table():
+    settings = Settings((560.0, 640.0), tolerance=0.1, method="coupled", resolution=4)
+    table = solve_orders(lamellar(0.5, 0.05), INDEX, thin=True, settings=settings)
+    assert table.thin
+    assert table.header["energy_error"] < 1e-5
+    assert table.reciprocity < 1e-4
+    x, y, lam = np.array([0.2, -0.5]), 0.3, 600.0
+    for from_below in (False, True):
+        sums = [
+            table.efficiency(x, y, lam, m, from_below=from_below, transmitted=transmitted)
+            for m in range(-2, 3)
+            for transmitted in (False, True)
+        ]
+        # interpolation, beside the tolerance of 10 % of the orders
+        assert np.sum(sums, axis=0) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"material": "Al"}, "clear"),
+        ({"material": "none"}, "clear"),
+        ({"material": "1.5+0.1i"}, "clear"),
+        ({"material": "1.005"}, "1.01"),
+        ({"material": "1.5", "superstrate": 1.3}, "both sides"),
+    ],
+)
+def test_what_is_no_clear_sheet_is_refused_in_one_line(arguments, message):
+    with pytest.raises(DiffractionError, match=message) as caught:
+        md.solve_orders(WALLS, thin=True, **arguments)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,75 @@
+"""Tables of blocks: light on both sides of a face, files, and what they refuse."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.coat import face_transmittance
+from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders.listing import list_orders
+from tests.support.blocks import BLOCK, INDEX
+from tests.support.orders import thin_grating
+
+
+def orders(x, y, from_below, transmitted):
+    m = np.arange(-4, 5)[:, None]
+    return BLOCK.efficiency(x, y, 550.0, m, from_below=from_below, transmitted=transmitted)
+
+
+def test_order_0_vanishes_at_the_critical_angle_and_other_orders_go_on():
+    x, y = np.array([0.3, 0.999, 1.001, 1.4]), 0.0
+    zeroth = orders(x, y, True, True)[4]
+    cosine = np.sqrt(np.maximum(1.0 - x * x, 0.0))
+    # 8 % of the light that a flat face transmits is in other orders
+    assert zeroth == pytest.approx(0.92 * face_transmittance(cosine, INDEX), rel=2e-3)
+    assert np.all(zeroth[2:] == 0.0)
+    assert np.all(orders(x, y, True, True).sum(axis=0)[2:] > 0.0)
+    for from_below in (False, True):
+        inside = x if from_below else x[:2]
+        light = sum(orders(inside, y, from_below, side).sum(axis=0) for side in (False, True))
+        assert light == pytest.approx(1.0, abs=1e-9)
+
+
+def test_light_goes_back_as_it_came():
+    x, step = 0.2, 550.0 / (1e3 * BLOCK.period)
+    m = 1
+    for from_below, transmitted in ((False, True), (True, False), (False, False)):
+        there = BLOCK.efficiency(x, 0.1, 550.0, m, from_below=from_below, transmitted=transmitted)
+        back = BLOCK.efficiency(
+            -x - m * step, -0.1, 550.0, m,
+            from_below=from_below != transmitted, transmitted=transmitted,
+        )  # fmt: skip
+        assert there == pytest.approx(back, rel=1e-6)
+        assert (there > 0.0) == (from_below or transmitted)
+
+
+def test_files_keep_blocks(tmp_path):
+    path = tmp_path / "block.nc"
+    BLOCK.save(path)
+    loaded = OrderTable.load(path)
+    assert loaded.block == INDEX
+    assert loaded.digest() != dataclasses.replace(loaded, block=1.5001).digest()
+
+
+def test_orders_of_both_faces_are_listed():
+    above = list_orders(BLOCK, 550.0, [0.0, 30.0]).rows
+    within = list_orders(BLOCK, 550.0, [0.0, 60.0], from_below=True).rows
+    for rows in (above, within):
+        for theta in np.unique(rows[:, 1]):  # a block loses no light
+            assert rows[rows[:, 1] == theta, 4:].sum() / 2.0 == pytest.approx(1.0, abs=1e-6)
+    assert (within[within[:, 1] == 60.0, 6:] > 0.0).sum() < (within[:, 4:6] > 0.0).sum()
+
+
+def test_blocks_have_unpolarised_light_alone_and_no_other_medium():
+    for call in (BLOCK.polarised_efficiency, BLOCK.groove_efficiency):
+        with pytest.raises(DiffractionError, match="unpolarised"):
+            call(0.1, 0.0, 550.0, 0)
+    for change in ({"superstrate": 1.2}, {"thin": True}, {"block": 1.001}, {"block": 7.0}):
+        with pytest.raises(DiffractionError, match="block="):
+            dataclasses.replace(BLOCK, **change)
+    with pytest.raises(DiffractionError, match="thin"):
+        dataclasses.replace(thin_grating(0.5, superstrate=1.5), thin=True)

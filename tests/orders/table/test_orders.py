@@ -1,0 +1,165 @@
+"""Tables of orders: look-up between nodes, energy, reciprocity, and refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders import Band, Cells, OrderTable, cells
+from mitsuba_diffraction.orders.cells import Counts
+from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
+from mitsuba_diffraction.reference.fresnel import reflectance
+from tests.support.orders import thin_grating
+
+GRATING = thin_grating()
+
+
+def light(n=200, seed=1):
+    """Directions over the hemisphere, and wavelengths."""
+    rng = np.random.default_rng(seed)
+    radius, turn = np.sqrt(rng.uniform(0.0, 0.99, n)), rng.uniform(0.0, 2.0 * np.pi, n)
+    return radius * np.cos(turn), radius * np.sin(turn), rng.uniform(380.0, 780.0, n)
+
+
+def orders_of(table, x, y, wavelength):
+    """Efficiencies of all orders, (n, orders), and the orders."""
+    steps = np.arange(-table.last_band - 1, table.last_band + 2)
+    columns = [table.efficiency(x, y, wavelength, m) for m in steps]
+    return np.stack(columns, axis=1), steps
+
+
+def test_values_at_nodes_are_the_tables():
+    k = 3
+    tau, rho, w = GRATING.response.nodes(k)
+    big_k = k + cells.sine_squared(rho[2])
+    wavelength = cells.wavelength_of(big_k, w[1], GRATING.wavelengths, GRATING.optical_period)
+    at = cells.from_cell(k, cells.A, 1, tau[4], rho[2], wavelength, GRATING.optical_period)
+    for q in range(k + 1):
+        expected = GRATING.bands[k].a[4, 2, 1, 1, q, 0]
+        found = GRATING.efficiency(at.x, at.y, at.wavelength, 1 - q)
+        # even cells follow the polynomials through the nodes: curvature over 32 x 24 x 6 cells
+        assert found == pytest.approx(expected, abs=2e-3)
+
+
+def test_orders_sum_to_no_more_than_one_and_are_the_visible_ones():
+    x, y, wavelength = light()
+    values, steps = orders_of(GRATING, x, y, wavelength)
+    assert values.min() >= 0.0
+    assert values.sum(axis=1).max() <= 1.0 + 1e-12
+    outgoing = x[:, None] + steps * wavelength[:, None] / (1e3 * GRATING.period)
+    assert np.all(values[outgoing**2 + y[:, None] ** 2 > 1.0] == 0.0)
+    assert np.array_equal(values, orders_of(GRATING, x, -y, wavelength)[0])
+
+
+def test_reversed_light_has_the_same_efficiency():
+    x, y, wavelength = light()
+    values, steps = orders_of(GRATING, x, y, wavelength)
+    outgoing = x[:, None] + steps * wavelength[:, None] / (1e3 * GRATING.period)
+    back = GRATING.efficiency(-outgoing, -y[:, None], wavelength[:, None], steps)
+    assert GRATING.reciprocity < 1e-6  # single precision
+    # clamping of sums is not reciprocal, but this grating absorbs
+    assert back[values > 0.0] == pytest.approx(values[values > 0.0], abs=1e-4)
+
+
+def test_a_mirror_reflects_order_0_alone():
+    mirror = OrderTable.mirror(0.9, 0.8)
+    values, steps = orders_of(mirror, *light())
+    assert values == pytest.approx(np.where(steps == 0, 0.8, 0.0)[None].repeat(200, 0))
+
+
+def test_even_grids_follow_the_polynomials():
+    counts = Counts(16, 8, 4)
+    grid = rows(GRATING, Kind(4, cells.B, 4), counts).within
+    assert grid.shape == (17, 9, 5, 4, 4)
+    big_k = 4 + cells.sine_squared(0.5)
+    wavelength = wavelength_of(GRATING, big_k, 0.75)
+    at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
+    expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
+    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=2e-3)  # curvature over cells
+
+
+def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
+    mirror = OrderTable.mirror(1.6, 0.8, superstrate=1.5)
+    grid = rows(mirror, Kind(6, cells.A, 7), Counts(4, 4, 4))
+    big_k = 6 + cells.sine_squared(0.5)
+    at = cells.from_cell(
+        6, cells.A, 3, 0.5, 0.5, wavelength_of(mirror, big_k, 0.75), mirror.optical_period
+    )
+    face = reflectance(np.sqrt(1.0 - 1.5**2 * (at.x**2 + at.y**2)), 1.5)
+    # geometric series of R ρ
+    expected = 0.8 / (1.0 - 0.8 * face)
+    assert grid.within[2, 2, 3, 3, 3] == pytest.approx(expected, rel=1e-3)
+    assert grid.through[2, 2, 3, 3, 3] == pytest.approx(expected * (1.0 - face), rel=1e-3)
+
+
+def test_wavelengths_outside_hold_the_end_values():
+    near = GRATING.efficiency(0.1, 0.7, [780.0, 779.9], 0)
+    assert near[0] == pytest.approx(near[1], abs=1e-3)
+    assert np.isfinite(GRATING.efficiency(0.3, 0.2, [300.0, 900.0], [0, 1])).all()
+
+
+def test_files_keep_tables(tmp_path):
+    path = tmp_path / "grating.nc"
+    GRATING.save(path)
+    loaded = OrderTable.load(path)
+    assert (loaded.period, loaded.wavelengths) == (GRATING.period, GRATING.wavelengths)
+    assert dict(loaded.header) == dict(GRATING.header)
+    assert loaded.digest() == GRATING.digest()
+    again = tmp_path / "again.nc"
+    loaded.save(again)
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_damaged_files_are_refused_in_one_line(tmp_path):
+    path = tmp_path / "grating.nc"
+    thin_grating(period=0.5, counts=(2, 2, 1)).save(path)
+    content = path.read_bytes()
+    rng = np.random.default_rng(3)
+    for trial in range(40):
+        damaged = bytearray(content)
+        if trial % 2:
+            damaged = damaged[: rng.integers(0, len(content))]
+        else:
+            damaged[rng.integers(0, len(content))] ^= 1 << rng.integers(0, 8)
+        path.write_bytes(bytes(damaged))
+        try:
+            OrderTable.load(path)
+        except DiffractionError as error:
+            assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda a: a * 1.5,
+        lambda a: a - 0.1,
+        lambda a: np.where(a > 0.5, np.nan, a).astype(np.float32),
+        lambda a: a[:, :, :, :-1],
+        lambda a: a.astype(np.float64),
+    ],
+)
+def test_what_are_no_efficiencies_is_refused(change):
+    mirror = OrderTable.mirror(0.5)
+    bands = (*mirror.bands[:-1], Band(2, change(mirror.bands[2].a), mirror.bands[2].b))
+    with pytest.raises(DiffractionError, match="band 2"):
+        dataclasses.replace(mirror, response=Cells(bands))
+
+
+def test_missing_bands_and_absurd_outlines_are_refused():
+    mirror = OrderTable.mirror(0.5)
+    with pytest.raises(DiffractionError, match="expected 3"):
+        dataclasses.replace(mirror, response=Cells(mirror.bands[:-1]))
+    for arguments in ({"period": np.nan}, {"period": 500.0}, {"wavelengths": (700.0, 400.0)}):
+        with pytest.raises(DiffractionError):
+            OrderTable.mirror(**{"period": 0.5, **arguments})
+
+
+def test_a_header_that_is_no_object_is_refused(tmp_path, monkeypatch):
+    file = tmp_path / "list.nc"
+    monkeypatch.setattr("json.dumps", lambda *_, **__: "[1, 2]")  # with a checksum that is right
+    GRATING.save(file)
+    with pytest.raises(DiffractionError, match="header does not fit"):
+        OrderTable.load(file)
