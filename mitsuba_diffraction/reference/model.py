@@ -23,10 +23,11 @@ size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
 window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
 orders alone. C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p at θm,
-whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's r_s, r_p at the half vector; U turns between the
-facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along d. Rows and columns of J are s and p of the
-outgoing and the incoming light. B is first-order small slope (Rice 1951; Voronovich 1985). Indices
-and results are arrays (n,) as in `Light`. coat.py and transmission.py wrap this.
+whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's r_s,
+r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
+d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order small
+slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py and
+transmission.py wrap this.
 """
 
 from __future__ import annotations
