@@ -6,13 +6,9 @@ public code and in all code, and how many there are.
 
 from __future__ import annotations
 
-from collections import Counter
-from pathlib import Path
-
 import pytest
 
-from docs.make.words import code_texts, phrases
-from tests.support.docstrings import PACKAGE, Docstring, docstrings
+from tests.support.docstrings import Docstring, docstrings
 
 # Part of all docstrings, private code included, that may begin vaguely.
 ALLOWED = 0.02
@@ -39,10 +35,3 @@ def test_no_docstring_of_public_code_begins_vaguely(texts):
 def test_few_docstrings_of_all_code_begin_vaguely(texts):
     vague = [text for text in texts if text.vague]
     assert len(vague) <= ALLOWED * len(texts), f"{len(vague)} of {len(texts)}:\n{listed(vague)}"
-
-
-def test_few_texts_avoid_the_noun():
-    files = list(Path(PACKAGE).rglob("*.py"))
-    found = sum((phrases(t) for f in files for t in code_texts(f.read_text("utf-8"))), Counter())
-    assert len(files) > 200
-    assert found.total() <= MOST_PHRASES, found

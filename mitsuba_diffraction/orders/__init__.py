@@ -2,22 +2,31 @@
 
 Contents
 --------
-OrderTable    efficiencies, or Mueller matrices, of all orders, over cells or listed light
-read_orders   a table from efficiencies of another program, or of a bench
-list_orders   a table's efficiencies as the lines of a CSV
-cells, rows   coordinates in which efficiencies are smooth; even grids, under a coat
-lookup        look-up in NumPy and in kernels, of cells, blocks and listed light
-bsdf          the BSDF in Dr.Jit
-solve         solvers: from a profile to a table
+OrderTable     efficiencies, or Mueller matrices, of all orders (in `table`)
+efficiency     its answers in NumPy
+file           tables as NetCDF files
+cells          coordinates in which efficiencies are smooth
+rows           even grids of a table, under a coat, for the renderer and shaders
+blocks         light on both sides of a block's face, whose channels differ in number
+polarised      Mueller matrices of orders, and their axes
+daylight       the sum of an order's lobe over daylight, for RGB variants
+grid           records of a table that its look-up interpolates
+lookup         look-up of cells and blocks, in NumPy and in kernels
+listed_lookup  the same of listed light
+listed         `read_orders`: a table of listed light, such as another program's efficiencies
+lists          files of efficiencies, CSV and NetCDF, and their conventions
+listing        `list_orders`: a table's efficiencies as such a file
+bsdf           the BSDF `diffraction_orders` in Dr.Jit
+solve          solvers: from a profile to a table
 """
 
 from __future__ import annotations
 
 from .efficiency import efficiency, groove_efficiency, mueller, polarised_efficiency
 from .file import load_orders, save_orders
-from .table import Band, Cells, Listed, OrderTable
+from .table import Band, CellResponse, ListedResponse, OrderTable
 
-__all__ = ["Band", "Cells", "Listed", "OrderTable"]
+__all__ = ["Band", "CellResponse", "ListedResponse", "OrderTable"]
 
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency

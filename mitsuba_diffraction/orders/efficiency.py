@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, warn
 from .cells import Array
-from .grid import Grid, grid_of
+from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import nearest_pure
-from .table import ALONG, LINEAR, UNPOLARISED, Listed, OrderTable
+from .table import ALONG, LINEAR, UNPOLARISED, ListedResponse, OrderTable
 
 #: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
 _IN_PLANE = 1e-7
@@ -243,7 +243,7 @@ def _placed(light: _Light) -> _Placed:
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[Grid], Memory], *, coated: bool, elements: bool
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
 ) -> AnyLookup:
     """Return the look-up of a table, with its grid in a memory.
 
@@ -252,7 +252,7 @@ def lookup_in(
     grid = grid_of(table, coated=coated, elements=elements)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
-    if isinstance(table.response, Listed) and not coated:
+    if isinstance(table.response, ListedResponse) and not coated:
         return ListedLookup(table, grid, held)
     if table.block:
         return BlockLookup(table, grid, held)

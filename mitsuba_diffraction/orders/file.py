@@ -4,8 +4,8 @@ Numbers are single precision: the first n elements of Mueller matrices (`element
 first is the efficiency. Over cells, the variable `kind_a_K` holds kind A of band K, with the
 dimensions `tau_K`, `rho_K`, `w_K`, `j_a_K`, `q_a_K` and `element` of `Band.a`; `kind_b_K` holds
 kind B. Of listed light, `efficiency` has the dimensions `wavelength`, `theta`, `phi`, `side`,
-`port` and `element` of `Listed.values`, with coordinate variables `wavelength` (nm, in vacuum),
-`theta` and `phi` (degrees), and `order_x` and `order_y` of the ports of a side.
+`port` and `element` of `ListedResponse.values`, with coordinate variables `wavelength` (nm, in
+vacuum), `theta` and `phi` (degrees), and `order_x` and `order_y` of the ports of a side.
 
 Global attributes hold the rest: `period` (µm), `period_y` (of a crossed grating; else left out),
 `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
@@ -34,7 +34,7 @@ from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES
 from ..tables.fields import mapping
-from .table import Band, Cells, Listed, OrderTable
+from .table import Band, CellResponse, ListedResponse, OrderTable
 
 #: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
 #: and crossed gratings, which have other lights now.
@@ -77,7 +77,7 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 
 def _add_response(file: Any, table: OrderTable) -> None:
     response = table.response
-    if isinstance(response, Listed):
+    if isinstance(response, ListedResponse):
         if response.in_plane:
             file.in_plane = np.int32(1)
         axes = zip(
@@ -164,12 +164,12 @@ def _table(file: Any) -> OrderTable:
     if _LISTED in file.variables:
         axes = [np.array(file.variables[name][:], float) for name in ("wavelength", "theta", "phi")]
         orders = [file.variables[name][:].astype(np.int64) for name in ("order_x", "order_y")]
-        response: Cells | Listed = Listed(
+        response: CellResponse | ListedResponse = ListedResponse(
             (axes[0], axes[1], axes[2]), np.column_stack(orders), _floats(file, _LISTED),
             bool(getattr(file, "in_plane", False)),
         )  # fmt: skip
     else:
-        response = Cells(_bands(file), even=bool(getattr(file, "even", False)))
+        response = CellResponse(_bands(file), even=bool(getattr(file, "even", False)))
     return _with_outline(file, response)
 
 
@@ -195,7 +195,7 @@ def _bands(file: Any) -> tuple[Band, ...]:
     )
 
 
-def _with_outline(file: Any, response: Cells | Listed) -> OrderTable:
+def _with_outline(file: Any, response: CellResponse | ListedResponse) -> OrderTable:
     """Return the table with the attributes of an open file."""
     header = mapping(json.loads(_text(file.header)), "header")
     low, high = map(float, file.wavelengths)
@@ -266,7 +266,7 @@ def _first_version(file: Any) -> OrderTable:
         if a is None:
             raise ValueError(f"it lacks kind A of band {k}")
         bands.append(Band(k, a, kind("b", k)))
-    return _with_outline(file, Cells(tuple(bands), even=block))
+    return _with_outline(file, CellResponse(tuple(bands), even=block))
 
 
 def _first_checksum(file: Any, numbers: dict[str, NDArray[Any]]) -> str:

@@ -18,13 +18,13 @@ from . import blocks
 from .cells import Array, Counts
 from .polarised import smooth_elements
 from .rows import Kind, cells_of, kinds_of, on_cells, resampled, rows
-from .table import MUELLER, Listed, OrderTable
+from .table import MUELLER, ListedResponse, OrderTable
 
 #: Largest number that a half float shall hold; 65504 is its limit.
 _LARGEST = 32768.0
 
 
-class Grid(NamedTuple):
+class OrderGrid(NamedTuple):
     """Records of a table at the corners of cells.
 
     Attributes
@@ -54,7 +54,7 @@ class Grid(NamedTuple):
         return self.corners.shape[1] // 8
 
 
-def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> Grid:
+def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
     """Return the records of a table.
 
     coated : whether the reflections between the flat face of its superstrate and the grating are
@@ -62,7 +62,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> Grid:
     elements : whether the grid has elements of Mueller matrices, where the table has any.
     """
     response = table.response
-    if isinstance(response, Listed) and not (coated and table.superstrate != 1.0):
+    if isinstance(response, ListedResponse) and not (coated and table.superstrate != 1.0):
         return _listed(response, elements)
     table = on_cells(table)
     counts = cells_of(table)
@@ -89,7 +89,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> Grid:
     return _scaled(counts, starts, corners, matrices, element_starts)
 
 
-def _listed(response: Listed, elements: bool) -> Grid:
+def _listed(response: ListedResponse, elements: bool) -> OrderGrid:
     """Return the records of listed light; single lights along an axis are a cell of equal ends."""
     values = response.values.astype(np.float64)
     for axis in range(3):
@@ -103,10 +103,12 @@ def _listed(response: Listed, elements: bool) -> Grid:
 def _scaled(
     counts: Counts, starts: NDArray[np.uint32], corners: Array, elements: Array | None,
     element_starts: NDArray[np.uint32],
-) -> Grid:  # fmt: skip
+) -> OrderGrid:  # fmt: skip
     scale = half_scale(corners)
     stored = None if elements is None else (elements / scale).astype(np.float32)
-    return Grid(counts, starts, (corners / scale).astype(np.float32), stored, element_starts, scale)
+    return OrderGrid(
+        counts, starts, (corners / scale).astype(np.float32), stored, element_starts, scale
+    )
 
 
 def half_scale(values: NDArray[Any]) -> float:
@@ -117,7 +119,7 @@ def half_scale(values: NDArray[Any]) -> float:
 def corner_records(values: Array) -> Array:
     """Return efficiencies (…, ports), then their sum, at the corners of all cells, (n, 8).
 
-    Cells lie along the first three axes; corners are 000, 001, 010 … 111.
+    CellResponse lie along the first three axes; corners are 000, 001, 010 … 111.
     """
     whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
     pairs = itertools.product((slice(-1), slice(1, None)), repeat=3)

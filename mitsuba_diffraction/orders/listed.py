@@ -22,7 +22,7 @@ from ..optics.orders import crossed_square
 from .cells import Array
 from .efficiency import MIN_ANGLE, turned_axes
 from .lists import ROUNDING, Efficiencies, read_efficiencies
-from .table import LARGEST_SUM, Listed, OrderTable, check_outline, orders_between
+from .table import LARGEST_SUM, ListedResponse, OrderTable, check_outline, orders_between
 
 #: Difference between light and reversed light above which a file hardly holds powers: grids of 5 to
 #: 45° have 0.02 to 0.14, efficiencies without the ratio of cosines 0.4 to 0.8.
@@ -44,8 +44,8 @@ class Lights(NamedTuple):
     wavelengths, theta, phi : (a,), (b,), (c,) nm in vacuum, and degrees within the medium of the
         light; θ below 0 is light from the other side, φ + 180°.
     orders : (m, 2), m_x and m_y.
-    values : (a, b, c, sides in, sides out, m, n) elements of Mueller matrices (`Listed.values`);
-        NaN where an order does not propagate.
+    values : (a, b, c, sides in, sides out, m, n) elements of Mueller matrices, as of
+        `ListedResponse.values`; NaN where an order does not propagate.
     """
 
     wavelengths: Array
@@ -72,7 +72,7 @@ def listed_table(
 
 def _response(
     lights: Lights, periods: tuple[float, float], superstrate: float, block: float | None = None
-) -> Listed:
+) -> ListedResponse:
     """Return the lights on a grid without gaps."""
     crossed = bool(np.isfinite(periods[1]))
     theta, phi = _canonical(lights, crossed)
@@ -111,7 +111,7 @@ def _response(
         light = values[:, :, :, side].reshape(*values.shape[:3], left * len(orders), n)
         stored[:, :, :, side] = _filled(light, axes, np.tile(orders, (left, 1)), optical, factor)
     in_plane = not crossed and bool(np.isin(azimuths, (0.0, 180.0)).all())
-    return Listed(axes, orders, stored, in_plane)
+    return ListedResponse(axes, orders, stored, in_plane)
 
 
 def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:
@@ -234,7 +234,7 @@ def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
 
 
 def _sheet(
-    response: Listed, periods: tuple[float, float], ends: tuple[float, float],
+    response: ListedResponse, periods: tuple[float, float], ends: tuple[float, float],
     header: dict[str, Any],
 ) -> OrderTable:  # fmt: skip
     """Return the table of a thin sheet from its light from above; see `read_orders`.
@@ -317,7 +317,7 @@ def _shown(order: NDArray[np.int64], crossed: bool) -> str:
 def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
-    assert isinstance(response, Listed)
+    assert isinstance(response, ListedResponse)
     theta, phi = _canonical(lights, table.crossed)
     bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     if table.crossed:

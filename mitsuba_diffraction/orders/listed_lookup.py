@@ -9,10 +9,10 @@ import numpy as np
 from ..optics.arithmetic import Mask, Number, of
 from ..optics.orders import crossed_square
 from .cells import Array
-from .grid import Grid
+from .grid import OrderGrid
 from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
 from .polarised import ODD
-from .table import Listed, OrderTable
+from .table import ListedResponse, OrderTable
 
 _DEGREE = 180.0 / np.pi
 #: Against division by 0 along the grooves.
@@ -51,9 +51,9 @@ class ListedLookup:
 
     coated = False
 
-    def __init__(self, table: OrderTable, grid: Grid, memory: Memory) -> None:
+    def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         response = table.response
-        assert isinstance(response, Listed)
+        assert isinstance(response, ListedResponse)
         self.memory, self._cells, self._scale = memory, grid.cells, grid.scale
         self._axes = [_Axis(nodes) for nodes in response.axes]
         self._in_plane, self._crossed = response.in_plane, table.crossed
@@ -80,7 +80,7 @@ class ListedLookup:
     def _angles(
         self, x: Number, y: Number, cos_i: Number, wavelength: Number
     ) -> tuple[Number, Number, Number]:
-        """Return the wavelength, θ and φ of ωi, degrees; of light in the plane, see `Listed`."""
+        """Return the wavelength, θ and φ of ωi, degrees (`ListedResponse.in_plane`)."""
         xp = of(x, wavelength)
         if self.index != 1.0:  # side 0 of a block lies within, tangential parts are n sinθ
             inverse = xp.where(cos_i < 0.0, 1.0, 1.0 / self.index)

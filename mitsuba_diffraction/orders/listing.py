@@ -15,7 +15,7 @@ from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import MIN_ANGLE
 from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
-from .table import Listed, OrderTable, orders_between
+from .table import ListedResponse, OrderTable, orders_between
 
 #: Lines at most: what `efficiencies` reads.
 _MOST_LINES = 2_000_000
@@ -119,7 +119,7 @@ def list_orders(
 
 def _orders(table: OrderTable, shortest: float) -> NDArray[np.int64]:
     """Return all orders (m, 2) that may propagate from some wavelength on, nm."""
-    if isinstance(table.response, Listed):
+    if isinstance(table.response, ListedResponse):
         return table.response.orders
     most = int(np.ceil(2e3 * table.optical_period / shortest))
     return orders_between((-most, 0), (most, 0))

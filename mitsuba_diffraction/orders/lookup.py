@@ -23,7 +23,7 @@ from ..optics.orders import (
     smooth_coordinate,
     wavelength_coordinate,
 )
-from .grid import Grid
+from .grid import OrderGrid
 from .polarised import ODD
 from .table import OrderTable
 
@@ -53,7 +53,7 @@ class Memory(Protocol):
 class Arrays:
     """A grid in NumPy's memory."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: OrderGrid) -> None:
         self._grid = grid
 
     def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Number]:
@@ -129,7 +129,7 @@ class Lookup:
     numbers : number of elements of Mueller matrices, 0 without them.
     """
 
-    def __init__(self, table: OrderTable, grid: Grid, memory: Memory, *, coated: bool) -> None:
+    def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory, *, coated: bool) -> None:
         self.memory, self.sides = memory, table.sides
         self._cells, self._scale, self._parts = grid.cells, grid.scale, grid.parts
         self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
@@ -291,7 +291,7 @@ class BlockLookup(Lookup):
     means above the face.
     """
 
-    def __init__(self, table: OrderTable, grid: Grid, memory: Memory) -> None:
+    def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         super().__init__(table, grid, memory, coated=False)
         assert table.block is not None
         self.index, self._more = table.block, table.block**2 - 1.0

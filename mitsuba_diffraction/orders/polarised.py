@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..reference.boundary import mueller
 from . import cells
 from .cells import Array
-from .table import Cells, OrderTable
+from .table import CellResponse, OrderTable
 
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
@@ -33,7 +33,7 @@ def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
 
 def smooth_elements(table: OrderTable, k: int, values: Array) -> Array:
     """Return elements (τ, ρ, w, j, q, 16) at nodes of a band, the odd ones over y."""
-    assert isinstance(table.response, Cells)
+    assert isinstance(table.response, CellResponse)
     _, rho, w = table.response.nodes(k)
     big_k = (k + cells.sine_squared(rho))[:, None]
     lam = cells.wavelength_of(big_k, w, table.wavelengths, table.optical_period)

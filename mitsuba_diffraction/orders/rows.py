@@ -18,7 +18,7 @@ from ..optics.coat import face_transmittance
 from ..optics.orders import least_c
 from . import cells
 from .cells import Array, Counts
-from .table import Band, Cells, Listed, OrderTable
+from .table import Band, CellResponse, ListedResponse, OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
 #: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
@@ -89,7 +89,7 @@ def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) ->
 
 def resampled(table: OrderTable, k: int, values: NDArray[Any], counts: Counts) -> Array:
     """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
-    assert isinstance(table.response, Cells)
+    assert isinstance(table.response, CellResponse)
     matrix = cells.linear if table.response.even else cells.interpolation
     known, grid = table.response.bands[k].counts, _grid(table, k, counts)
     along_tau, along_rho = matrix(known.tau, grid.tau), matrix(known.rho, grid.rho)
@@ -151,7 +151,7 @@ def cells_of(table: OrderTable) -> Counts:
 def constant(table: OrderTable) -> bool:
     """Whether a table has a single node in each band."""
     response = table.response
-    return isinstance(response, Cells) and all(b.counts == (1, 1, 1) for b in response.bands)
+    return isinstance(response, CellResponse) and all(b.counts == (1, 1, 1) for b in response.bands)
 
 
 _on_cells: weakref.WeakKeyDictionary[OrderTable, OrderTable] = weakref.WeakKeyDictionary()
@@ -164,7 +164,7 @@ def on_cells(table: OrderTable) -> OrderTable:
     exact at the listed lights. Crossed gratings have no cells.
     """
     response = table.response
-    if not isinstance(response, Listed):
+    if not isinstance(response, ListedResponse):
         return table
     if table not in _on_cells:
         counts = Counts(*(n + 1 for n in CELLS_UNDER_COAT))
@@ -173,7 +173,7 @@ def on_cells(table: OrderTable) -> OrderTable:
             parts.setdefault(of.band, []).append(_sampled(table, of, counts))
         bands = tuple(Band(k, *of_band) for k, of_band in parts.items())
         _on_cells[table] = OrderTable(
-            table.periods, table.wavelengths, Cells(bands, even=True), table.superstrate,
+            table.periods, table.wavelengths, CellResponse(bands, even=True), table.superstrate,
             table.header, table.thin, table.block,
         )  # fmt: skip
     return _on_cells[table]

@@ -30,7 +30,7 @@ LEAST_BLOCK = 1.01
 MARGIN = 0.1
 #: Bands, and nodes along an axis, of a table at most: beyond, no renderer would want it.
 MOST_BANDS, MOST_NODES = 256, 64
-#: Numbers of elements of Mueller matrices that a response may have (`Cells`, `Listed`).
+#: Numbers of elements of Mueller matrices that a response may have.
 UNPOLARISED, ALONG, LINEAR, MUELLER = 1, 2, 3, 16
 
 
@@ -72,7 +72,7 @@ class Band:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cells:
+class CellResponse:
     """Response at nodes of the cells of all directions and wavelengths (`cells`).
 
     Attributes
@@ -120,7 +120,7 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Listed:
+class ListedResponse:
     """Response at listed lights: a grid of wavelengths and directions of its own.
 
     Each listed light has its listed efficiencies; between them they are interpolated linearly. At
@@ -200,8 +200,8 @@ class OrderTable:
     wavelengths : shortest and longest, in vacuum, nm. Light beyond them by less than `MARGIN`
         has the nearest efficiencies: longer light at the same s and K, shorter light in the
         same direction. Other light has none.
-    response : efficiencies or Mueller matrices, over `Cells` of all light, or of `Listed` light.
-        Matrices are about the axes of `polarised`.
+    response : efficiencies or Mueller matrices, of all light (`CellResponse`) or of a
+        list (`ListedResponse`).         Matrices are about the axes of `polarised`.
     superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
         thick to interfere, as the polycarbonate of a CD.
     header : facts for people and programs, JSON: `solver`, `solver_version`, `settings`,
@@ -215,7 +215,7 @@ class OrderTable:
 
     periods: tuple[float, float]
     wavelengths: tuple[float, float]
-    response: Cells | Listed
+    response: CellResponse | ListedResponse
     superstrate: float = 1.0
     header: Mapping[str, Any] = field(default_factory=dict)
     thin: bool = False
@@ -232,7 +232,7 @@ class OrderTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 
     def __post_init__(self) -> None:
-        listed = isinstance(self.response, Listed)
+        listed = isinstance(self.response, ListedResponse)
         check_outline(
             self.periods, self.wavelengths, self.superstrate, self.thin, self.block, listed=listed
         )
@@ -260,7 +260,7 @@ class OrderTable:
             Band(k, values(k + 1), values(k) if k else None)
             for k in range(largest_band(wavelengths, superstrate * period) + 1)
         )
-        return cls(periods, wavelengths, Cells(bands), superstrate, {"profile": "flat"})
+        return cls(periods, wavelengths, CellResponse(bands), superstrate, {"profile": "flat"})
 
     @property
     def period(self) -> float:
@@ -304,7 +304,7 @@ class OrderTable:
 
         Raises a DiffractionError for listed light.
         """
-        if isinstance(self.response, Listed):
+        if isinstance(self.response, ListedResponse):
             raise DiffractionError("a table of listed light has no bands; see `rows.on_cells`")
         return self.response.bands
 
@@ -333,7 +333,7 @@ class OrderTable:
     @property
     def albedo(self) -> float:
         """Mean over nodes and ports of the sum over orders of all sides, unpolarised."""
-        if isinstance(self.response, Listed):
+        if isinstance(self.response, ListedResponse):
             return float(self.response.values[..., 0].sum(axis=-1).mean())
         return float(np.mean([kind[..., 0].sum(axis=-1).mean() for kind in self.response.arrays]))
 
@@ -350,7 +350,7 @@ class OrderTable:
     def _digest(self) -> str:
         outline = [self.periods, self.wavelengths, self.superstrate, self.thin, self.block]
         content = hashlib.sha256()
-        if isinstance(self.response, Listed):
+        if isinstance(self.response, ListedResponse):
             outline.append(self.response.in_plane)
             for axis in (*self.response.axes, self.response.orders):
                 content.update(np.ascontiguousarray(axis, np.float64).data)
@@ -378,7 +378,7 @@ class OrderTable:
         }
         if self.crossed:
             shown["periods_um"] = list(self.periods)
-        if isinstance(self.response, Cells):
+        if isinstance(self.response, CellResponse):
             shown["reciprocity_residual"] = self.reciprocity
         return shown
 

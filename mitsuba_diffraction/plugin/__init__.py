@@ -4,7 +4,6 @@ Contents
 --------
 diffraction     `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
 diffraction_dielectric  the plugin `diffraction_dielectric`, which lets light through as well
-orders          the plugin `diffraction_orders`: gratings whose orders were solved
 diffraction_mix  the plugin `diffraction_mix`: several surfaces in one, by weights
 weights         its weights, given or by the depth of solved gratings
 base            `PluginBSDF`, answers, parameters and their changes; `SurfaceBSDF`, the one `sample`

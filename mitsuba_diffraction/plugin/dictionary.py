@@ -38,7 +38,7 @@ class Pluggable(Protocol):
 
 
 class TableData(mi.Object):
-    """Such a table in an object that a dictionary of Mitsuba's can hold."""
+    """Table with its own BSDF, in an object that a dictionary of Mitsuba's can hold."""
 
     def __init__(self, table: Pluggable) -> None:
         super().__init__()

@@ -16,7 +16,6 @@ energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
-orders             solved efficiencies of a periodic profile's orders
 fields             checks of single values that are read from files
 TableSource        the table of any source of heights, built once; `providing` (in `source`)
 store              the cache, of whatever packs itself into a record

@@ -14,7 +14,8 @@ def test_info_describes_a_table_of_orders(run, tmp_path):
     path = tmp_path / "grating.nc"
     thin_grating(0.6, counts=(2, 2, 1)).save(path)
     data = json.loads(run("info", path, "--json").out)
-    assert (data["kind"], data["period_um"], data["bands"]) == ("table of orders", 0.6, 4)
+    assert (data["kind"], data["period_um"]) == ("table of orders", 0.6)
+    assert "4 bands" in data["grid"]
     assert run("info", path, "--level", "plane").code != 0
 
 
@@ -71,9 +72,9 @@ def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypat
     assert ran.code == 0, ran.err
     assert "index 1.5" in ran.out
     assert json.loads(run("info", "block.nc", "--json").out)["block_index"] == 1.5
-    assert "two sides" in run("orders", "block.nc").err
+    assert run("orders", "block.nc").code == 0
     assert "light that goes through" in run("export-bsdf", "block.nc").err
-    for other in (("--superstrate", 1.3), ("--thin",), ("--layer", "1.46:0.1"), ("--theta", 10)):
+    for other in (("--superstrate", 1.3), ("--thin",), ("--layer", "1.46:0.1")):
         assert "not allowed with" in run("solve", "lamellar", *grating, "--block", *other).err
     assert "--import" in run("solve", "a.csv", "--import", "--period", 1, "--block").err
 
@@ -89,7 +90,7 @@ def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkey
     periods = ("--period", 0.8, "--period-y", 1.1)
     assert run("solve", "crossed.csv", "--import", *periods, "-o", "back.nc").code == 0
     assert "does not propagate" in run("solve", "crossed.csv", "--import", "--period", 0.5).err
-    assert "polarised" in run("orders", "crossed.nc", "--polarised").err
+    assert run("orders", "crossed.nc", "--polarised").code == 0
     maps = ("--resolution", 16, "--samples", 1, "--wavelength", 550)
     assert run("brdf-map", "back.nc", *maps).code == 0
     assert run("spectrum", "back.nc", "--step", 100, "--relative", "none").code == 0
@@ -102,7 +103,7 @@ def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
     np.save("flat.npy", np.zeros((4, 4)))
     flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500,500", "--resolution", 4)
     solved = run("solve", "flat.npy", *flags, "-o", "flat.nc")
-    assert "orders to (0, 0)" in solved.out
+    assert "1 orders" in solved.out
     assert run("solve", "flat.npy", "--crossed").err.count("--period") > 0
     assert "not allowed with --crossed" in run("solve", "flat.npy", *flags, "--polarised").err
     assert "not square" in run("solve", "flat.npy", *flags, "--period-y", 0.3).err

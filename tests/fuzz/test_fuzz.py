@@ -41,11 +41,3 @@ def test_random_cases_pass(kind, some_variant):
 @pytest.mark.parametrize(("kind", "seed", "number"), FOUND)
 def test_what_failed_once_passes(some_variant, kind, seed, number):
     run_case(kind, seed, number)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("block", range(10))
-def test_no_combination_makes_light(block):
-    """200 random combinations of surface, material, layers, scales, windows and variants."""
-    for number in range(20 * block, 20 * block + 20):
-        run_case("energy", 52, number)

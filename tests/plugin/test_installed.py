@@ -8,10 +8,10 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
-from mitsuba_diffraction.plugin.fresnel import Conductor
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.plugin.conductors import tabulated_index
+from mitsuba_diffraction.plugin.materials import Conductor
 from mitsuba_diffraction.scene.load import load_scene
 from tests.support.hostile import other_metals, plugins_in
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.orders import Band, Cells, OrderTable, blocks, cells
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, blocks, cells
 from mitsuba_diffraction.orders.cells import Counts
 from tests.support.directions import Array
 
@@ -38,7 +38,7 @@ def block_grating(
         Band(k, kind(k, cells.A), kind(k, cells.B) if k else None)
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
-    response, header = Cells(bands, even=True), {"profile": "weak"}
+    response, header = CellResponse(bands, even=True), {"profile": "weak"}
     return OrderTable((period, np.inf), wavelengths, response, header=header, block=index)
 
 

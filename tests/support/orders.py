@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import jv
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.orders import Band, Cells, OrderTable, cells
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, small_slope, turn
 from tests.support.directions import Array, as_single, uniform_directions
@@ -63,7 +63,7 @@ def thin_grating(
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
     header = {"profile": "thin sinusoid"}
-    return OrderTable((period, np.inf), wavelengths, Cells(bands), superstrate, header, thin)
+    return OrderTable((period, np.inf), wavelengths, CellResponse(bands), superstrate, header, thin)
 
 
 def shallow_grating(
@@ -103,7 +103,7 @@ def shallow_grating(
         of_kinds = [matrices(k, kind) for kind in ((cells.A, cells.B) if k else (cells.A,))]
         flat = [m.reshape(*m.shape[:-2], 16).astype(np.float32) for m in of_kinds]
         bands.append(Band(k, *flat))
-    response, header = Cells(tuple(bands)), {"profile": "shallow"}
+    response, header = CellResponse(tuple(bands)), {"profile": "shallow"}
     return OrderTable((period, np.inf), wavelengths, response, superstrate, header)
 
 

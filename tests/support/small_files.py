@@ -72,21 +72,21 @@ def layers(path: Path) -> object:
 
 
 def solved_layers(path: Path) -> object:
-    from mitsuba_diffraction.solve.films import read_layers
+    from mitsuba_diffraction.orders.solve.films import read_layers
 
     return read_layers(path)
 
 
 def efficiencies(path: Path) -> object:
-    from mitsuba_diffraction.solve.efficiencies import read_efficiencies
+    from mitsuba_diffraction.orders.lists import read_efficiencies
 
     return read_efficiencies(path)
 
 
 def orders(path: Path) -> object:
-    from mitsuba_diffraction.tables.orders import load_any_orders
+    from mitsuba_diffraction.orders.file import load_orders
 
-    return load_any_orders(path)
+    return load_orders(path)
 
 
 def pigment(path: Path) -> object:

@@ -13,14 +13,14 @@ from ...plugin.loops import sum_of
 from ...plugin.memory import once_a_table, read, read_record, upload
 from ...plugin.types import Buffer, Float, Index, Mask
 from ..efficiency import AnyLookup, lookup_in
-from ..grid import Grid
+from ..grid import OrderGrid
 from ..table import OrderTable
 
 
 class Device:
     """A grid in the current variant's memory; a `lookup.Memory`."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: OrderGrid) -> None:
         self._buffers: dict[str, Buffer] = {}
         for name, values in grid._asdict().items():
             if isinstance(values, np.ndarray):

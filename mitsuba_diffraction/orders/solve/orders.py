@@ -15,7 +15,7 @@ from ...errors import DiffractionError, check_choice, quoted, warn
 from .. import cells
 from ..cells import Counts
 from ..polarised import ODD, mueller_of
-from ..table import MOST_NODES, Band, Cells, OrderTable, check_outline
+from ..table import MOST_NODES, Band, CellResponse, OrderTable, check_outline
 from .accuracy import WORST, diffuse_light, measured_error, powers
 from .block import to_node
 from .directions import Directions, solve_directions
@@ -190,8 +190,8 @@ def _solve_cells(
             header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
         made = tuple(_band(grating, k, counts[k], solved, how.polarised) for k in bands)
         table = OrderTable(
-            (grating.profile.period, math.inf), how.wavelengths, Cells(made, even=bool(block)),
-            superstrate, header, thin, block,
+            (grating.profile.period, math.inf), how.wavelengths,
+            CellResponse(made, even=bool(block)), superstrate, header, thin, block,
         )  # fmt: skip
         error = measured_error(table, problem, work)
         if error.within(how.tolerance) or refinement == REFINEMENTS:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.orders import Band, Cells, OrderTable, cells
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
 from mitsuba_diffraction.reference.fresnel import reflectance
@@ -145,13 +145,13 @@ def test_what_are_no_efficiencies_is_refused(change):
     mirror = OrderTable.mirror(0.5)
     bands = (*mirror.bands[:-1], Band(2, change(mirror.bands[2].a), mirror.bands[2].b))
     with pytest.raises(DiffractionError, match="band 2"):
-        dataclasses.replace(mirror, response=Cells(bands))
+        dataclasses.replace(mirror, response=CellResponse(bands))
 
 
 def test_missing_bands_and_absurd_outlines_are_refused():
     mirror = OrderTable.mirror(0.5)
     with pytest.raises(DiffractionError, match="expected 3"):
-        dataclasses.replace(mirror, response=Cells(mirror.bands[:-1]))
+        dataclasses.replace(mirror, response=CellResponse(mirror.bands[:-1]))
     for arguments in ({"period": np.nan}, {"period": 500.0}, {"wavelengths": (700.0, 400.0)}):
         with pytest.raises(DiffractionError):
             OrderTable.mirror(**{"period": 0.5, **arguments})

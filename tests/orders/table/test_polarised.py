@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.orders import Band, Cells, OrderTable
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.reference.boundary import mueller, small_slope
 from tests.support.orders import groove_matrices, shallow_grating
 from tests.support.stokes import REVERSAL
@@ -79,4 +79,4 @@ def test_tables_without_matrices_and_matrices_of_other_efficiencies_are_refused(
     for wrong in (larger, whole[..., :3], whole[..., :7]):
         bands = (Band(0, wrong), *GRATING.bands[1:])
         with pytest.raises(DiffractionError, match=r"band [01]"):
-            dataclasses.replace(GRATING, response=Cells(bands))
+            dataclasses.replace(GRATING, response=CellResponse(bands))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.orders import Band, Cells, OrderTable
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.orders.cells import Counts
 from tests.support.orders import SHARES, thin_grating
 
@@ -40,7 +40,7 @@ def test_reversed_light_is_compared_with_the_side_that_it_comes_from():
         return changed
 
     bands = tuple(Band(band.k, *(one_way(kind) for kind in band.kinds)) for band in SHEET.bands)
-    assert dataclasses.replace(SHEET, response=Cells(bands)).reciprocity > 0.1
+    assert dataclasses.replace(SHEET, response=CellResponse(bands)).reciprocity > 0.1
 
 
 def test_files_keep_sheets(tmp_path):

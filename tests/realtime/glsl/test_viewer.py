@@ -155,7 +155,7 @@ def test_sliders_reach_the_picture(viewer: Any) -> None:
 def test_a_method_that_does_not_suit_is_explained_and_not_taken(viewer: Any) -> None:
     loaded(viewer).choose("flss")  # the scene names a table, which does not hold the heights
     assert viewer.method == "fast"
-    assert "does not hold the heights" in viewer.message
+    assert "needs the heights" in viewer.message
     viewer.on_render(0.0, 0.01)
 
 
