@@ -183,8 +183,27 @@ def decaying_root(square: Number) -> Number:
 @formula
 def reflectance(cosine: Number, index: Index) -> Number:
     """Reflectance for unpolarised light, the mean of both polarisations; as `amplitudes`."""
+    if not isinstance(index, Filmed | Stacked) and is_complex(index):
+        return _absorbing_reflectance(cosine, index)
     r_s, r_p = amplitudes(cosine, 1.0 - cosine * cosine, index)
     return 0.5 * (squared(r_s) + squared(r_p))
+
+
+def _absorbing_reflectance(cosine: Number, index: Number) -> Number:
+    """Return |r_s|² (1 + |r_p/r_s|²)/2 with r_p/r_s = (q cosθ − sin²θ)/(q cosθ + sin²θ).
+
+    From Born and Wolf's coefficients, with q = √(ε − sin²θ), in real arithmetic and one division.
+    """
+    square = 1.0 - cosine * cosine
+    inside = decaying_root(index * index - square)
+    xp, q, decay = of(cosine, inside), inside.real, inside.imag
+    flat = q * cosine
+    cross, decay = decay * cosine * (decay * cosine), decay * decay
+    less, more = flat - square, flat + square
+    ratios = [xp.fma(less, less, cross), xp.fma(more, more, cross)]
+    less, more = q - cosine, q + cosine
+    above, below = xp.fma(less, less, decay), xp.fma(more, more, decay)
+    return 0.5 * above * (ratios[0] + ratios[1]) * xp.reciprocal(below * ratios[1])
 
 
 @formula

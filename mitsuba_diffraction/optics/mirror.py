@@ -1,83 +1,77 @@
 """Order 0 as a mirror's lobe that the horizon does not shorten, in any arithmetic.
 
 A flat surface under a Gaussian window reflects light as a mirror does, into a lobe of the window's
-width. With u the tangential part of ωi + ωo, σ₀ of the window, and the half vector's angle θh,
+width. With u the tangential part of ωi + ωo, and σ₀ of the window,
 
-    f₀ = R(θh) |a₀|² G(u) C(X_i) C(X_o),   G(u) = (kσ₀)²/π exp(−(kσ₀u)²),   X = √(kσ₀) cosθ.
+    f₀ = R(θm) |a₀|² G(u) C(X_i) C(X_o),   G(u) = (kσ₀)²/π exp(−(kσ₀u)²),   X = √(kσ₀) cosθ.
 
 G cosθo dωo is Gaussian over the tangential plane and of integral 1, of which grazing light has a
 part beyond the horizon. C makes up for that part. It is the fixed point of
 
-    C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) e^{−βY/2} C(Y) = e^{−βX/2}:
+    C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1,
 
-with a reflectance R = exp(−βX) near the horizon, R(θh) ≈ √(R(θi) R(θo)) there, and the albedo of
-the mirror is R(θi). β = 0 of a mirror that reflects alike at all angles; of dielectrics β is up
-to 2, and C up to twice as large. `grazing_slope` measures β across the lobe. f₀ is reciprocal.
+so the albedo of a perfect mirror is 1, and no material reflects more than its largest R.
 
-C is 1 for X above 2.5, where the lobe ends above the horizon. `reference.mirror` solves the
-equation; `log_correction` is a fit to that solution by least squares, of error 0.001 for β = 0
-and 0.005 for β up to 2.
+θm is the half vector's angle θh but near the horizon, where light of one direction leaves in a lobe
+that reaches as far as reflectances change. There cosθm = cosθh − (h(X_i) + h(X_o))/√(kσ₀), and the
+mean of R(θm) over the lobe is R(θi). h solves
+
+    ∫ p(Y|X) exp(−X/2 − Y/2 + h(X) + h(Y)) dY = exp(−X),   p(Y|X) = C(X) C(Y) Y/√π exp(…),
+
+for the reflectance exp(−X), as dielectrics under narrow windows have it. It is taken at 550 nm for
+all wavelengths, so that materials without dispersion have one R(θm). f₀ is reciprocal.
+
+`reference.mirror` solves both equations. Here are fits: of C with an error of 0.003, and of h with
+one of 0.01, which changes R by up to 0.02 where R falls most steeply.
 """
 
 from __future__ import annotations
 
-from .arithmetic import Number, formula, is_complex, of
+from .arithmetic import Number, formula, of
 from .boundary import Geometry, Jones, facets
-from .fresnel import Filmed, Index, amplitudes, reflectance
-from .stack import Stacked
+from .fresnel import Index, amplitudes
 
-#: X at which the slope is measured; the lobe of grazing light reaches about as far.
-SLOPE_AT = 1.25
-#: Largest β of the fit. Less of steeper reflectances is returned, never more.
-MOST_SLOPE = 2.4
-_NEPER = 0.6931471805599453
-
-
-@formula
-def log_correction(x: Number, slope: Number) -> Number:
-    """Return ln C at X for a grazing slope β."""
-    xp = of(x, slope)
-    a = xp.fma(slope, xp.fma(slope, -0.0209, 0.3837), 0.5)
-    b = slope * xp.fma(slope, -0.0218, -0.4236)
-    c = xp.fma(slope, xp.fma(slope, 0.0554, -0.0347), -0.3652)
-    d = xp.fma(slope, xp.fma(slope, -0.053, 0.2363), 0.1532)
-    e = xp.fma(slope, -0.1243, -0.0378)
-    square = x * x
-    series = xp.fma(x, xp.fma(x, xp.fma(x, xp.fma(x, e, d), c), b), a)
-    fades = xp.exp(-(square * xp.fma(square, 0.1919, 0.3703)))
-    tail = 0.0052 * slope * slope * square * xp.reciprocal(xp.fma(square * square, 0.114, 1.0))
-    return xp.fma(series, fades, -tail)
+#: rad/µm of 550 nm, at which the angle θm is taken.
+WAVENUMBER = 11.423973285781066
+#: Least cosθm: 1 − cos² is below 1 in single precision, where an index of 1 is to reflect nothing.
+LEAST_COSINE = 1e-3
+# Where C is 1, and h is 0
+_X_SQUARE, _X = 4.0, 2.3
 
 
 @formula
-def horizon_correction(cos_i: Number, cos_o: Number, sharpness: Number, slope: Number) -> Number:
+def horizon_correction(level_i: Number, level_o: Number, k: Number) -> Number:
     """Return C(X_i) C(X_o).
 
-    sharpness : √(kσ₀).
-    slope : β of `grazing_slope`.
+    level_i, level_o : σ₀ cos²θ of both directions, µm.
+    k : 2π/λ, rad/µm.
     """
-    x_i, x_o = sharpness * cos_i, sharpness * cos_o
-    return of(x_i, x_o, slope).exp(log_correction(x_i, slope) + log_correction(x_o, slope))
+    return _correction(k, level_i) * _correction(k, level_o)
+
+
+def _correction(k: Number, level: Number) -> Number:
+    xp = of(k, level)
+    t = xp.maximum(xp.fma(k, level * (-1.0 / _X_SQUARE), 1.0), 0.0)
+    fit = xp.fma(t, xp.fma(t, xp.fma(t, 1.64753, -1.55096), 0.68232), -0.1328)
+    return xp.fma(t, fit, 1.0)
 
 
 @formula
-def grazing_slope(index: Index, sharpness: Number) -> Number:
-    """Return β, by which R falls as exp(−βX) from the horizon to the end of a grazing lobe.
-
-    It is 0 where reflectances do not fall like that: of total reflection, and under films and
-    stacks, whose fringes go up and down.
-    """
-    xp = of(sharpness)
-    if isinstance(index, Filmed | Stacked):
-        return 0.0 * sharpness
-    cosine = xp.minimum(SLOPE_AT * xp.reciprocal(sharpness), 1.0)
-    falls = xp.log2(xp.maximum(reflectance(cosine, index), 1e-6)) * (-_NEPER / SLOPE_AT)
-    epsilon = index * index
-    total = xp.absolute((epsilon.real if is_complex(epsilon) else epsilon) - 0.5) < 0.5
-    return xp.where(total, 0.0, xp.clip(falls, 0.0, MOST_SLOPE))
+def mirror_cosine(cos_half: Number, cos_i: Number, cos_o: Number, sigma_0: Number) -> Number:
+    """Return cosθm of the half vector's cosine and of both directions; σ₀ in µm."""
+    xp = of(cos_i, cos_o, sigma_0)
+    sharpness = xp.sqrt(WAVENUMBER * sigma_0)
+    shift = _shift(cos_i, sharpness) + _shift(cos_o, sharpness)
+    return xp.clip(cos_half - shift * xp.reciprocal(sharpness), LEAST_COSINE, 1.0)
 
 
-def mirror(geometry: Geometry, index: Index) -> Jones:
-    """Return U(ωo) diag(r_s, r_p) U(ωi) of a level facet, with Fresnel's r at the half vector."""
-    cosine = geometry.cos_half
+def _shift(cosine: Number, sharpness: Number) -> Number:
+    """Return h(X)."""
+    xp = of(cosine, sharpness)
+    t = xp.maximum(xp.fma(cosine, sharpness * (-1.0 / _X), 1.0), 0.0)
+    return t * t * xp.fma(t, xp.fma(t, -1.85638, 3.80759), -1.59677)
+
+
+def mirror(geometry: Geometry, cosine: Number, index: Index) -> Jones:
+    """Return U(ωo) diag(r_s, r_p) U(ωi) of a level facet, with Fresnel's r at cosθm."""
     return facets(geometry, *amplitudes(cosine, 1.0 - cosine * cosine, index))

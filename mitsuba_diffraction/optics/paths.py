@@ -19,9 +19,9 @@ import numpy as np
 from . import boundary, through
 from .blend import Real
 from .boundary import Direction, Heights, Jones
-from .coat import crossing, refracted, transmittances, transmitted
+from .coat import cosine_within, crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
-from .mirror import grazing_slope, horizon_correction, mirror
+from .mirror import horizon_correction, mirror, mirror_cosine
 from .stack import Stacked
 
 
@@ -169,28 +169,28 @@ class Path:
         return 0.5 * (np.sqrt(came[0] * left[0]) + np.sqrt(came[1] * left[1]))
 
     def mirrored(
-        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, sharpness: float
+        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, k: float, sigma_0: float
     ) -> tuple[Real, Real]:
         """Return G of order 0 that is reflected, and of the flat face of a sheet or a coat.
 
-        sharpness : √(kσ₀) in the medium that directions are measured in.
+        k : 2π/λ in the medium above, rad/µm.
+        sigma_0 : σ₀ times the optical index of the medium that directions are measured in, µm.
         """
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
-        sharp, none = np.full_like(cos_i, sharpness), np.zeros_like(cos_i)
+        visible = horizon_correction(sigma_0 * cos_i**2, sigma_0 * cos_o**2, k)
+        none = np.zeros_like(visible)
         if self.index is None:
-            return horizon_correction(cos_i, cos_o, sharp, none), none
+            return visible, none
         wi, wo = directions(cos_i, cos_o, cos_turn)
         pair, n = boundary.geometry(wi, wo), np.asarray(self.came.at_structure)
+        cosine = mirror_cosine(pair.cos_half, cos_i, cos_o, np.asarray(sigma_0))
         if not self.thin:
-            slope = grazing_slope(self.index, np.asarray(sharpness)) + none
-            share = reflectance(pair.cos_half, self.index)
-            return share * horizon_correction(cos_i, cos_o, sharp, slope), none
-        slope = grazing_slope(n, np.asarray(sharpness)) + none
-        face = reflectance(pair.cos_half, n) * horizon_correction(cos_i, cos_o, sharp, slope)
+            return visible * reflectance(cosine, self.index), none
+        face = visible * reflectance(cosine, n)
         inside = boundary.geometry(refracted(wi, n), refracted(wo, n))
         ends = (crossing(direction[2], n) for direction in (wi, wo))
-        jones = transmitted(mirror(inside, self.index), inside, self.index, *ends)
-        share = boundary.power(jones) * horizon_correction(cos_i, cos_o, sharp, none)
+        facet = mirror(inside, cosine_within(cosine, n), self.index)
+        share = visible * boundary.power(transmitted(facet, inside, self.index, *ends))
         return share, face
 
     @property
@@ -230,7 +230,7 @@ class Returned(Path):
         return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)
 
     def mirrored(
-        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, sharpness: float
+        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, k: float, sigma_0: float
     ) -> tuple[Real, Real]:
         share = self.common(cos_i, cos_o, cos_turn)
         return share, np.zeros_like(share)

@@ -29,14 +29,20 @@ from ..optics.boundary import (
     model_of,
     power,
 )
-from ..optics.coat import FaceCoefficients, coated_power, crossing, transmitted
+from ..optics.coat import (
+    FaceCoefficients,
+    coated_power,
+    cosine_within,
+    crossing,
+    transmitted,
+)
 from ..optics.fresnel import reflectance
-from ..optics.mirror import grazing_slope, horizon_correction, mirror
+from ..optics.mirror import horizon_correction, mirror, mirror_cosine
 from .arithmetic import clip, index_of, maximum
 from .directions import CoatedPair, Pair, TablePoint
 from .materials import Material, Perfect
 from .memory import index_between, read_record, upload
-from .types import Float, Interaction, Mask, Number, Spectrum, Vector3f
+from .types import Float, Number, Spectrum, Vector3f
 
 #: The model of flat faces and of a perfect reflector, which has no index.
 KIRCHHOFF = model_of("kirchhoff")
@@ -90,19 +96,18 @@ class Boundary:
         pair: Pair,
         height_scale: Float,
         wavenumbers: list[Float],
-        si: Interaction,
-        active: Mask,
+        indices: list[Number],
         mode: mi.TransportMode,
     ) -> Spectrum:
         """Return N' of a pair, or its Mueller matrix, for each channel.
 
         wavenumbers : of the channels, rad/µm.
+        indices : of the material (`Material.indices`).
         mode : direction of the light, along ωo (radiance) or along ωi (importance).
         """
         if isinstance(self.material, Perfect):
             return mi.depolarizer(mi.UnpolarizedSpectrum(dr.square(pair.one_plus_dot)))
         light = LightPath.of(pair, mode)
-        indices = self.material.indices(si, active)
         heights = self.heights(pair, height_scale, self.material.wavenumbers(wavenumbers))
         channels = _side_by_side(indices, heights)
         if self.model.power is not None and not (mi.is_polarized or light.passed):
@@ -116,35 +121,27 @@ class Boundary:
         pair: Pair,
         wavenumbers: list[Float],
         sigma_0: Float,
-        si: Interaction,
-        active: Mask,
+        indices: list[Number],
         mode: mi.TransportMode,
     ) -> Spectrum:
         """Return N_0 C(X_i) C(X_o) of eq. 10, or its Mueller matrix, for each channel.
 
         sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `factor`.
         """
-        ends, width = (pair.outer.cos_i, pair.outer.cos_o), sigma_0 * pair.outer.medium
-        sharpness = [dr.sqrt(k * width) for k in self.material.wavenumbers(wavenumbers)]
+        outer, width = pair.outer, sigma_0 * pair.outer.medium
+        into, out = (dr.square(cosine) * width for cosine in (outer.cos_i, outer.cos_o))
+        visible = mi.UnpolarizedSpectrum([horizon_correction(into, out, k) for k in wavenumbers])
         if isinstance(self.material, Perfect):
-            visible = [horizon_correction(*ends, each, mi.Float(0.0)) for each in sharpness]
-            return mi.depolarizer(mi.UnpolarizedSpectrum(visible))
+            return mi.depolarizer(visible)
+        cosine = mirror_cosine(outer.cos_half, outer.cos_i, outer.cos_o, width)
         light = LightPath.of(pair, mode)
-        channels = _side_by_side(self.material.indices(si, active), sharpness)
-        slopes = [mi.Float(0.0) if light.passed else grazing_slope(*each) for each in channels]
-        visible = [
-            horizon_correction(*ends, sharp, slope)
-            for (_, sharp), slope in zip(channels, slopes, strict=True)
-        ]
-        if not (mi.is_polarized or light.passed):
-            cosine = light.pair.cos_half
-            powers = [reflectance(cosine, index) for index, _ in channels]
-            return self.material.channels([p * c for p, c in zip(powers, visible, strict=True)])
-        matrices = []
-        for (index, _), factor in zip(channels, visible, strict=True):
-            root = dr.sqrt(factor)
-            matrices.append(tuple(entry * root for entry in mirror(light.pair, index)))
-        return self._of_matrices(light, matrices, [index for index, _ in channels])
+        if isinstance(pair, CoatedPair):
+            cosine = cosine_within(cosine, pair.n)
+        elif not mi.is_polarized:
+            powers = [reflectance(cosine, index) for index in indices]
+            return self.material.channels(powers) * visible
+        matrices = [mirror(light.pair, cosine, index) for index in indices]
+        return mi.Spectrum(visible) * self._of_matrices(light, matrices, indices)
 
     def _of_matrices(
         self, light: LightPath, matrices: list[Jones], indices: list[Number]

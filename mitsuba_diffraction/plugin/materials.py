@@ -107,6 +107,10 @@ class Perfect(Material):
 
     kind = Feature.MIRROR
 
+    def indices(self, si: Interaction, active: Mask) -> list[Any]:
+        """Return no index."""
+        return []
+
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """See `Material.reflectance`."""
         return mi.UnpolarizedSpectrum(1.0)

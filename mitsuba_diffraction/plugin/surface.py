@@ -29,6 +29,7 @@ from .types import (
     Float,
     Interaction,
     Mask,
+    Number,
     Powers,
     Properties,
     Spectrum,
@@ -132,10 +133,11 @@ class DiffractingSurface(SurfaceBSDF):
 
         shadowing : of all orders but 0.
         """
-        factor = boundary.factor(pair, site.scale, site.wavenumbers, site.si, active, ctx.mode)
+        indices = boundary.material.indices(site.si, active)
+        factor = boundary.factor(pair, site.scale, site.wavenumbers, indices, ctx.mode)
         level = mi.Spectrum(power.others * (self.geometry(pair) * shadowing))
         others = dr.select(active, tinted(level * factor, boundary.material), 0.0)
-        mirror = self.mirrored(ctx, site, pair, boundary, power.zeroth, active)
+        mirror = self.mirrored(ctx, site, pair, boundary, indices, power.zeroth, active)
         return interfering(others, mirror, power.cosine)
 
     def mirrored(
@@ -144,15 +146,17 @@ class DiffractingSurface(SurfaceBSDF):
         site: Site,
         pair: Pair,
         boundary: Boundary,
+        indices: list[Number],
         zeroth: Colour,
         active: Mask,
     ) -> Spectrum:
         """Return f cosθo of order 0, eq. 10.
 
+        indices : of the material (`Material.indices`).
         zeroth : ⟨|P_0|²⟩ / (4π²σ⁴ λ²), per channel.
         """
         width = self.table.sigma_0 * pair.frame.stretch
-        factor = boundary.mirror(pair, site.wavenumbers, width, site.si, active, ctx.mode)
+        factor = boundary.mirror(pair, site.wavenumbers, width, indices, ctx.mode)
         level = zeroth * (self.area_factor * pair.frame.area * pair.outer.cos_o)
         return dr.select(active, tinted(mi.Spectrum(level) * factor, boundary.material), 0.0)
 
@@ -160,7 +164,8 @@ class DiffractingSurface(SurfaceBSDF):
         self, ctx: Context, site: Site, pair: Pair, mirror: Boundary, active: Mask
     ) -> Spectrum:
         """Return f cosθo of a flat face."""
-        return self.mirrored(ctx, site, pair, mirror, self.power.flat(pair, site.si), active)
+        indices, flat = mirror.material.indices(site.si, active), self.power.flat(pair, site.si)
+        return self.mirrored(ctx, site, pair, mirror, indices, flat, active)
 
     def reflected_share(self, site: Site, active: Mask) -> Colour:
         """See `SurfaceBSDF.reflected_share`."""

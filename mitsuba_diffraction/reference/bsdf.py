@@ -100,7 +100,7 @@ def brdf(
     if material.index is None:
         others, zeroth, cosine = window_powers(field, *light, *window)
         others *= kirchhoff_factor(*light, window.sigmas.orders)
-        zeroth *= horizon_correction(light, window.sigmas.zeroth, None)
+        zeroth *= horizon_correction(light, window.sigmas.zeroth)
         area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
         return interfering(others, zeroth / area, cosine)
     return _reflected(boundary.unpolarised, field, light, material, window)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics.geometry import wavenumber
 from . import model
 from .fresnel import amplitudes
-from .mirror import horizon_correction, interfering
+from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light
 
 Real = NDArray[np.float64]
@@ -43,8 +43,10 @@ def reflected(
     inside = refracted_light(light, coat)
     ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
     others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
-    mirror = transmitted(model.facets(inside, index)[0], *ends)
-    visible = horizon_correction(light, sigma_0, index, bare=False)
+    outside = mirror_cosine(light, sigma_0)
+    within = np.sqrt(np.maximum(outside**2 + coat**2 - 1.0, 0.0)) / coat
+    mirror = transmitted(model.facets(inside, index, within)[0], *ends)
+    visible = horizon_correction(light, sigma_0)
     area = (light.wavelength * 1e-3) ** 2 * np.pi * sigma**2
     zeroth = (visible * powers[1] / area * measure(mirror).T).T
     # The face is a mirror: ⟨|P|²⟩ of a flat patch

@@ -15,17 +15,19 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
     s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),   R₀ = |(n − 1)/(n + 1)|²                                (9)
     σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),   h_q' the heights' spectrum
     f_0 = N_0 C(X_i) C(X_o) / (λ² A) · ⟨|P_0|²⟩,   N_0 of J_0 = U(ωo) diag(r_s, r_p) U(ωi)     (10)
-    C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) e^(−βY/2) C(Y) = e^(−βX/2),   X = √(kσ₀) cosθ         (11)
+    C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1,   X = √(kσ₀) cosθ                           (11)
+    cosθm = cosθh − (h(X_i) + h(X_o))/√(kσ₀)                                                   (12)
 
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
 window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
-orders alone. C makes up for the part of its lobe beyond the horizon, with the reflectance exp(−βX)
-near it. K is Kirchhoff's tangent plane: Fresnel's r_s, r_p at the half vector; U turns between the
-facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along d. Rows and columns of J are s and p of the
-outgoing and the incoming light. B is first-order small slope (Rice 1951; Voronovich 1985). Indices
-and results are arrays (n,) as in `Light`. coat.py and transmission.py wrap this.
+orders alone. C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p at θm,
+whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's r_s,
+r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
+d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order small
+slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py and
+transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ from ..optics.fresnel import Index
 from . import boundary, scan
 from .boundary import facet_axis, jones_matrix, mixed, polarisation_axes, turn, unpolarised
 from .fresnel import amplitudes, decaying_root
-from .mirror import horizon_correction
+from .mirror import horizon_correction, mirror_cosine
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -94,9 +96,10 @@ def mirrored(
     light: Light, sigmas: Sigmas, power: Real, index: Index, measure: Callable[[Complex], Real]
 ) -> Real:
     """f_0 of (10) from ⟨|P_0|²⟩."""
-    visible = horizon_correction(light, sigmas.zeroth, index)
+    visible = horizon_correction(light, sigmas.zeroth)
     factor = visible * power / ((light.wavelength * 1e-3) ** 2 * np.pi * sigmas.orders**2)
-    return (factor * measure(facets(light, index)[0]).T).T
+    jones = facets(light, index, mirror_cosine(light, sigmas.zeroth))[0]
+    return (factor * measure(jones).T).T
 
 
 def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
@@ -170,14 +173,16 @@ def kirchhoff(light: Light, index: Complex) -> Complex:
     return (one_plus_dot / (2 * light.wi[:, 2] * light.wo[:, 2]))[:, None, None] * jones
 
 
-def facets(light: Light, index: Index) -> tuple[Complex, Real]:
-    """U(ωo) diag(r_s, r_p) U(ωi) at the half vector, (n, 2, 2), and 1 + ωi·ωo."""
+def facets(light: Light, index: Index, cosine: Real | None = None) -> tuple[Complex, Real]:
+    """U(ωo) diag(r_s, r_p) U(ωi), (n, 2, 2), and 1 + ωi·ωo; r at the half vector or a cosine."""
     wi, wo, _ = light
     s_in, s_out = polarisation_axes(wi, wo)
     axis, half = facet_axis(wi, wo, s_in), wi + wo
     # |ωi + ωo|²/2 = 1 + ωi·ωo, and cosθ at the half vector is √((1 + ωi·ωo)/2)
     one_plus_dot = 0.5 * np.sum(half * half, axis=1)
-    r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
+    if cosine is None:
+        cosine = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
+    r_s, r_p = amplitudes(cosine, index)
     facet = jones_matrix(ss=r_s, sp=0.0, ps=0.0, pp=r_p)
     return turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi), one_plus_dot
 

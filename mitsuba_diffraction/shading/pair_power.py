@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ..optics.arithmetic import Number, of
 from ..optics.boundary import Direction, Geometry, Heights, Jones, geometry, power
-from ..optics.coat import coated_power, crossing
+from ..optics.coat import coated_power, cosine_within, crossing
 from ..optics.fresnel import Index
 from ..optics.mirror import mirror
 
@@ -72,11 +72,11 @@ def relative_power(
     return pair_power(jones, wi, wo, index, kappa, variance, coat) / (edge * edge)
 
 
-def coated_mirror(wi: Direction, wo: Direction, index: Index, coat: Coat) -> Number:
+def coated_mirror(wi: Direction, wo: Direction, cosine: Number, index: Index, coat: Coat) -> Number:
     """Return N_0 of eq. 10 of a level facet under a coat, as seen from outside.
 
-    wi, wo, index : within the coat.
+    wi, wo, index : within the coat; cosine : of θm outside.
     """
     pair = geometry(wi, wo)
     came, left = crossing(coat.cos_i, coat.n), crossing(coat.cos_o, coat.n)
-    return coated_power(mirror(pair, index), pair, index, came, left)
+    return coated_power(mirror(pair, cosine_within(cosine, coat.n), index), pair, index, came, left)

@@ -98,7 +98,7 @@ def brdf(
     cos_i, cos_o = (np.where(above, np.asarray(each)[..., 2], 1.0) for each in (wi, wo))
     mirror = k**2 * table.sigma**2 / np.pi * np.where(above, zeroth, 0.0)
     others *= factor
-    mirror *= horizon_correction(cos_i, cos_o, np.sqrt(k * table.sigma_0), np.zeros_like(k))
+    mirror *= horizon_correction(table.sigma_0 * cos_i**2, table.sigma_0 * cos_o**2, k)
     return np.asarray(others + mirror + 2.0 * phase * np.sqrt(others * mirror))
 
 

@@ -17,7 +17,7 @@ from ...optics.colour import encoded_colour
 from ...optics.display import shown_colour
 from ...optics.fresnel import reflectance
 from ...optics.geometry import vcavity
-from ...optics.mirror import grazing_slope, horizon_correction
+from ...optics.mirror import horizon_correction, mirror_cosine
 from ...optics.orders import (
     cell_wavelengths,
     lobe_falloff,
@@ -41,7 +41,7 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
         order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
     },
     "FACE": {face_transmittance: 2, order_direction: 4},
-    "ORDER_0": {horizon_correction: 4},
+    "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
 }  # fmt: skip
@@ -72,13 +72,9 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(refracted, "vector", "float")
     if index is not None:
         program.add(reflectance, "float", index, name="interface_reflectance")
-    if "ORDER_0" in names and "COATED" in names:
-        program.add(grazing_slope, "float", "float", name="face_slope")
-    if "ORDER_0" in names and index is not None:
-        program.add(grazing_slope, index, "float")
-        if "COATED" in names:
-            over = Coat("float", "float", "float")
-            program.add(coated_mirror, "vector", "vector", index, over)
+    if {"ORDER_0", "COATED"} <= names and index is not None:
+        over = Coat("float", "float", "float")
+        program.add(coated_mirror, "vector", "vector", "float", index, over)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(

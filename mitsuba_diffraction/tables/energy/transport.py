@@ -121,6 +121,7 @@ class Transport:
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
+        self._optical_0 = orders.sigma_0 * path.left.index
         self._parts: list[Callable[[Array], Array]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
             half, nodes = grid.half, orders.nodes
@@ -163,7 +164,7 @@ class Transport:
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
         cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
-        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth, self._width_0**-0.5)
+        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth, self._optical_0)
         return np.asarray(lobe * gain, np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
@@ -186,7 +187,7 @@ class Transport:
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
         cos_in = np.broadcast_to(cos_i, cos_o.shape)
-        parts *= self._gain.order_0(cos_in, cos_o, power, np.pi, width**-0.5)
+        parts *= self._gain.order_0(cos_in, cos_o, power, np.pi, self._optical_0)
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 

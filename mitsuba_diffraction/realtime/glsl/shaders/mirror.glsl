@@ -1,27 +1,34 @@
-// Order 0, a mirror's lobe: f₀ = R(θh) |a₀|² G(u) C(X_i) C(X_o). The formulas are of optics/mirror.py.
+// Order 0, a mirror's lobe: f₀ = R(θm) |a₀|² G(u) C(X_i) C(X_o). The formulas are of optics/mirror.py.
 // All is relative to the factor of `begin_diffraction`, which sets the values of a pair.
 
 vec2 mirror_ends = vec2(1.0);   // cosθi and cosθo
+float mirror_half = 1.0;        // cosθh
 float mirror_share = 1.0;       // of order 0
 #ifdef COATED
 vec3 mirror_wi, mirror_wo;   // directions within the coat
-float face_share;            // of the coat's face, times its reflectance
+float face_share;            // of the coat's face
 #endif
 
-// √(kσ₀) of the window on the surface.
-float sharpness(float k, float sigma_0) { return sqrt(k * sigma_0 * sqrt(patch_area)); }
+// σ₀ of the window on the surface.
+float on_surface(float sigma_0) { return sigma_0 * sqrt(patch_area); }
 
-float visible(float sharp, float slope)
+float visible(float k, float sigma_0)
 {
-    return horizon_correction(mirror_ends.x, mirror_ends.y, sharp, slope);
+    vec2 level = mirror_ends * mirror_ends * on_surface(sigma_0);
+    return horizon_correction(level.x, level.y, k);
+}
+
+// cosθm outside of a coat.
+float mirrored(float sigma_0)
+{
+    return mirror_cosine(mirror_half, mirror_ends.x, mirror_ends.y, on_surface(sigma_0));
 }
 
 #ifdef COATED
 
 float face_at(float k, float sigma_0)
 {
-    float sharp = sharpness(k, sigma_0);
-    return face_share * visible(sharp, face_slope(coat, sharp));
+    return face_share * face_reflectance(mirrored(sigma_0)) * visible(k, sigma_0);
 }
 
 vec3 face(float sigma_0)
@@ -35,26 +42,24 @@ vec3 face(float sigma_0)
 
 #if SURFACE_KIND == CONDUCTOR
 
-float mirror_of(vec2 index, float k, float sigma_0)
-{
-    float sharp = sharpness(k, sigma_0);
 #ifdef COATED
-    return mirror_share * visible(sharp, 0.0)
-           * coated_mirror(mirror_wi, mirror_wo, index, coat, mirror_ends.x, mirror_ends.y);
-#else
-    return mirror_share * visible(sharp, grazing_slope(index, sharp));
-#endif
+float coated_power_of(vec2 index, float sigma_0)
+{
+    return coated_mirror(mirror_wi, mirror_wo, mirrored(sigma_0), index, coat, mirror_ends.x,
+                         mirror_ends.y);
 }
+#endif
 
 // Factor of order 0 at one wavenumber, to be multiplied by `boundary_at_all`.
 float mirror_at(float cos_half, float k, float sigma_0)
 {
-    vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
 #ifdef COATED
-    return mirror_of(index, k, sigma_0);
+    vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
+    float reflected = coated_power_of(index, sigma_0);
 #else
-    return mirror_of(index, k, sigma_0) * reflectance_at(cos_half, k);
+    float reflected = reflectance_at(mirrored(sigma_0), k);
 #endif
+    return mirror_share * visible(k, sigma_0) * reflected;
 }
 
 // Factor of order 0 in each channel.
@@ -62,29 +67,34 @@ vec3 mirror(float cos_half, float sigma_0)
 {
     vec3 found;
     for (int n = 0; n < 3; ++n) {
-        vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] = mirror_of(index, channel_wavenumbers[n], sigma_0);
+        found[n] = mirror_share * visible(channel_wavenumbers[n], sigma_0);
 #ifdef COATED
-        found[n] /= max(interface_reflectance(cos_half, index), 1e-20);
+        vec2 index = vec2(channel_eta[n], channel_k[n]);
+        found[n] *= coated_power_of(index, sigma_0)
+                    / max(interface_reflectance(cos_half, index), 1e-20);
 #endif
     }
+#ifdef COATED
     return found * reflectance(cos_half);
+#else
+    return found * reflectance(mirrored(sigma_0));
+#endif
 }
 
 #else
 
 float mirror_at(float cos_half, float k, float sigma_0)
 {
-    float sharp = sharpness(k, sigma_0);
+    float share = mirror_share * visible(k, sigma_0);
 #if defined(COATED)
-    return mirror_share * visible(sharp, 0.0)
-           * coated_mirror(mirror_wi, mirror_wo, eta, coat, mirror_ends.x, mirror_ends.y);
+    return share * coated_mirror(mirror_wi, mirror_wo, mirrored(sigma_0), eta, coat, mirror_ends.x,
+                                 mirror_ends.y);
 #elif SURFACE_KIND == PERFECT
-    return mirror_share * visible(sharp, 0.0);
+    return share;
 #elif defined(BOUNDARY)
-    return mirror_share * visible(sharp, grazing_slope(eta, sharp)) * reflectance_at_all(cos_half);
+    return share * reflectance_at_all(mirrored(sigma_0));
 #else
-    return mirror_share * visible(sharp, grazing_slope(eta, sharp));
+    return share * reflectance_at_all(mirrored(sigma_0)) / max(reflectance_at_all(cos_half), 1e-20);
 #endif
 }
 

@@ -10,8 +10,10 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     float ratio = one_plus_dot / sum.z;
     float outside = area * ratio * ratio / wi.z;
     vec2 outer = vec2(wi.z, wo.z);
+#ifdef ORDER_0
+    mirror_half = sqrt(min(0.5 * one_plus_dot, 1.0));
+#endif
 #ifdef COATED
-    float face = face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     wi = refracted(wi, coat);
     wo = refracted(wo, coat);
     sum = wi + wo;
@@ -37,7 +39,7 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
 #ifdef COATED
     mirror_wi = wi;
     mirror_wo = wo;
-    face_share = area * outer.y * face / outside;
+    face_share = area * outer.y / outside;
 #endif
 #endif
     place.zw = vec2(sum.z * height_scale, sqrt(min(0.5 * one_plus_dot, 1.0)));
