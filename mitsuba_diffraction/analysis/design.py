@@ -3,7 +3,9 @@
 A phase screen exp(iκh) has the orders a_j(κ). The BRDF of a pair of directions, averaged over all
 positions of the window (see `reference`), is
 
-    f = factor · 4π²σ⁴ Σ_j |a_j|² exp(−σ²|q − q_j|²).
+    f = factor · 4π²σ⁴ Σ_j≠0 |a_j|² exp(−σ²|q − q_j|²) + |a_0|² f_flat,
+
+with the BRDF f_flat of a flat patch.
 
 A loss L of many such f changes with the heights by the adjoint of the DFT, one more DFT per κ:
 
@@ -26,7 +28,9 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField, check_pixel_count
 from ..heights.lengths import PixelSize
 from ..optics import colour
-from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
+from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
+from ..reference.arguments import directions_of, index_of
+from ..reference.fresnel import reflectance
 
 Real = NDArray[np.float64]
 #: Loss of BRDFs (n,): returns its value and its derivatives (n,).
@@ -37,8 +41,6 @@ WAVELENGTHS = tuple(float(x) for x in range(400, 701, 20))
 
 _ALL = slice(None)
 _AT_ONCE = 2**20  # pixels of the screens that `Views.brdf` evaluates at a time, 40 MB
-_UP = (0.0, 0.0, 1.0)
-_NARROW = 1e-3  # µm: under so small a σ a flat patch has one BRDF in all directions
 
 
 class Views:
@@ -65,22 +67,23 @@ class Views:
         eta: ArrayLike | None = None,
         k: ArrayLike = 0.0,
     ) -> None:
-        _flat_brdf(_UP, _UP, 550.0, coherence_width)  # checks the width
-        # the factor of the BRDF that depends neither on heights nor, divided by σ², on the window
-        narrow = _flat_brdf(wi, wo, wavelength, 4 * _NARROW, eta, k)
-        sigma = sigma_of(coherence_width)
-        u, v, w = diffraction_coordinates(wi, wo)
-        wave = wavenumber(wavelength)
+        self._flat = _flat_brdf(wi, wo, wavelength, coherence_width, eta, k)
+        sigma, light = sigma_of(coherence_width), directions_of(wi, wo, wavelength)
+        u, v, w = diffraction_coordinates(light.wi, light.wo)
+        wave = wavenumber(light.wavelength)
         self.shape, self.pixel_size = patch.shape, patch.pixel_size
-        self.kappa, alpha, beta = (np.broadcast_to(wave * x, narrow.shape) for x in (w, u, v))
-        self._factor = narrow * np.exp(_NARROW**2 * (alpha**2 + beta**2)) * (sigma / _NARROW) ** 2
+        self.kappa, alpha, beta = wave * w, wave * u, wave * v
+        self._factor = kirchhoff_factor(*light, sigma) * 4 * np.pi**2 * sigma**4
+        index = index_of(eta, k, light.wavelength, None)
+        if index is not None:
+            self._factor *= reflectance(0.5 * np.sqrt(u**2 + v**2 + w**2), index)
         self._window_x, self._window_y = (
             np.exp(-((sigma * (q[:, None] - 2 * np.pi * fft.fftfreq(n, pixel))) ** 2))
             for q, n, pixel in zip((alpha, beta), self.shape[::-1], self.pixel_size, strict=True)
         )
 
     def __len__(self) -> int:
-        return len(self._factor)
+        return len(self._flat)
 
     def brdf(self, heights: ArrayLike) -> Real:
         """Return the BRDF (n,) of heights (ny, nx) in µm, 1/sr."""
@@ -95,7 +98,9 @@ class Views:
         orders = fft.ifft2(screens)
         value, derivatives = loss(self._brdf(orders))
         weights = (self._factor * derivatives)[:, None] * self._window_y
+        zeroth = self._flat * derivatives * orders[:, 0, 0]
         orders *= np.einsum("ny,nx->nyx", weights, self._window_x)
+        orders[:, 0, 0] = zeroth
         adjoint = fft.fft2(orders, overwrite_x=True)
         imaginary = screens.imag * adjoint.real - screens.real * adjoint.imag
         return value, -2.0 / screens[0].size * np.einsum("n,nyx->yx", self.kappa, imaginary)
@@ -110,8 +115,11 @@ class Views:
     def _brdf(self, orders: NDArray[np.complex128], part: slice = _ALL) -> Real:
         """Return the BRDF (n,) of some pairs from the amplitudes of the orders (n, ny, nx)."""
         powers = orders.real**2 + orders.imag**2
+        zeroth = self._flat[part] * powers[:, 0, 0]
+        powers[:, 0, 0] = 0.0
         rows = np.einsum("nyx,nx->ny", powers, self._window_x[part])
-        return np.asarray(self._factor[part] * np.einsum("ny,ny->n", rows, self._window_y[part]))
+        others = self._factor[part] * np.einsum("ny,ny->n", rows, self._window_y[part])
+        return np.asarray(others + zeroth)
 
 
 def _flat_brdf(
@@ -122,7 +130,7 @@ def _flat_brdf(
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
 ) -> Real:
-    """Return the reference BRDF of a flat patch; checks all arguments."""
+    """Return the reference BRDF of a flat patch, a mirror's lobe; checks all arguments."""
     flat = HeightField(np.zeros((2, 2)), 1.0)
     return reference.brdf(
         flat, wi, wo, wavelength, coherence_width=width, model="kirchhoff", eta=eta, k=k

@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError, check_choice
 from ..llvm import require_loaded_llvm
 from ..optics.colour import LONGEST, SHORTEST
-from ..optics.geometry import kirchhoff_factor, wavenumber
+from ..optics.geometry import wavenumber
+from ..optics.mirror import horizon_correction
 from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ..plugin.memory import upload
 from ..progress import Progress, silent
@@ -294,17 +295,17 @@ def _stokes(light: Reals, across: Reals) -> Reals:
 def _of_mirror(sigma: float | None, geometry: MeasurementGeometry, lam: Reals) -> Reals:
     """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to.
 
-    Its f is Kirchhoff's factor times ⟨|P|²⟩ = 4π²σ⁴ exp(−σ²q²), eq. 3 and 4 of `reference.model`.
+    Its f is f_0 of `optics.mirror` for R = 1.
     """
     if sigma is None:
         return np.ones((lam.size, 1))
     directions, solid = cone(geometry, geometry.light, lobe_width(sigma, lam))
     light = light_direction(geometry)
     squares = np.square(directions[:, :2] + light[:2]).sum(axis=1)
-    weights = 4.0 * np.pi**2 * sigma**4 * solid * directions[:, 2]
-    signals = [
-        kirchhoff_factor(light, directions, each, sigma)
-        @ (weights * np.exp(-np.square(sigma * wavenumber(each)) * squares))
-        for each in lam
-    ]
-    return np.array(signals)[:, None]
+    weights = (solid * directions[:, 2])[:, None]
+    level_i, level_o = sigma * light[2] ** 2, sigma * directions[:, 2] ** 2
+    signals = []
+    for k in wavenumber(lam):
+        lobe = (sigma * k) ** 2 / np.pi * np.exp(-squares * (sigma * k) ** 2)
+        signals.append(lobe * horizon_correction(level_i, level_o, k) @ weights)
+    return np.array(signals)

@@ -28,7 +28,7 @@ from mitsuba_diffraction.reference.fresnel import amplitudes
 from . import integral, rayleigh
 from .cases import ALUMINIUM, COAT, FEW_WAVELENGTHS, PROFILES, Grating, Scan, index_of, order_sines
 from .compare import compare
-from .model import efficiencies, in_plane, jones_of, lobe_sigma, shares
+from .model import LOBE_SIGMA, efficiencies, in_plane, jones_of, shares
 from .solutions import ROW, Solutions, load, save_rows
 
 Real = NDArray[np.float64]
@@ -194,7 +194,7 @@ def _once(grating: Grating, theta: float, wavelength: float) -> Real:
     sine, field = np.sin(np.radians(theta)), grating.heights()
     light = in_plane(sine / COAT), in_plane(sines / COAT), wavelength / COAT
     index = index_of(MATERIAL, wavelength / COAT)
-    inside = efficiencies(field, index, *light, "small_slope", sigma=lobe_sigma(grating))
+    inside = efficiencies(field, index, *light, "small_slope", sigma=LOBE_SIGMA)
     by_light = inside[:, None] * shares(jones_of(field, index, *light, "small_slope"))
     through = np.stack(
         [

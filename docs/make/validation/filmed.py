@@ -30,7 +30,7 @@ from mitsuba_diffraction.reference.fresnel import decaying_root
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
 from .compare import GRAZING
-from .model import in_plane, lobe_sigma
+from .model import LOBE_SIGMA, in_plane
 from .solutions import ROW, Solutions, load, save_rows
 
 Complex = NDArray[np.complex128]
@@ -189,13 +189,13 @@ def compare_models(stack: Stack) -> FilmDeviations:
 def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, model: str) -> Real:
     """The model's efficiencies of the orders, for unpolarised light."""
     _, sines = order_sines(grating.period, wavelength, theta)
-    sigma, index = lobe_sigma(grating), stack.index[wavelength]
+    index = stack.index[wavelength]
     brdf = reference.brdf(
         grating.heights(), in_plane(np.sin(np.radians(theta))), in_plane(sines), wavelength,
-        coherence_width=WIDTHS_PER_SIGMA * sigma, model=model,
+        coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
         eta=index.real, k=index.imag, film=(stack.film, stack.thickness),
     )  # fmt: skip
-    return np.asarray(brdf * np.pi / (sigma * float(wavenumber(wavelength))) ** 2)
+    return np.asarray(brdf * np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2)
 
 
 class Beyond(NamedTuple):

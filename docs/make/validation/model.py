@@ -9,7 +9,7 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
 
     η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
-For a mirror this is R; for m = 0 of any grating R·|a_0|². Kirchhoff's model has
+For a mirror this is R; for m = 0 of any grating R·|a_0|², eq. 10 with C = 1. Kirchhoff's model has
 R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.boundary`.
 """
 
@@ -27,8 +27,9 @@ from mitsuba_diffraction.reference import boundary
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
-# Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
-_SIGMA_PER_PERIOD = 1.0
+#: σ (µm) of a window through which the lobes of gratings are separate, up to periods of 1 mm, and
+#: order 0's lies above the horizon: √(kσ) cosθ is above 20 up to 75°, so C of eq. 10 is 1.
+LOBE_SIGMA = 1000.0
 
 #: As the plugin has them, and the small-slope matrix alone, or in equal parts with Kirchhoff.
 MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
@@ -57,7 +58,7 @@ def order_efficiencies(
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        _period(grating), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating), coat=coat
+        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, coat=coat
     )
 
 
@@ -155,11 +156,6 @@ def order_shares(
     return shares(jones_of(field, index, wi, wo, wavelength, model))
 
 
-def lobe_sigma(grating: Grating) -> float:
-    """Standard deviation σ (µm) of a window through which the grating's lobes are separate."""
-    return _SIGMA_PER_PERIOD * grating.period
-
-
 def lobe_peaks(
     grating: Grating,
     wi: NDArray[np.float64],
@@ -167,7 +163,7 @@ def lobe_peaks(
     wavelength: float,
     pixels: int = PIXELS,
 ) -> NDArray[np.float64]:
-    """The BRDF (R = 1) at the centres of lobes, through a window of `lobe_sigma`.
+    """The BRDF (R = 1) at the centres of lobes, through a window of `LOBE_SIGMA`.
 
     Parameters
     ----------
@@ -179,7 +175,7 @@ def lobe_peaks(
     -------
     (n,) in 1/sr.
     """
-    width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
+    width = WIDTHS_PER_SIGMA * LOBE_SIGMA
     return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
 
 

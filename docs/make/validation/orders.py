@@ -27,7 +27,7 @@ from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
 from .cases import PIXELS
-from .model import efficiencies
+from .model import LOBE_SIGMA, efficiencies
 from .published import light_of
 
 Real = NDArray[np.float64]
@@ -194,7 +194,7 @@ class Case:
         x = order * inside / 1e3 / table.period - wi[0]
         wo = np.stack([x, np.full(len(x), -wi[1]), np.sqrt(1 - x**2 - wi[1] ** 2)], axis=-1)
         index = self._index(wavelength)
-        model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=table.period)
+        model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=LOBE_SIGMA)
         solved = table.efficiency(-wi[0], wi[1], wavelength, order)
         return _Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
 

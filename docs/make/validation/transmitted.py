@@ -22,7 +22,7 @@ from mitsuba_diffraction.reference import boundary
 from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
 from .compare import GRAZING
-from .model import lobe_sigma
+from .model import LOBE_SIGMA
 
 Real = NDArray[np.float64]
 
@@ -67,12 +67,11 @@ def orders_of(
     wi = np.array([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)])
     exact = rayleigh.through(field, KERATIN, wavelength, wi, _HARMONICS)
     cosines = -KERATIN * exact.wo[:, 2]
-    sigma = lobe_sigma(grating)
     btdf = reference.btdf(
         field, wi, exact.wo, wavelength,
-        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model,
+        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
     )  # fmt: skip
-    per_btdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
+    per_btdf = np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2
     return Orders(
         per_btdf * btdf,
         boundary.unpolarised(exact.jones) * cosines / wi[2],

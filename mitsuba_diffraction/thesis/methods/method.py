@@ -304,7 +304,8 @@ class FullSpectrum(UniformMethod):
     3. S = |P|² (`coherence="patch"`), or Σ_j g_j²·|a_j|² (`ensemble`). The terms are summed
        before they are squared.
     4. XYZ = Σ_k step·(½ at both ends)·f(λ_k)·s̄(λ_k), where
-       f = (1 + ωi·ωo)²·4πσ²·S/(λ_k² w² cosθi cosθo), or C·S for relative reflectance.
+       f = (1 + ωi·ωo)²·4πσ²·S/(λ_k² w² cosθi cosθo), or C·S for relative reflectance. Order 0
+       of f is the mirror's lobe of the model instead (`tables.lookup.brdf`).
 
     `default` reads |a_j|² (or a_j) from the series in κ of `tables.expansion` instead.
 
@@ -339,3 +340,9 @@ class FullSpectrum(UniformMethod):
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         return self.table.window_sum(k * u, k * v, k * w)
+
+    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+        """Return f of the table, or ρ with a gain factor."""
+        if gain is None:
+            return self.table.brdf(wi, wo, wavelength)
+        return super()._scaled(wi, wo, wavelength, gain)

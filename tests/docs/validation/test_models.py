@@ -7,7 +7,7 @@ import pytest
 
 from docs.make.validation.cases import PROFILES, Grating, index_of, order_sines
 from docs.make.validation.compare import angles_of, compare, gratings_of, table_of
-from docs.make.validation.model import in_plane, lobe_sigma
+from docs.make.validation.model import LOBE_SIGMA, in_plane
 from docs.make.validation.models import ANGLES, banded, of_colours
 from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import reference
@@ -51,9 +51,9 @@ def polarised_errors(depth: float, rows, model: str) -> np.ndarray:
     grating, index = Grating("sinusoidal", 2.5, depth), index_of("aluminium", 610.0)
     _, sines = order_sines(2.5, 610.0, 60.0)
     wi, wo = in_plane(np.sin(np.radians(60.0))), in_plane(sines)
-    lobe = np.pi / (lobe_sigma(grating) * wavenumber(610.0)) ** 2
+    lobe = np.pi / (LOBE_SIGMA * wavenumber(610.0)) ** 2
     matrices = lobe * reference.mueller(
-        grating.heights(), wi, wo, 610.0, coherence_width=4 * lobe_sigma(grating),
+        grating.heights(), wi, wo, 610.0, coherence_width=4 * LOBE_SIGMA,
         model=model, eta=index.real, k=index.imag,
     )  # fmt: skip
     counted = (rows["order"] != 0) & (np.abs(sines) < np.sin(np.radians(75.0)))
