@@ -18,8 +18,7 @@ mean of R(θm) over the lobe is R(θi). h solves
 
     ∫ p(Y|X) exp(−X/2 − Y/2 + h(X) + h(Y)) dY = exp(−X),   p(Y|X) = C(X) C(Y) Y/√π exp(…),
 
-for the reflectance exp(−X), as dielectrics under narrow windows have it. It is taken at 550 nm for
-all wavelengths, so that materials without dispersion have one R(θm). f₀ is reciprocal.
+for the reflectance exp(−X), as dielectrics under narrow windows have it. f₀ is reciprocal.
 
 `reference.mirror` solves both equations. Here are fits: of C with an error of 0.003, and of h with
 one of 0.01, which changes R by up to 0.02 where R falls most steeply.
@@ -31,8 +30,6 @@ from .arithmetic import Number, formula, of
 from .boundary import Geometry, Jones, facets
 from .fresnel import Index, amplitudes
 
-#: rad/µm of 550 nm, at which the angle θm is taken.
-WAVENUMBER = 11.423973285781066
 #: Least cosθm: 1 − cos² is below 1 in single precision, where an index of 1 is to reflect nothing.
 LEAST_COSINE = 1e-3
 # Where C is 1, and h is 0
@@ -57,12 +54,12 @@ def _correction(k: Number, level: Number) -> Number:
 
 
 @formula
-def mirror_cosine(cos_half: Number, cos_i: Number, cos_o: Number, sigma_0: Number) -> Number:
-    """Return cosθm of the half vector's cosine and of both directions; σ₀ in µm."""
-    xp = of(cos_i, cos_o, sigma_0)
-    sharpness = xp.sqrt(WAVENUMBER * sigma_0)
-    shift = _shift(cos_i, sharpness) + _shift(cos_o, sharpness)
-    return xp.clip(cos_half - shift * xp.reciprocal(sharpness), LEAST_COSINE, 1.0)
+def mirror_cosine(cos_half: Number, cos_i: Number, cos_o: Number, sharpness: Number) -> Number:
+    """Return cosθm of the half vector's cosine, of both directions, and of kσ₀."""
+    xp = of(cos_i, cos_o, sharpness)
+    root = xp.sqrt(sharpness)
+    shift = _shift(cos_i, root) + _shift(cos_o, root)
+    return xp.clip(cos_half - shift * xp.reciprocal(root), LEAST_COSINE, 1.0)
 
 
 def _shift(cosine: Number, sharpness: Number) -> Number:

@@ -183,7 +183,7 @@ class Path:
             return visible, none
         wi, wo = directions(cos_i, cos_o, cos_turn)
         pair, n = boundary.geometry(wi, wo), np.asarray(self.came.at_structure)
-        cosine = mirror_cosine(pair.cos_half, cos_i, cos_o, np.asarray(sigma_0))
+        cosine = mirror_cosine(pair.cos_half, cos_i, cos_o, np.asarray(k * sigma_0))
         if not self.thin:
             return visible * reflectance(cosine, self.index), none
         face = visible * reflectance(cosine, n)

@@ -133,15 +133,20 @@ class Boundary:
         visible = mi.UnpolarizedSpectrum([horizon_correction(into, out, k) for k in wavenumbers])
         if isinstance(self.material, Perfect):
             return mi.depolarizer(visible)
-        cosine = mirror_cosine(outer.cos_half, outer.cos_i, outer.cos_o, width)
+        cosines = [
+            mirror_cosine(outer.cos_half, outer.cos_i, outer.cos_o, k * width)
+            for k in self.material.wavenumbers(wavenumbers)
+        ]
         light = LightPath.of(pair, mode)
         if isinstance(pair, CoatedPair):
-            cosine = cosine_within(cosine, pair.n)
-        elif not mi.is_polarized:
-            powers = [reflectance(cosine, index) for index in indices]
+            cosines = [cosine_within(cosine, pair.n) for cosine in cosines]
+        channels = _side_by_side(indices, cosines)
+        if not (mi.is_polarized or light.passed):
+            powers = [reflectance(cosine, index) for index, cosine in channels]
             return self.material.channels(powers) * visible
-        matrices = [mirror(light.pair, cosine, index) for index in indices]
-        return mi.Spectrum(visible) * self._of_matrices(light, matrices, indices)
+        matrices = [mirror(light.pair, cosine, index) for index, cosine in channels]
+        of_each = [index for index, _ in channels]
+        return mi.Spectrum(visible) * self._of_matrices(light, matrices, of_each)
 
     def _of_matrices(
         self, light: LightPath, matrices: list[Jones], indices: list[Number]

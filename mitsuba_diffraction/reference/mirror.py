@@ -49,7 +49,8 @@ def horizon_correction(light: Any, sigma: float) -> Real:
 def mirror_cosine(light: Any, sigma: float) -> Real:
     """Return cosθm (n,) of `model.Light`."""
     half = 0.5 * np.linalg.norm(light.wi + light.wo, axis=1)
-    return np.asarray(mirror.mirror_cosine(half, light.wi[:, 2], light.wo[:, 2], np.float64(sigma)))
+    sharpness = sigma * wavenumber(light.wavelength)
+    return np.asarray(mirror.mirror_cosine(half, light.wi[:, 2], light.wo[:, 2], sharpness))
 
 
 def interfering(others: Real, zeroth: Real, cosine: Real) -> Real:

@@ -8,13 +8,14 @@ import pytest
 from mitsuba_diffraction.optics.boundary import geometry, power
 from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.optics.mirror import (
-    WAVENUMBER,
     horizon_correction,
     mirror,
     mirror_cosine,
 )
 from mitsuba_diffraction.reference import mirror as judge
 
+#: 2π/λ of 550 nm, rad/µm.
+WAVENUMBER = 2e3 * np.pi / 550.0
 #: Widths of windows in µm at 550 nm, as kσ₀.
 SHARPNESS = [2e3 * np.pi / 550.0 * width / 4.0 for width in (6.4, 12.0, 65.0)]
 INDICES = {"perfect": None, "Al": 0.96 + 6.69j, "Au": 0.43 + 2.4j, "glass": 1.5, "water": 1.33}
@@ -35,7 +36,7 @@ def albedo(sharp: float, degrees: float, index: complex | None) -> float:
     cos_i, sigma_0 = np.full_like(cos_o, np.cos(theta)), np.float64(sharp / WAVENUMBER)
     if index is not None:
         dot = cos_i * cos_o - sine * sin_o * np.cos(turn)
-        cosine = mirror_cosine(np.sqrt(0.5 * (1.0 + dot)), cos_i, cos_o, sigma_0)
+        cosine = mirror_cosine(np.sqrt(0.5 * (1.0 + dot)), cos_i, cos_o, np.float64(sharp))
         lobe *= reflectance(cosine, np.asarray(index))
     lobe *= horizon_correction(sigma_0 * cos_i**2, sigma_0 * cos_o**2, WAVENUMBER)
     return float(lobe.sum() * (last - first) * 2.0 * half / nodes**2)
@@ -46,9 +47,8 @@ def test_the_fits_are_those_of_the_fixed_points():
     far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 and h = 0 at the other end
     fitted = horizon_correction(x**2, far, one)
     assert np.abs(fitted / c - 1.0).max() < 0.003
-    sigma_0 = 400.0 / WAVENUMBER  # X = 20 cosθ
-    there = x < 10.0
-    shift = 0.5 - mirror_cosine(0.5, x[there] / 20.0, far[there], np.float64(sigma_0))
+    there = x < 10.0  # X = 20 cosθ
+    shift = 0.5 - mirror_cosine(0.5, x[there] / 20.0, far[there], np.float64(400.0))
     assert np.abs(20.0 * shift - h[there]).max() < 0.01
 
 

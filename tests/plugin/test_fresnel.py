@@ -10,7 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
-from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
 from mitsuba_diffraction.optics.mirror import mirror_cosine
 from mitsuba_diffraction.plugin.conductors import tabulated_index
 from tests.support.directions import as_single, polar, uniform_directions
@@ -39,7 +39,7 @@ def mirror_cosines(wi, wo):
     """cosθ at which the lobe has its reflectance: of the half vector, but near the horizon."""
     half = wi + wo
     cosine = np.sum(wi * half, axis=-1) / np.linalg.norm(half, axis=-1)
-    return mirror_cosine(cosine, wi[..., 2], wo[..., 2], np.float64(sigma_of(WIDTH)))
+    return mirror_cosine(cosine, wi[..., 2], wo[..., 2], wavenumber(550.0) * sigma_of(WIDTH))
 
 
 def dielectric(cos_theta, eta):

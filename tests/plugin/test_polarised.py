@@ -99,7 +99,8 @@ def test_matrices_are_the_reference_s(polarised, model, material):
 def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mode):
     flat = md.HeightField(np.zeros((40, 40)), 0.08)
     mode = getattr(mi.TransportMode, mode)
-    smooth, bsdf, mirror = mi.load_dict(theirs), load(flat, **ours), load(flat, material="none")
+    smooth, wide = mi.load_dict(theirs), {"coherence_width": 65.0}  # a lobe far from the horizon
+    bsdf, mirror = load(flat, **ours, **wide), load(flat, material="none", **wide)
     for theta, phi in ((0.0, 0.0), (30.0, 10.0), (56.0, 100.0), (75.0, 200.0)):
         wi = as_single(polar(theta, phi))[None]
         wo = wi * [-1, -1, 1]
@@ -120,7 +121,9 @@ def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, 
     mode = getattr(mi.TransportMode, mode)
     smooth, bsdf = (
         mi.load_dict({"type": "dielectric", **n}),
-        load(flat, plugin="diffraction_dielectric", **n),
+        load(
+            flat, plugin="diffraction_dielectric", coherence_width=65.0, **n
+        ),  # far from the horizon
     )
     wi, scalar = as_single(polar(theta, 70.0))[None], not dr.is_jit_v(mi.Float)
     si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])

@@ -8,7 +8,7 @@ g = (κ·rms)², a coherent part exp(−g) at q = 0 and the density
 
 (Beckmann and Spizzichino 1963, section 5.3). Seen through the window, whose power
 spectrum is a Gaussian exp(−σ²q²), both broaden; Gaussians convolve to Gaussians, so the sum stays
-closed.
+closed. The coherent part is the mirror's lobe of docs/theory.md, eq. 10.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from mitsuba_diffraction.optics.geometry import (
     sigma_of,
     wavenumber,
 )
+from mitsuba_diffraction.optics.mirror import horizon_correction
 
 # gⁿ/n! falls below the last bit by n = g + 9√g + 40 for every g
 _EXTRA_TERMS, _SPREAD = 40, 9
@@ -85,8 +86,7 @@ def mean_brdf(
     u, v, w = diffraction_coordinates(wi, wo)
     q2 = (k * u) ** 2 + (k * v) ** 2
     g = (k * w * roughness.rms) ** 2
-    power = np.exp(-g - sigma**2 * q2)  # the coherent part
-    weight = np.exp(-g)
+    power, weight = np.zeros_like(g), np.exp(-g)
     for n in range(1, _terms(float(np.max(g))) + 1):
         weight = weight * g / n
         # ∫ S(q') exp(−σ²|q − q'|²) d²q'/4π², a Gaussian of variances T²/4n and σ² combined
@@ -94,7 +94,11 @@ def mean_brdf(
         total = sigma**2 + narrow
         power += weight * narrow / total * np.exp(-q2 * sigma**2 * narrow / total)
     factor = kirchhoff_factor(wi, wo, wavelength, sigma)
-    return factor * 4 * np.pi**2 * sigma**4 * power
+    # the coherent part, order 0: a mirror's lobe
+    cos_i, cos_o = (np.asarray(each)[..., 2] for each in (wi, wo))
+    visible = horizon_correction(sigma * cos_i**2, sigma * cos_o**2, k)
+    coherent = (k * sigma) ** 2 / np.pi * visible * np.exp(-g - sigma**2 * q2)
+    return np.asarray(factor * 4 * np.pi**2 * sigma**4 * power + coherent)
 
 
 def _terms(g: float) -> int:

@@ -124,6 +124,8 @@ class Method(ABC):
     def brdf(self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Array:
         """Return the BRDF f = (1 + ωi·ωo)²·4πσ²·S / (λ² w² cosθi cosθo) in 1/sr, shape (n,).
 
+        `FullSpectrum` has the mirror's lobe as order 0 (`tables.lookup.brdf`).
+
         wavelength : (n,) or scalar, nm.
         """
         return self._value(wi, wo, wavelength, None)

@@ -19,16 +19,16 @@ float visible(float k, float sigma_0)
 }
 
 // cosθm outside of a coat.
-float mirrored(float sigma_0)
+float mirrored(float k, float sigma_0)
 {
-    return mirror_cosine(mirror_half, mirror_ends.x, mirror_ends.y, on_surface(sigma_0));
+    return mirror_cosine(mirror_half, mirror_ends.x, mirror_ends.y, k * on_surface(sigma_0));
 }
 
 #ifdef COATED
 
 float face_at(float k, float sigma_0)
 {
-    return face_share * face_reflectance(mirrored(sigma_0)) * visible(k, sigma_0);
+    return face_share * face_reflectance(mirrored(k, sigma_0)) * visible(k, sigma_0);
 }
 
 vec3 face(float sigma_0)
@@ -43,9 +43,9 @@ vec3 face(float sigma_0)
 #if SURFACE_KIND == CONDUCTOR
 
 #ifdef COATED
-float coated_power_of(vec2 index, float sigma_0)
+float coated_power_of(vec2 index, float k, float sigma_0)
 {
-    return coated_mirror(mirror_wi, mirror_wo, mirrored(sigma_0), index, coat, mirror_ends.x,
+    return coated_mirror(mirror_wi, mirror_wo, mirrored(k, sigma_0), index, coat, mirror_ends.x,
                          mirror_ends.y);
 }
 #endif
@@ -55,9 +55,9 @@ float mirror_at(float cos_half, float k, float sigma_0)
 {
 #ifdef COATED
     vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
-    float reflected = coated_power_of(index, sigma_0);
+    float reflected = coated_power_of(index, k, sigma_0);
 #else
-    float reflected = reflectance_at(mirrored(sigma_0), k);
+    float reflected = reflectance_at(mirrored(k, sigma_0), k);
 #endif
     return mirror_share * visible(k, sigma_0) * reflected;
 }
@@ -70,14 +70,16 @@ vec3 mirror(float cos_half, float sigma_0)
         found[n] = mirror_share * visible(channel_wavenumbers[n], sigma_0);
 #ifdef COATED
         vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] *= coated_power_of(index, sigma_0)
+        found[n] *= coated_power_of(index, channel_wavenumbers[n], sigma_0)
                     / max(interface_reflectance(cos_half, index), 1e-20);
+#else
+        found[n] *= reflectance(mirrored(channel_wavenumbers[n], sigma_0))[n];
 #endif
     }
 #ifdef COATED
     return found * reflectance(cos_half);
 #else
-    return found * reflectance(mirrored(sigma_0));
+    return found;
 #endif
 }
 
@@ -87,14 +89,14 @@ float mirror_at(float cos_half, float k, float sigma_0)
 {
     float share = mirror_share * visible(k, sigma_0);
 #if defined(COATED)
-    return share * coated_mirror(mirror_wi, mirror_wo, mirrored(sigma_0), eta, coat, mirror_ends.x,
+    return share * coated_mirror(mirror_wi, mirror_wo, mirrored(k, sigma_0), eta, coat, mirror_ends.x,
                                  mirror_ends.y);
 #elif SURFACE_KIND == PERFECT
     return share;
 #elif defined(BOUNDARY)
-    return share * reflectance_at_all(mirrored(sigma_0));
+    return share * reflectance_at_all(mirrored(k, sigma_0));
 #else
-    return share * reflectance_at_all(mirrored(sigma_0)) / max(reflectance_at_all(cos_half), 1e-20);
+    return share * reflectance_at_all(mirrored(k, sigma_0)) / max(reflectance_at_all(cos_half), 1e-20);
 #endif
 }
 
