@@ -69,9 +69,8 @@ class DeviceTable:
     def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
         others, zeroth, *cosine = self.window_sums(qx, qy, kappa)
-        return (
-            others + zeroth + sum(2.0 * each * dr.sqrt(others) * dr.sqrt(zeroth) for each in cosine)
-        )
+        lengths = [dr.sqrt(maximum(each, 1e-30)) for each in (others, zeroth)]  # with derivatives
+        return others + zeroth + sum(2.0 * each * lengths[0] * lengths[1] for each in cosine)
 
     def window_sums(
         self, qx: Float, qy: Float, kappa: Float, windows: Sequence[PlacedWindow] = ()
@@ -105,7 +104,7 @@ class DeviceTable:
             rest = [part * self._inverse_scale for part in total]
             others, zeroth = (dr.square(x) + dr.square(y) for x, y in (rest, centre))
             both = rest[0] * centre[0] + rest[1] * centre[1]
-            lengths = [dr.rsqrt(maximum(each, 1e-30)) for each in (others, zeroth)]
+            lengths = [dr.rsqrt(maximum(each, 1e-20)) for each in (others, zeroth)]
             cosine = [both * lengths[0] * lengths[1]]
         else:
             if self.record.components == 2:

