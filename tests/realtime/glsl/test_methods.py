@@ -234,7 +234,8 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
     lam = np.array([360.0, 500.0, 520.0, 830.0])
     eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
     at = places(60)
-    at[:, 3] = np.linspace(0.2, 1.0, 60)
+    at = at[np.hypot(at[:, 0], at[:, 1]) > 0.1]  # beside order 0, which has an angle of its own
+    at[:, 3] = np.linspace(0.2, 1.0, len(at))
     packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
     found = probed(gl, "exact", packed, at)
 
@@ -242,9 +243,10 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
     index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
     reflected = reflectance(at[:, 3], index[:, None])
     exact = np.array(
-        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(60)]
+        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(len(at))]
     )
-    assert difference(found, exact) < 8e-3  # as for a perfect mirror
+    # 64 wavelengths of the reflectance's table; a perfect mirror's is below 2e-3
+    assert difference(found, exact) < 8e-3
 
 
 @pytest.mark.parametrize("method", METHODS)
