@@ -192,7 +192,7 @@ class Surface:
 
     @property
     def wavelengths(self) -> tuple[float, float]:
-        """Shortest and longest wavelength of the light that the table reflects, nm."""
+        """Shortest and longest wavelength of a table of heights; of orders, that have light; nm."""
         table = self.table
         return table.wavelength_range if isinstance(table, DiffractionTable) else table.reach
 

@@ -69,8 +69,9 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
         table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
     if table.limited:
         x, y = table.frequency_limit
+        shown = source.path.name if source.path else source.names[0]
         warn(
-            f"{source.files[0].name}: the table ends at the frequencies {x:.4g} along x and "
+            f"{shown}: the table ends at the frequencies {x:.4g} along x and "
             f"{y:.4g} rad/µm along y (frequency_limit): light that the surface sends beyond is "
             "missing"
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..plugin.description import Surface
+from ..plugin.power import INFRARED
 from ..plugin.sources import SHORTEST_WAVELENGTH
 from ..tables.source import TableRequest, providing
 from ..tables.table import DiffractionTable
@@ -103,9 +104,11 @@ def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -
 
 
 def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]]) -> None:
-    """Warn of each surface that is black at wavelengths that a camera records.
+    """Warn of each surface whose table lacks wavelengths that a camera records.
 
-    Colours need no warning: tables that miss visible light are refused or named when they load.
+    Light below a table's wavelengths is black; far above a table of heights it has the values of
+    the longest wavelength that is looked up. Colours need no warning: tables that miss visible
+    light are refused or named when they load.
 
     sensors : cameras of the scene.
     surfaces : surfaces that diffract, by the names of their shapes.
@@ -119,15 +122,38 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[S
         return
     first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
     for name, described in surfaces.items():
-        for solved, (low, high) in dict.fromkeys((s.solved, s.wavelengths) for s in described):
-            least, most = min(first, low), max(last, high)
-            if least < low - _MARGIN or most > high + _MARGIN:
-                wider = f"wavelength_range=({least:.4g}, {most:.4g}) (the command 'precompute')"
-                warn(
-                    f"{name} is black outside {low:.4g} to {high:.4g} nm, the range of its table, "
-                    f"and the camera records {first:.4g} to {last:.4g} nm; make the table with "
-                    f"{'a wider range of wavelengths' if solved else wider}"
-                )
+        for solved, served in dict.fromkeys((s.solved, s.wavelengths) for s in described):
+            if lacking := _lacking(solved, served, first, last):
+                warn(f"{name} {lacking}")
+
+
+def _lacking(solved: bool, served: tuple[float, float], first: float, last: float) -> str:
+    """Return what a table lacks of the light from `first` to `last` nm, and a remedy, or "".
+
+    served : shortest and longest wavelength of the table, nm.
+    """
+    low, high = served
+    begins_late = first < low - _MARGIN
+    if solved:
+        if not begins_late and last <= high + _MARGIN:
+            return ""
+        return (
+            f"is black outside {low:.4g} to {high:.4g} nm, the range of its table, and the camera "
+            f"records {first:.4g} to {last:.4g} nm; make the table with a wider range of "
+            "wavelengths"
+        )
+    most = high * INFRARED
+    ends_early = last > most + _MARGIN
+    faults = [f"is black below {low:.4g} nm, where its table begins"] if begins_late else []
+    if ends_early:
+        faults.append(f"has the values of {most:.4g} nm at all longer wavelengths")
+    if not faults:
+        return ""
+    wider = f"{first if begins_late else low:.4g}, {last if ends_early else high:.4g}"
+    return (
+        f"{' and '.join(faults)}, and the camera records {first:.4g} to {last:.4g} nm; make the "
+        f"table with wavelength_range=({wider}) (the command 'precompute')"
+    )
 
 
 def _recorded(sensor: Any) -> tuple[float, float]:

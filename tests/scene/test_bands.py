@@ -36,7 +36,6 @@ SCENE = """<scene version="3.0.0">
         <bsdf type="diffraction">
             <string name="heightfield" value="{heights}"/>
             <string name="pixel_size" value="{pixel}"/>
-            <string name="periodic" value="exact"/>
             <string name="level" value="none"/>
         </bsdf>
     </shape>
@@ -56,6 +55,7 @@ def scene(tmp_path):
     """A rough surface in light as strong at every wavelength."""
     field = rough_patch((48, 48), (PIXEL, PIXEL), 0.02)
     np.save(tmp_path / "heights.npy", field.heights)
+    field = md.HeightField.load(tmp_path / "heights.npy", pixel_size=PIXEL, level="none")
     camera, towards = 5.0 * polar(*CAMERA), -polar(*LIGHT)
     text = SCENE.format(
         camera=_text(camera), towards=_text(towards), heights="heights.npy", pixel=PIXEL
@@ -101,12 +101,25 @@ def test_tables_that_begin_at_longer_wavelengths_are_refused(scene, tmp_path):
     load_scene(file, {}, bands=SensorBands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
 
 
-#: A film's bands, nm, and whether each lies within the table's 360 to 830 nm.
+#: A film's bands, nm, and whether each has light: none below the table's 360 nm, and all above.
 RANGES = {
     "ultraviolet": {(200.0, 350.0): False},
-    "infrared": {(850.0, 1500.0): False},
-    "both and blue": {(200.0, 350.0): False, (400.0, 500.0): True, (850.0, 1500.0): False},
+    "infrared": {(850.0, 1500.0): True},
+    "both and blue": {(200.0, 350.0): False, (400.0, 500.0): True, (850.0, 1500.0): True},
     "visible": {(360.0, 500.0): True, (500.0, 830.0): True},
+    "heat": {(3000.0, 5000.0): True},
+    "all": {(200.0, 350.0): False, (3000.0, 5000.0): True},
+}
+DARK, HEAT = (
+    "is black below 360 nm, where its table begins",
+    "has the values of 3320 nm at all longer",
+)
+#: What the warning says of each, and its remedy; of the others there is none.
+WARNED = {
+    "ultraviolet": ([DARK], "(200, 830)"),
+    "both and blue": ([DARK], "(200, 830)"),
+    "heat": ([HEAT], "(360, 5000)"),
+    "all": ([DARK, HEAT], "(200, 5000)"),
 }
 
 
@@ -116,13 +129,14 @@ def _banded(file, spans, second=""):
         f'<spectrum name="b{n}" value="{a}:1, {b}:1"/>' for n, (a, b) in enumerate(spans)
     )
     text = file.read_text().replace('type="hdrfilm">', f'type="specfilm">{bands}')
-    text = text.replace("300:1, 830:1", "200:1, 1500:1")
+    text = text.replace("300:1, 830:1", "200:1, 5000:1")
     file.write_text(text.replace("<emitter", f"{second}<emitter"))
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
-@pytest.mark.parametrize("spans", RANGES.values(), ids=RANGES)
-def test_bands_outside_the_table_are_black_with_a_warning_for_each_surface(scene, variant, spans):
+@pytest.mark.parametrize("case", RANGES)
+def test_bands_that_the_table_lacks_have_a_warning_for_each_surface(scene, variant, case):
+    spans = RANGES[case]
     mi.set_variant(variant)
     _, file = scene
     text = file.read_text()
@@ -134,12 +148,15 @@ def test_bands_outside_the_table_are_black_with_a_warning_for_each_surface(scene
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", md.DiffractionWarning)
         loaded = load_scene(file, {})
-    lines = [str(w.message) for w in caught if "is black outside" in str(w.message)]
-    assert len(lines) == (0 if all(spans.values()) else 2)
+    lines = [str(w.message) for w in caught if "the camera records" in str(w.message)]
+    faults, remedy = WARNED.get(case, ([], ""))
+    assert len(lines) == (2 if faults else 0)
     first, last = min(a for a, _ in spans), max(b for _, b in spans)
     for number, line in enumerate(lines, start=1):
-        assert line.startswith(f"shape {number} (a rectangle without id) is black outside 360 to")
-        assert f"records {first:g} to {last:g} nm; make the table with Diffr" in line
+        assert line.startswith(f"shape {number} (a rectangle without id) {faults[0]}")
+        assert [fault in line for fault in (DARK, HEAT)] == [f in faults for f in (DARK, HEAT)]
+        assert f"records {first:g} to {last:g} nm; make the table with wavel" in line
+        assert f"wavelength_range={remedy} (the command" in line
     picture = np.array(mi.render(loaded, spp=16)).reshape(16, len(spans))
     assert np.isfinite(picture).all()
     assert ((picture > 0.0).any(axis=0) == list(spans.values())).all()

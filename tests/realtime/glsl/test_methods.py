@@ -124,7 +124,7 @@ def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable)
 
 def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
     table = DiffractionTable.build(SMALL_SCAN)
-    assert table.order_0_ratio > 30.0
+    assert table.order_0_ratio > 100.0
     at = places(600)
     # many in the lobe of the light, 0.3° wide
     at[::2, :2] = np.random.default_rng(3).normal(0.0, 0.006, (300, 2))
@@ -140,8 +140,7 @@ def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
             assert difference(found[part], expected[part]) < bound, method
     wider = window(Bindings(gl, pack_powers(table)), 130.0)
     assert wider["sigma"] == pytest.approx(table.sigma)
-    # the look-up's window of an open scan is twice the scan's
-    assert wider["order_0_ratio"] == pytest.approx((65.0 / table.window_width) ** 2)
+    assert wider["order_0_ratio"] == pytest.approx((130.0 / table.window_width) ** 2)
 
 
 def test_exact_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:
@@ -234,10 +233,9 @@ def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
 def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTable) -> None:
     lam = np.array([360.0, 500.0, 520.0, 830.0])
     eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
-    # beside order 0, whose angle is that of a mirror
-    at = places(200)
-    at = at[np.hypot(at[:, 0], at[:, 1]) > 0.05][:60]
-    at[:, 3] = np.linspace(0.2, 1.0, 60)
+    at = places(60)
+    at = at[np.hypot(at[:, 0], at[:, 1]) > 0.1]  # beside order 0, which has an angle of its own
+    at[:, 3] = np.linspace(0.2, 1.0, len(at))
     packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
     found = probed(gl, "exact", packed, at)
 
@@ -245,9 +243,10 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
     index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
     reflected = reflectance(at[:, 3], index[:, None])
     exact = np.array(
-        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(60)]
+        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(len(at))]
     )
-    assert difference(found, exact) < 8e-3  # as for a perfect mirror
+    # 64 wavelengths of the reflectance's table; a perfect mirror's is below 2e-3
+    assert difference(found, exact) < 8e-3
 
 
 @pytest.mark.parametrize("method", METHODS)

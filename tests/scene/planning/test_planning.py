@@ -21,6 +21,7 @@ from mitsuba_diffraction.scene.planning.plan import (
     recipe_of,
     record,
 )
+from mitsuba_diffraction.tables.source import TableRequest
 from tests.support.directions import polar, rough_patch
 
 # Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
@@ -185,10 +186,12 @@ def test_where_all_of_a_table_is_asked_for_it_stays_whole(traced):
     ones = np.ones(360)
     lookups = lookups_by_hand(u, v, ones, 360.0 * ones, ones / 360.0)
 
-    def build(settings):
-        raise AssertionError("a table is built")
+    class Unused(TableRequest):
+        def cached(self, settings):
+            raise AssertionError("a table is built")
 
-    request = dataclasses.replace(traced[1].request, build=build)
+    asked = traced[1].request
+    request = Unused(*(getattr(asked, each.name) for each in dataclasses.fields(asked)))
     recorded = dataclasses.replace(traced[1], lookups=lookups, request=request)
     assert plan_table(recorded, 1e-3).settings is None
     unseen = dataclasses.replace(recorded, lookups=None)

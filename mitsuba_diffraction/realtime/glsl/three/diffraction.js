@@ -12,10 +12,11 @@ async function texture(url, { type, filter, wrap }) {
   return loaded;
 }
 
+// names of its own do not begin with md_, as those of the exported code do
 const LIGHT = (name) => `
 #ifdef ROOM
-uniform sampler2D md_room;
-uniform vec3 md_mirror; // (kσ)² of the mirror lobe, for red, green and blue
+uniform sampler2D room_light;
+uniform vec3 room_lobe; // (kσ)² of the mirror lobe, for red, green and blue
 bool sampled = false;
 #endif
 void RE_Direct_Orders(IncidentLight light, vec3 position, vec3 normal,
@@ -27,14 +28,14 @@ void RE_Direct_Orders(IncidentLight light, vec3 position, vec3 normal,
   vec3 orders = ${name}(wi, wo);
 #ifdef ROOM
   wi += wo;
-  if (sampled) orders *= smoothstep(4.0, 9.0, md_mirror.r * dot(wi.xy, wi.xy));
+  if (sampled) orders *= smoothstep(4.0, 9.0, room_lobe.r * dot(wi.xy, wi.xy));
 #endif
   reflected.directDiffuse += light.color * (base + orders);
 }
 #undef RE_Direct
 #define RE_Direct RE_Direct_Orders
 #if SAMPLES > 0
-uniform vec3 md_lights[2 * SAMPLES];
+uniform vec3 room_samples[2 * SAMPLES];
 #endif
 `;
 // the mirror lobe has the peak R (kσ)²/π
@@ -43,15 +44,15 @@ IncidentLight it;
 #define ADD RE_Direct(it, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, reflectedLight)
 #ifdef ROOM
 it.direction = reflect(-geometryViewDir, geometryNormal);
-it.color = textureLod(md_room, equirectUv(inverseTransformDirection(it.direction, viewMatrix)), 0.0).rgb
-  * PI / (md_mirror * max(dot(it.direction, geometryNormal), 1e-3));
+it.color = textureLod(room_light, equirectUv(inverseTransformDirection(it.direction, viewMatrix)), 0.0).rgb
+  * PI / (room_lobe * max(dot(it.direction, geometryNormal), 1e-3));
 ADD;
 sampled = true;
 #endif
 #if SAMPLES > 0
 for (int n = 0; n < SAMPLES; ++n) {
-  it.direction = (viewMatrix * vec4(md_lights[2 * n], 0.0)).xyz;
-  it.color = md_lights[2 * n + 1];
+  it.direction = (viewMatrix * vec4(room_samples[2 * n], 0.0)).xyz;
+  it.color = room_samples[2 * n + 1];
   ADD;
 }
 #endif
@@ -66,8 +67,8 @@ export async function diffractionMaterial(folder = ".", { method = "fast", envir
   const code = await (await fetch(`${folder}/diffraction.glsl`)).text();
   const name = constants.functions[method];
   if (!name) throw new Error(`method ${method} was not exported, only ${Object.keys(constants.functions)}`);
-  const uniforms = { md_lights: { value: environment }, md_room: { value: room } };
-  uniforms.md_mirror = { value: [0.611, 0.549, 0.464].map((length) => ((0.5 * Math.PI * constants.coherence_width) / length) ** 2) };
+  const uniforms = { room_samples: { value: environment }, room_light: { value: room } };
+  uniforms.room_lobe = { value: [0.611, 0.549, 0.464].map((length) => ((0.5 * Math.PI * constants.coherence_width) / length) ** 2) };
   for (const [key, value] of Object.entries(constants.uniforms)) uniforms[key] = { value };
   for (const [key, entry] of Object.entries(constants.textures))
     uniforms[key] = { value: await texture(`${folder}/${entry.file}`, entry) };
