@@ -256,21 +256,22 @@ def _followed(
     """
     import numpy as np
 
-    from ..thesis.period_fit import Ridge, find_period, fit_period, ridge_of
+    from ..thesis.period_fit import FEWEST, Ridge, find_period, fit_period, ridge_of
 
     period = find_period(response, held, order)
     ridge = ridge_of(response, order, period=period)
-    fit = fit_period(ridge)
     if period is not None:
+        fit = fit_period(ridge)
         return ridge, fit, (
             f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at "
             f"most, {fit.points} of {fit.wavelengths} wavelengths"
         )  # fmt: skip
     nothing = np.full(response.wavelengths.size, np.nan)
-    return Ridge(response, order, nothing, nothing), None, (
-        "none: the light on this side follows no grating equation (the brightest angles alone "
-        f"would give {1e3 * fit.period:.4g} nm)"
-    )  # fmt: skip
+    none = "none: the light on this side follows no grating equation"
+    if ridge.has_maximum.sum() >= FEWEST:
+        brightest = fit_period(ridge).period
+        none += f" (the brightest angles alone would give {1e3 * brightest:.4g} nm)"
+    return Ridge(response, order, nothing, nothing), None, none
 
 
 def viewing_angles(

@@ -133,7 +133,7 @@ def test_what_a_plugin_raises_while_a_scene_loads_is_not_swallowed(
     def read(*_: object) -> None:
         raise eval(raised)
 
-    monkeypatch.setattr(diffraction, "read_parameters", read)
+    monkeypatch.setattr(diffraction.read, "nested_of", read)
     scene = tmp_path / "a.xml"
     scene.write_text(
         '<scene version="3.0.0"><shape type="sphere"><bsdf type="diffraction"/></shape></scene>'

@@ -7,6 +7,7 @@ Response        angle-resolved scatter of a method, by wavelength and viewing an
 measure         response of a method to a beam
 Ridge           viewing angle of the maximum at each wavelength
 ridge_of        ridge of one order
+FEWEST          maxima that a fit needs at least
 Fit             period of the grating equation that fits a ridge
 fit_period      fit of that period
 find_period     period of the strongest ridge that obeys the grating equation, if one does
@@ -16,10 +17,20 @@ thesis_fit      procedure behind the thesis' published periods
 
 from __future__ import annotations
 
-from .ridge import Beam, Fit, Response, Ridge, find_period, fit_period, measure, ridge_of
+from .ridge import (
+    FEWEST,
+    Beam,
+    Fit,
+    Response,
+    Ridge,
+    find_period,
+    fit_period,
+    measure,
+    ridge_of,
+)
 from .windows import thesis_fit, window_fits
 
 __all__ = [
-    "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure", "ridge_of",
+    "FEWEST", "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure", "ridge_of",
     "thesis_fit", "window_fits",
 ]  # fmt: skip
