@@ -268,7 +268,7 @@ def _followed(
         )  # fmt: skip
     nothing = np.full(response.wavelengths.size, np.nan)
     none = "none: the light on this side follows no grating equation"
-    if ridge.has_maximum.sum() >= FEWEST:
+    if ridge.has_maximum.sum() >= FEWEST or order != 1:  # an order that was chosen is named
         brightest = fit_period(ridge).period
         none += f" (the brightest angles alone would give {1e3 * brightest:.4g} nm)"
     return Ridge(response, order, nothing, nothing), None, none

@@ -31,6 +31,6 @@ from .ridge import (
 from .windows import thesis_fit, window_fits
 
 __all__ = [
-    "FEWEST", "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure", "ridge_of",
-    "thesis_fit", "window_fits",
+    "FEWEST", "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure",
+    "ridge_of", "thesis_fit", "window_fits",
 ]  # fmt: skip
