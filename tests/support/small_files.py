@@ -223,10 +223,9 @@ def _(path: Path) -> None:
 
 def run(names: list[str], folder: Path) -> None:
     """Write and read files; print what is said of each."""
-    import resource
-
     from mitsuba_diffraction.errors import DiffractionError
     from mitsuba_diffraction.scene.load import set_variant
+    from mitsuba_diffraction.system import peak_memory
 
     set_variant("scalar_rgb")
     for name in names:
@@ -237,10 +236,9 @@ def run(names: list[str], folder: Path) -> None:
             FILES[name].read(path)
         except DiffractionError as error:
             refusal = str(error)
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         print(
             json.dumps({
-                "name": name, "seconds": time.monotonic() - start, "peak": peak * 1024,
+                "name": name, "seconds": time.monotonic() - start, "peak": peak_memory(),
                 "refusal": refusal, "size": path.stat().st_size,
             }),
             flush=True,
