@@ -46,8 +46,10 @@ def test_every_table_is_looked_up_as_numpy_does(seed):
             found = [device.window_sum(*map(float, q)) for q in zip(*asked, strict=True)]
         else:
             found = np.array(device.window_sum(*map(lanes, asked)))
-        # frequencies in single precision, over lobes that are 1/σ wide
-        assert found == pytest.approx(expected, rel=2e-3, abs=2e-5 * expected.max()), name
+        # frequencies in single precision, over lobes that are 1/σ wide; squares of lengths below
+        # 1e-20 have no direction there, and no table holds light that is so faint
+        faint = max(2e-5 * expected.max(), 1e-20)
+        assert found == pytest.approx(expected, rel=2e-3, abs=faint), name
 
 
 def test_many_bins_in_few_rows_are_read_in_a_loop(some_variant):

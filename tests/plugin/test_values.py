@@ -35,7 +35,8 @@ def test_swapping_directions_changes_nothing(variant):
             brdf_values(bsdf, wi, wo, lam[:, None]),
             brdf_values(bsdf, wo, wi, lam[:, None]),
         )
-        assert there == pytest.approx(back, rel=1e-5)
+        # amplitudes of one place cancel: their phases, of some 100 rad, are known to 6e-6
+        assert there == pytest.approx(back, rel=2e-5 if "coherence" in parameters else 1e-5)
 
 
 def test_nothing_is_reflected_from_or_to_below(variant):
