@@ -18,7 +18,8 @@ from ...heights.field import HeightField
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...progress import Progress, silent
-from ...reference import Sigmas, window_power
+from ...reference import window_power
+from ...reference.arguments import sigmas_of
 from ...tables.table import DiffractionTable, q_limit_of
 
 Array = NDArray[np.float64]
@@ -57,15 +58,14 @@ class Sample:
         progress: Progress,
     ) -> Sample:
         """Draw n pairs of directions, and compute exact window sums from all pixels."""
-        sigma = sigma_of(coherence_width)
-        sigmas = Sigmas(sigma, sigma)
-        pairs = lit_pairs(field, sigma, n, seed=20140113)
+        sigmas = sigmas_of(coherence_width, field, coherence)
+        pairs = lit_pairs(field, sigma_of(coherence_width), n, seed=20140113)
         exact = np.empty(n)
         for i in range(n):
             wi, wo, wavelength = (values[i : i + 1] for values in pairs[:3])
             exact[i] = window_power(field, wi, wo, wavelength, sigmas, coherence)[0]
             progress(i + 1, n, f"the exact answer, {coherence}")
-        return cls(*pairs, exact / (4.0 * np.pi**2 * sigma**4))
+        return cls(*pairs, exact / (4.0 * np.pi**2 * sigmas.orders**4))
 
     def error(self, sums: Array) -> tuple[float, float]:
         """Return Σ|sums − exact| / Σ exact, near order 0 and elsewhere."""
