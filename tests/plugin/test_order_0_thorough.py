@@ -48,7 +48,7 @@ def test_the_density_is_that_of_the_samples(order):
     # a histogram of the hemisphere resolves lobes of 12 µm
     width = {"coherence_width": 12.0} if order is None else {}
     case = Case(SMALL_SCAN, 30.0, (550.0,), width, order)
-    test = chi_square(case.load(), case, samples=1 << 20)
+    test = chi_square(case.load(), case, samples=1 << 22)
     assert test.run(0.01, 2, quiet=True), test.messages
     assert test.histogram_sum[0] > 0.01
 
