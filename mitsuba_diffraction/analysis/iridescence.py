@@ -139,6 +139,8 @@ def diffracted_light(
         )
     coefficients, _, scale, expansion = power_series(table.averaged)
     width = min(WINDOW, table.window_width)
+    # the orders of a scan have its taper's lobes already
+    sigma = (sigma_of(width) ** -2 - table.inverse_taper) ** -0.5
     qx, qy = (
         spacing * np.arange(-last, last + 1)
         for spacing, last in zip(table.spacing, table.grid.last, strict=True)
@@ -172,7 +174,7 @@ def diffracted_light(
         central += weights * power[near].sum()
         order_0 = order_0_power(table.averaged, np.array(2.0 * k * light.direction[2]))
         central += weights * float(order_0)
-        lobe = 1.0 / (math.sqrt(2.0) * k * sigma_of(width))  # standard deviation of its power
+        lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
         xyz += _spread(sines[~near], power[~near], lobe, count)[..., None] * weights
     diffracted = float(xyz[..., 1].sum())
     return DiffractedLight(xyz, diffracted / max(diffracted + central[1], 1e-300))
