@@ -180,8 +180,8 @@ def _columns(
 ) -> tuple[tuple[str, ...], Reals]:
     """Return the names of the columns of a text, and its numbers, wavelengths (nm) first.
 
-    Raises a DiffractionError if it is no spectrum; the message on a name that is none lists the
-    known values of the parameter.
+    Raises a DiffractionError if the file holds no spectrum, or the name is unknown; the message on
+    an unknown name lists the known values of the parameter.
     """
     choice = choice_of(name)
     if Path(choice.path).suffix.lower() not in SPECTRA:

@@ -292,7 +292,7 @@ class SceneFiles:
 
 @lru_cache(1)
 def _own_temporary() -> Path:
-    """Return a new folder for files of tasks, of this process alone, where there is no cache.
+    """Return a new folder for this process's task files, for machines without a cache.
 
     A folder of a known name in the folder that all users share might be somebody else's.
     """

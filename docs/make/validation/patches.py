@@ -22,7 +22,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from .cases import ALUMINIUM, KERATIN
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
-#: Cuts of the measured patch, which is no part of the project.
+#: Cuts of the measured patch; the project does not ship this patch.
 _MEASURED = "measured_scale.npz"
 
 #: Pixels along each side of a cut or a crossed grating, and along a sinusoid.

@@ -1,9 +1,9 @@
 """Scans as parts of a larger surface: hues of gratings, and crops against the whole.
 
 A sinusoid has its orders in closed form, |a_m|² = J_m²(κ h/2) (Goodman, Introduction to Fourier
-Optics, section 4.4), seen through the light's window: exp(−σ²|q − q_m|²). A scan of it that is no
-whole number of periods must show the same hues. Crops of a rough surface must show the light of
-the whole, under the same window.
+Optics, section 4.4), seen through the light's window: exp(−σ²|q − q_m|²). A scan of a sinusoid
+that is no whole number of periods must show the same hues. Crops of a rough surface must show the
+light of the whole, under the same window.
 """
 
 from __future__ import annotations
