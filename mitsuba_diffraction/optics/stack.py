@@ -21,6 +21,8 @@ Complex = NDArray[np.complex128]
 
 #: Standard deviations of thickness that a mean covers, and its steps: of the phase, rad, at most.
 _REACH, _STEP, _FEWEST = 3.0, 1.0, 13
+#: Least cosine: at the horizon itself, gaps between layers of the index above make 0/0.
+_HORIZON = 1e-6
 #: Nodes of a fringe: linear interpolation is within 0.004 of the reflectance.
 _PER_FRINGE, _FEWEST_NODES = 24, 24
 
@@ -37,9 +39,9 @@ def amplitudes(
     indices : (layers + 1, n) of the material, then of the layers upwards, over the medium above.
     thicknesses : (layers,) from the material upwards.
     """
-    square, wavenumber = 1.0 - cosine**2, 2.0 * np.pi / wavelengths[:, None]
+    square, wavenumber = np.maximum(cosine, _HORIZON) ** 2, 2.0 * np.pi / wavelengths[:, None]
     epsilons = [*(indices[:, :, None].astype(np.complex128) ** 2), np.ones((1, 1), complex)]
-    normals = [np.sqrt(epsilon - square) for epsilon in epsilons]
+    normals = [np.sqrt(epsilon - 1.0 + square) for epsilon in epsilons]
     r_s = r_p = np.zeros((1, 1), complex)
     for layer in range(len(epsilons) - 1):
         (below, q), (above, up) = ((epsilons[n], normals[n]) for n in (layer, layer + 1))

@@ -281,7 +281,7 @@ class DiffractingSurface(SurfaceBSDF):
 
 
 #: Least f of orders that interfere: its square is a number of single precision, too.
-_DARK = 1e-12
+_DARK = 1e-18
 
 
 def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Spectrum:
@@ -298,4 +298,4 @@ def interfering(others: Spectrum, mirror: Spectrum, cosine: Colour | None) -> Sp
     # above 0, where roots have derivatives
     a, b = (dr.maximum(mi.unpolarized_spectrum(f), _DARK) for f in (others, mirror))
     beats = 2.0 * cosine * dr.sqrt(a) * dr.sqrt(b) * dr.rcp(a + b)
-    return total * mi.Spectrum(1.0 + beats)
+    return total * mi.Spectrum(dr.maximum(1.0 + beats, 0.0))

@@ -42,6 +42,8 @@ class OrderMixture:
     powers : (kappas, n) of the strong orders.
     central : (kappas,), power of order 0.
     density : (kappas, ny, nx), power of all others per (rad/µm)², smoothed; q = 0 in the middle.
+    beats : the same of their interference with order 0, of either sign, where lobes are so wide
+        that its factor is not the others'; None where `density` has it.
     pitch : rad/µm between samples of the density.
     """
 
@@ -50,6 +52,7 @@ class OrderMixture:
     powers: NDArray[np.float32]
     central: NDArray[np.float64]
     density: NDArray[np.float32]
+    beats: NDArray[np.float32] | None
     pitch: float
 
     def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -97,15 +100,23 @@ def order_mixture(
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
     density = np.empty((count, 2 * half, 2 * half), np.float32)
+    apart = all_smooth and table.grid.coherent
+    beats = np.empty_like(density) if apart else None
     central = np.empty(count)
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     stored = []
-    powers_at = _Powers(table, axes)
+    powers_at = _Powers(table, axes, apart=apart)
+
+    def smoothed(power: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.asarray((splats[0] @ (splats[1] @ power).T).T)
+
     for n, kappa in enumerate(kappas):
-        power, central[n] = powers_at(float(kappa))
+        power, central[n], interference = powers_at(float(kappa))
         np.maximum(strongest, power, out=strongest)
-        density[n] = (splats[0] @ (splats[1] @ power).T).T
+        density[n] = smoothed(power)
+        if beats is not None:
+            beats[n] = smoothed(interference)
         stored.append(power if power.nbytes * count < 400e6 else None)
     chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
     rows, columns = chosen.T
@@ -120,7 +131,7 @@ def order_mixture(
     np.maximum(density, 0.0, out=density)
     frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
     step = float(kappas[1]) / height_scale
-    return OrderMixture(step, frequency, powers, central, density, pitch)
+    return OrderMixture(step, frequency, powers, central, density, beats, pitch)
 
 
 class _Axis:
@@ -135,7 +146,7 @@ class _Axis:
             density = max(1, math.ceil(step / (_FINE if fine else _SAMPLED)))
             positions = np.arange(-last * density, last * density + 1) / density
             self.frequency = positions * spacing
-            self.lobe = np.exp(-2.0 * table.grid.exponents[axis] * positions**2)
+            self.lobe = np.exp(-table.grid.exponents[axis] * positions**2)
             self.matrix = tap_matrix(positions, -last, len(bins), table.grid.exponents[axis], None)
             self.weight = step / density / math.sqrt(math.pi)
             return
@@ -150,15 +161,18 @@ class _Axis:
 
 
 class _Powers:
-    """Powers at any κ; keeps the coefficients of the last interval in single precision."""
+    """Powers at any κ; keeps the coefficients of the last interval in single precision.
 
-    def __init__(self, table: DiffractionTable, axes: list[_Axis]) -> None:
-        self._table, self._axes = table, axes
+    apart : whether the interference of a window's order 0 is not among the others' powers.
+    """
+
+    def __init__(self, table: DiffractionTable, axes: list[_Axis], *, apart: bool) -> None:
+        self._table, self._axes, self._apart = table, axes, apart
         self._interval = -1
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
-        """Powers (ny, nx) of all orders but order 0, and the power of order 0."""
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, NDArray[np.float32]]:
+        """Powers (ny, nx) of all orders but 0, the power of order 0, and their interference."""
         table, axes = self._table, self._axes
         expansion = table.expansion
         interval = int(expansion.interval(kappa))
@@ -174,18 +188,23 @@ class _Powers:
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*table.order_0_at(kappa))
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
             weight = axes[0].weight * axes[1].weight
-            power = np.abs(field).astype(np.float32) ** 2 * weight
+            mean = complex(*table.order_0_at(kappa)) * axes[1].lobe[:, None] * axes[0].lobe
+            total, order_0, power = (
+                np.abs(part).astype(np.float32) ** 2 * weight
+                for part in (field, mean, field - mean)
+            )
+            if self._apart:
+                return power, float(order_0.sum()), total - order_0 - power
             # order 0 is the mean's lobe, or all light where the speckle is darker than that
-            x, y = (axis.lobe for axis in axes)
-            order_0 = np.minimum(centre * weight * y[:, None] * x, power)
-            return power - order_0, float(order_0.sum())
+            order_0 = np.minimum(order_0, total)
+            return total - order_0, float(order_0.sum()), np.zeros_like(total)
         of_power = expansion.kind == "power"
         power = np.maximum(parts[..., 0], 0.0) if of_power else np.sum(parts**2, axis=-1)
         if len(axes[0].frequency) < nx:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:
             power = axes[1].matrix @ power
-        return power, centre
+        return power, centre, np.zeros(0, np.float32)
 
 
 def _splat(

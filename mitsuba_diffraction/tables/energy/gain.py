@@ -69,17 +69,17 @@ class PathGain:
         return common * self._ratio(*ends)
 
     def order_0(
-        self, cos_i: Real, cos_o: Real, power: Real, turn: Real | float, sigma_0: float
-    ) -> Real:
-        """Return the share of order 0 that goes to directions across its lobe.
+        self, cos_i: Real, cos_o: Real, turn: Real | float, sigma_0: float
+    ) -> tuple[Real, Real]:
+        """Return G of order 0, and the share that a flat face over the structure adds.
 
-        power : of order 0 at these directions; turn : azimuths between them, rad.
+        turn : azimuths between both directions, rad.
         sigma_0 : of the lobe's window, µm, times the index of the medium that light goes to.
         """
         if self.path.let_through:
-            return self.path.flat_transmittance(cos_i, cos_o) * power
-        share, face = self.path.mirrored(cos_i, cos_o, np.cos(turn), self.wavenumber, sigma_0)
-        return share * power + face
+            gain = self.path.flat_transmittance(cos_i, cos_o)
+            return gain, np.zeros_like(gain)
+        return self.path.mirrored(cos_i, cos_o, np.cos(turn), self.wavenumber, sigma_0)
 
     @cached_property
     def _table(self) -> Real:

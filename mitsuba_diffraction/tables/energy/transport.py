@@ -75,7 +75,9 @@ class ScatteredOrders:
         reach = min(2.0 * longest, table.q_limit)
         self.mixture = order_mixture(table, scale, reach, smoothing)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
-        self.has_weak = bool(total > LEAST_WEAK)
+        # light that interferes goes with its root
+        least = LEAST_WEAK if self.mixture.beats is None else LEAST_WEAK**2
+        self.has_weak = bool(total > least)
         self.strong = len(self.mixture.frequency)
         self.nodes = quadrature(rings, steps)
         count = len(self.mixture.central)
@@ -164,8 +166,8 @@ class Transport:
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
         cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
-        gain = self._gain.order_0(cos_in, cos_out, power, nodes.azimuth, self._optical_0)
-        return np.asarray(lobe * gain, np.float64)
+        gain, face = self._gain.order_0(cos_in, cos_out, nodes.azimuth, self._optical_0)
+        return np.asarray(lobe * (gain * power + face), np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
         """Return shares (t, rows) of order 0 that go to the polar angles of a grid.
@@ -187,7 +189,8 @@ class Transport:
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
         cos_in = np.broadcast_to(cos_i, cos_o.shape)
-        parts *= self._gain.order_0(cos_in, cos_o, power, np.pi, self._optical_0)
+        gain, face = self._gain.order_0(cos_in, cos_o, np.pi, self._optical_0)
+        parts *= gain * power + face
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 
@@ -196,7 +199,11 @@ class Transport:
         mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
         cos_i, sine = self._start(theta[:, None])
         gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
-        factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
+        densities = [(mixture.density, gain)]
+        if mixture.beats is not None:
+            ends = (np.broadcast_to(each, gain.shape) for each in (cos_i, nodes.cosine))
+            zeroth, _ = self._gain.order_0(*ends, nodes.azimuth, self._optical_0)
+            densities.append((mixture.beats, np.sqrt(gain * zeroth)))
         position = np.minimum(
             self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001
         )
@@ -208,10 +215,14 @@ class Transport:
         rows, columns = mixture.density.shape[1:]
         column = np.clip((cos * bx - sin * by + 0.5 * columns).astype(np.int32), 0, columns - 1)
         row = np.clip((sin * bx + cos * by + 0.5 * rows).astype(np.int32), 0, rows - 1)
-        flat, index = mixture.density.ravel(), (lower[:, None] * rows + row) * columns + column
-        shares = flat.take(index) * (factor * (1.0 - upper_share))[:, None]
-        shares += flat.take(index + rows * columns) * (factor * upper_share)[:, None]
-        return shares
+        index = (lower[:, None] * rows + row) * columns + column
+        shares = np.float32(0.0)
+        for density, gain in densities:
+            flat = density.ravel()
+            factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
+            shares = shares + flat.take(index) * (factor * (1.0 - upper_share))[:, None]
+            shares += flat.take(index + rows * columns) * (factor * upper_share)[:, None]
+        return np.asarray(shares)
 
     def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> LinearMap:
         """Return the map from weights on a grid to the light of the strong orders."""
