@@ -290,7 +290,7 @@ def add_table(group: Group, names: Sequence[str] = TABLE, **defaults: str) -> No
     """Add the settings of a table. defaults: texts for the help in place of the default values."""
     for name in names:
         item = described_setting(name)
-        kind = item.choices or (whole_number(1) if item.type is int else item.type)
+        kind: Any = item.choices or (whole_number(1) if item.type is int else item.type)
         values = (item.metavar,) if isinstance(item.metavar, str) else ()
         if isinstance(item.metavar, tuple):
             kind, values = limits, (":".join(item.metavar),)
