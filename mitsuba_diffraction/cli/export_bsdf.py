@@ -26,8 +26,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "export-bsdf", run, "write a surface's BRDF for other programs",
         "Write the reflected light on a grid of directions, for programs that have no diffraction: "
         "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
-        "the BiRD project, csv for lines of scatter in 1/sr. Lobes narrower than the grid become as "
-        "wide as it, with all their light.",
+        "the BiRD project, csv for lines of scatter in 1/sr. Lobes narrower than the grid "
+        "become as wide as it, with all their light.",
         *SURFACE_SOURCE,
         ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
          options.path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
@@ -35,7 +35,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_options(
         parser.add_argument_group("the file"),
-        ("--format", "default: rgl for .bsdf, bird for .json and .brdf, csv for .csv", tuple(_SUFFIXES)),
+        ("--format", "default: rgl for .bsdf, bird for .json and .brdf, csv for .csv",
+         tuple(_SUFFIXES)),
         ("--theta DEG", "angles of the light from the normal, e.g. 0:80:10; default: by format",
          options.numbers),
         ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "

@@ -1,9 +1,9 @@
 """Light of a surface laid on the nodes of a file: what a reader integrates is the surface's light.
 
 A reader interpolates between nodes linearly, so a node stands for a hat function of directions.
-Light that leaves in some direction is shared between the four nodes around it, and a node's value is
-its light over ∫ hat cosθ dω: the integral of the interpolated file is the light laid on it, order by
-order, however coarse the nodes are.
+Light that leaves in some direction is shared between the four nodes around it, and a node's value
+is its light over ∫ hat cosθ dω: the integral of the interpolated file is the light laid on it, order
+by order, however coarse the nodes are.
 """
 
 from __future__ import annotations

@@ -116,9 +116,7 @@ def test_mitsuba_integrates_each_order_of_the_tensors(tmp_path):
     """Within 1 %, of a turned grating: orders 0.2° wide, cells of some degrees."""
     table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))
     bsdf = mi.load_dict(md.bsdf_dict(table, orientation=30.0))
-    grid = ExportGrid(
-        np.linspace(0, 60, 3), np.arange(-180.0, 181, 60), np.array([550.0, 551]), 48
-    )
+    grid = ExportGrid(np.linspace(0, 60, 3), np.arange(-180.0, 181, 60), np.array([550.0, 551]), 48)
     rgl.save_rgl(bsdf, tmp_path / "m.bsdf", grid)
     measured = mi.load_dict({"type": "measured", "filename": str(tmp_path / "m.bsdf")})
     u, v = ((np.arange(n) + 0.5) / n for n in (47 * 16, 47 * 8))
