@@ -307,6 +307,9 @@ def test_doubles_of_a_tiff_are_read(tmp_path, order):
     path.write_bytes(head + data + struct.pack(f"{order}H", len(tags)) + entries + bytes(4))
     found = HeightField.load(path, pixel_size=0.1, level="none").heights
     np.testing.assert_array_equal(found, heights[::-1])
+    packed = struct.pack(f"{order}HHIH", 259, 3, 1, 1), struct.pack(f"{order}HHIH", 259, 3, 1, 8)
+    path.write_bytes(path.read_bytes().replace(*packed))
+    assert "save it uncompressed" in refusal(path, pixel_size=0.1)
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(DiffractionError):
         HeightField.load(path, pixel_size=0.1)
