@@ -18,6 +18,7 @@ from ...limits import bounded_lines, bounded_memory, check_archive, check_conten
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
+from .catalogue import way_out
 from .headers import stated_sizes
 
 # Signals that instruments record in nanometres beside the topography.
@@ -59,6 +60,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         Heights in µm, rows upwards as in an image; points without data are NaN.
     """
     shown, size = repr(str(path)), path.stat().st_size
+    if known := way_out(path, beginning(path, 64)):
+        raise DiffractionError(f"{shown} {known}")
     check_archive(path, shown)
     if b"\0" not in beginning(path, 1 << 16):  # text: some readers take n² steps for long lines
         with path.open(encoding="latin-1") as stream:
@@ -110,7 +113,8 @@ def _why_unknown(path: Path, readers: Sequence[Any]) -> DiffractionError:
                     )
     return DiffractionError(
         f"{shown} is not a height field of a known kind; expected an image (PNG, BMP, TIFF, EXR), "
-        "an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument file, undamaged"
+        "an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument file, undamaged; "
+        "'mitsuba-diffraction info --formats' lists them"
     )
 
 
