@@ -2,8 +2,8 @@
 
 A reader interpolates between nodes linearly, so a node stands for a hat function of directions.
 Light that leaves in some direction is shared between the four nodes around it, and a node's value
-is its light over ∫ hat cosθ dω: the integral of the interpolated file is the light laid on it, order
-by order, however coarse the nodes are.
+is its light over ∫ hat cosθ dω: the integral of the interpolated file is the light laid on it,
+order by order, however coarse the nodes are.
 """
 
 from __future__ import annotations
@@ -225,8 +225,8 @@ def laid(
     for first in range(0, len(lights), together):
         progress(first, len(lights), "evaluating")
         group = lights[first : first + together]
-        wo, solid = zip(*(nodes.directions(wi, p, q) for wi in group), strict=True)
-        solid = [area * part * (out[:, 2] > 0.0) for part, out in zip(solid, wo, strict=True)]
+        wo, widths = zip(*(nodes.directions(wi, p, q) for wi in group), strict=True)
+        solid = [area * part * (out[:, 2] > 0.0) for part, out in zip(widths, wo, strict=True)]
         lit = [np.flatnonzero(part) for part in solid]
         if orders is not None:
             light = [orders.on(nodes, wi, grid.wavelengths, step) for wi in group]
@@ -310,8 +310,8 @@ class _Orders:
             m, waves = (np.broadcast_to(part, (*leaves.shape, *part.shape[2:]))[leaves]
                         for part in (m, waves))  # fmt: skip
             flat = np.zeros(len(waves))
-            row = self._lookup.row(flat + x, flat + y, flat + wi[2], waves)
-            order = tuple(m.T.astype(float)) if self._table.crossed else m[:, 0].astype(float)
+            row: Any = self._lookup.row(flat + x, flat + y, flat + wi[2], waves)
+            order: Any = tuple(m.T.astype(float)) if self._table.crossed else m[:, 0].astype(float)
             share = self._lookup.share(row, order, flat == 0.0).efficiency / _LOBE_SAMPLES
             kernel = np.broadcast_to(spread / wavenumber(lam)[:, None], centre.shape)[leaves]
             middle_of = centre[leaves]

@@ -44,14 +44,14 @@ def save_rgl(
         lambda u: (2.0 * np.sin(0.5 * np.pi * u * u), 2.0 * np.pi * u), pole=True, cosine=True,
     )  # fmt: skip
     spectra = np.empty((len(phi) * len(theta), len(grid.wavelengths), n, n), np.float32)
-    density = np.empty((len(phi) * len(theta), n, n))
+    powers = np.empty((len(phi) * len(theta), n, n))
     for place, of_light in enumerate(laid(bsdf, nodes, grid, light_vectors(grid), progress)):
         values, light = (np.concatenate([part, part[:1]]) for part in of_light)
-        spectra[place], density[place] = np.moveaxis(values, -1, 0), light.mean(axis=-1)
+        spectra[place], powers[place] = np.moveaxis(values, -1, 0), light.mean(axis=-1)
     spectra = spectra.reshape(len(phi), len(theta), *spectra.shape[1:])
     # density in u and v by which light is drawn: the light at each node, and an even share; nodes
     # at the ends of u have half a cell
-    density = density.reshape(len(phi), len(theta), n, n)
+    density = powers.reshape(len(phi), len(theta), n, n)
     density[..., [0, -1]] *= 2.0
     density += 1e-2 * density.mean(axis=(2, 3), keepdims=True) + 1e-9
     ones = np.ones((2, 2))
