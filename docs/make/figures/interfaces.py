@@ -71,7 +71,7 @@ def subparsers() -> dict[str, tuple[argparse.ArgumentParser, str]]:
     (action,) = (
         a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)
     )  # fmt: skip
-    helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+    helps = {c.dest: c.help or "" for c in action._get_subactions()}  # noqa: SLF001
     return {name: (parser, helps[name]) for name, parser in action.choices.items()}
 
 
@@ -102,7 +102,7 @@ def python_page() -> str:
     rows = [(f"`md.{name}`", entries[name], _members(getattr(md, name))) for name in entries]
     return "\n\n".join([
         "# In Python",
-        "`import mitsuba_diffraction as md` imports heavy modules at their first use, and registers "
+        "`import mitsuba_diffraction as md` imports heavy modules at their first use and registers "
         "the plugins once Mitsuba is imported. `make site` builds a reference with all arguments. "
         "Made by `python -m docs.make.figures.interfaces -o docs`.",
         pages.table(("name", "what it is", "names in it"), rows),

@@ -32,8 +32,9 @@ def write_page(path: Path, text: str) -> list[Path]:
     Paths of the page and of the files.
     """
     shown, tables = separated(text, path.stem)
-    for old in set(path.parent.glob(f"{path.stem}-*.csv")) - {path.parent / name for name in tables}:
-        old.unlink()
+    for old in path.parent.glob(f"{path.stem}-*.csv"):
+        if old.name not in tables:
+            old.unlink()
     for name, content in (*tables.items(), (path.name, shown)):
         with atomic_path(path.parent / name) as temporary:
             temporary.write_text(content, encoding="utf-8")
