@@ -92,7 +92,7 @@ def page() -> str:
         "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric), gratings whose orders "
         "were solved the plugin [`diffraction_orders`](#parameters-of-diffraction_orders).",
         *_parts(reflecting),
-        "[theory.md](theory.md) has all of the model, symbol by symbol.",
+        "[theory.md](theory.md) has the equations.",
     ]
     for plugin, text in zip(list(PLUGINS)[1:], others, strict=True):
         introduction = _GROUP.split(text)[0].partition("\n\n")[2]
