@@ -17,7 +17,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import MeshArrays, mesh_arrays
+from ..meshes import SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
 from .mesh_indices import CODES, any_line_begins, check_mesh, ply_header
 from .trimesh import TriangleMesh, vertex_normals
@@ -36,7 +36,7 @@ _CODES = {name: np.dtype(code).char for name, code in CODES.items()}
 _NORMAL, _CORNER = re.compile(rb"(?m)^vn .*$"), re.compile(rb"(?<= )(\d+)(/\d+)?/{1,2}\d+(?=\s|$)")
 
 
-def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
+def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
     """Read a mesh file; where it has no normals, smooth ones are made by `vertex_normals`.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, PLY files of polygons, glTF and USD. Normals
@@ -58,9 +58,10 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         mesh = mesh_arrays(_load(file))
         if not _states_normals(file):  # Mitsuba's have seams where texture coordinates have
             mesh = mesh._replace(normals=None)
-    if mesh.normals is not None:
-        return mesh
-    return mesh._replace(normals=vertex_normals(mesh.positions, mesh.faces))
+    positions, normals, uv, faces = mesh
+    if normals is None:
+        normals = vertex_normals(positions, faces)
+    return SmoothMesh(positions, normals, uv, faces)
 
 
 def _is_interchange(file: Path) -> bool:
