@@ -84,7 +84,7 @@ def kind_of(path: str | os.PathLike[str]) -> FileKind:
     for begins, attribute, kind in _CONTENTS:
         if content.startswith(begins) and attribute in content:
             return kind
-    if content.startswith((b"II*\0", b"MM\0*")):
+    if content.startswith((b"II*\0", b"MM\0*")) and Path(path).suffix.lower() != ".lext":
         instrument = not _INSTRUMENT_TAGS.isdisjoint(_tiff_tags(Path(path)))
         return FileKind.INSTRUMENT if instrument else FileKind.IMAGE
     return _SUFFIXES.get(Path(path).suffix.lower(), FileKind.INSTRUMENT)

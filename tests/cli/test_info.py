@@ -240,3 +240,18 @@ def test_normals_are_those_of_the_file(run, tmp_path, kind, own):
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
     data = json.loads(run("info", file, "--json").out)
     assert (data["normals"] == "in the file") is own
+
+
+def test_formats_are_listed_with_what_to_export_for_others(run, tmp_path):
+    ran = run("info", "--formats")
+    assert ran.code == 0
+    assert "NanoScope (.spm" in ran.out
+    data = json.loads(run("info", "--formats", "--json").out)
+    for row in data["not read"]:
+        assert row["instead"]
+    (tmp_path / "a.sxm").write_bytes(b":NANONIS_VERSION:\n2\n")
+    said = run("info", tmp_path / "a.sxm").failed_in_one_line()
+    assert "Nanonis" in said
+    assert "Gwyddion" in said
+    assert "--formats" in run("info").failed_in_one_line()
+    assert "--level" in run("info", "--formats", "--level", "plane").err
