@@ -57,6 +57,8 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
     grid = ("--theta", "0,40", "--phi", 0, "--wavelength", 550, "--resolution", 8)
     assert run("export-bsdf", "grating.nc", *grid, "--format", "zemax").code == 0
     assert run("export-bsdf", "grating.nc", *grid, "-o", "grating.brdf").code == 0
+    assert run("export-bsdf", "grating.nc", *grid, "-o", "grating.csv").code == 0
+    assert (tmp_path / "grating.csv").read_text().startswith("theta_i_deg,")
     assert (tmp_path / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
     assert json.loads((tmp_path / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
     refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
