@@ -181,6 +181,13 @@ class Surface:
         return not isinstance(self.table, DiffractionTable)
 
     @property
+    def summary(self) -> str:
+        """Material with its layers, and model of the boundary, for people."""
+        if self.solved:
+            return self.text
+        return "R = 1" if self.text == "none" else f"{self.text}, {self.model}"
+
+    @property
     def sigma(self) -> float:
         """Standard deviation of the amplitude window, µm."""
         return sigma_of(self.coherence_width)

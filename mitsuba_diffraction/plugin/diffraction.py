@@ -276,10 +276,7 @@ class Diffraction(DiffractingSurface):
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
         """See `SurfaceBSDF.diffracted`."""
-        # Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one
-        pair = Pair(site.si, wo, site.frame, active)
-        if self.coat is not None:
-            pair = CoatedPair(pair, self.coat.eta)
+        pair = self.pair(site, wo, active)  # eq. 1
         drawing = self._drawing_scale(site)
         if kinds == "d":
             density = self.power.density(pair.outer, drawing, site.si)
@@ -308,6 +305,11 @@ class Diffraction(DiffractingSurface):
             # s(ωi) s(ωo), so that no direction reflects more than it receives
             value *= mi.Spectrum(self.energy.factor(site, pair.outer.wo))
         return value
+
+    def pair(self, site: Site, wo: Vector3f, active: Mask) -> Pair:
+        """Return (u, v, w) = ωi + ωo in the patch's frame, eq. 1; within a coat if there is one."""
+        pair = Pair(site.si, wo, site.frame, active)
+        return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
     def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
         """See `SurfaceBSDF.draw`."""

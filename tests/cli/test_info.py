@@ -186,7 +186,7 @@ def test_a_recipe_is_drawn_and_a_table_is_not(run, table, tmp_path):
     for option in (
         ("--picture", tmp_path / "table.png"),
         ("--coherence-width", "5"),
-        ("--wavelength-range", "400", "700"),
+        ("--wavelength-range", "400:700"),
     ):
         ran = run("info", table, *option)
         assert ran.code == 2

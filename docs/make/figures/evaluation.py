@@ -208,7 +208,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not args.small:
             patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
         wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
-        angles = np.linspace(-75.0, 30.0, round(105.0 / args.angle_step) + 1)
+        angles = np.linspace(-30.0, 75.0, round(105.0 / args.angle_step) + 1)
         results = []
         for patch, nominal in patches:
             print(f"evaluating {patch.name}", flush=True)
