@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
+.PHONY: setup extras demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -21,6 +21,12 @@ setup: .venv/packages .venv/libraries  ## create .venv with the package, and an 
 
 .venv/browser: .venv/packages
 	@.ci/setup browser
+
+extras: .venv/extras  ## install what pictures may need: meshes of glTF and USD, films as MP4, denoising
+	@:
+
+.venv/extras: .venv/packages
+	@.ci/setup extras
 
 demo: setup  ## tabulate a snake scale, render three scenes with it, the snake in two lights
 	@mkdir -p out

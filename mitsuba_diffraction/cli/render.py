@@ -175,7 +175,7 @@ def _run_one(args: argparse.Namespace) -> Figures:
     outputs = _outputs(args)
 
     def load(bar: Bar) -> Any:
-        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
+        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise, say=say)
         return whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
 
     variant = set_variant(args.mode)
@@ -267,7 +267,9 @@ def _run_frames(args: argparse.Namespace) -> Figures:
         variant = set_variant(args.mode)
         with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
             bar(0, 0, "loading")
-            for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
+            for _ in render_frames(
+                args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+            ):
                 done += 1
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,

@@ -35,8 +35,8 @@ periodic : string [auto]
     Statement about the edges: `exact`, whole periods that tile; `open`, part of a larger surface.
     `auto`: files are open, generated patches tile.
 orientation : float or texture ∂ [0]
-    Angle, degrees, from ∂p/∂u to the x axis. Textures (raw) and mesh attributes hold (cos, sin) in
-    their first two of three channels.
+    Angle, degrees, from ∂p/∂u to the x axis. Raw textures and mesh attributes hold (cos, sin);
+    pictures of 8 and 16 bits (1 + cos)/2, (1 + sin)/2.
 lateral_scale : float or texture ∂ [1]
     Factor on lengths in the plane, 0.01 to 100: multiplies the period. Number, raw texture or mesh
     attribute of one channel.
