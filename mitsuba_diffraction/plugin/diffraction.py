@@ -35,8 +35,8 @@ periodic : string [auto]
     Statement about the edges: `exact`, whole periods that tile; `open`, part of a larger surface.
     `auto`: files are open, generated patches tile.
 orientation : float or texture ∂ [0]
-    Angle, degrees, from ∂p/∂u to the x axis. Raw textures and mesh attributes hold (cos, sin);
-    pictures of 8 and 16 bits (1 + cos)/2, (1 + sin)/2.
+    Angle, degrees, from ∂p/∂u to the x axis. Textures and mesh attributes hold (cos, sin); 8 and 16
+    bits: (1 + cos)/2, (1 + sin)/2.
 lateral_scale : float or texture ∂ [1]
     Factor on lengths in the plane, 0.01 to 100: multiplies the period. Number, raw texture or mesh
     attribute of one channel.
@@ -131,7 +131,7 @@ width on any scan; other orders have at most the width of the scan's windows (We
 elsewhere the window shrinks with the patch. A table file serves lateral factors up to 1.
 
 **Speckle.** `surface` requires texture coordinates of one scale, uv_scale or world_scale, and a
-spectral or mono variant. `random` tiling is that of Heitz and Neyret (2018).
+spectral or mono variant. `random` tiling: Heitz and Neyret (2018).
 
 **Media.** ext_ior changes only the reflectance. For the shorter waves in a medium, multiply
 lateral_scale and height_scale by its index, as `--ext-ior` does.

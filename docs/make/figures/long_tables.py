@@ -19,7 +19,8 @@ from .pages import exit_code
 #: Rows from which a table is a file.
 LONG = 12
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
-_HEADING = re.compile(r"^#+ (.*)$", re.M)
+# A heading, or the name of a generated part.
+_TITLE = re.compile(r"^(?:#+ |<!-- begin )(.*?)(?: -->)?$", re.M)
 
 
 def write_page(path: Path, text: str) -> list[Path]:
@@ -44,7 +45,7 @@ def write_page(path: Path, text: str) -> list[Path]:
 def separated(text: str, stem: str) -> tuple[str, dict[str, str]]:
     """Return a page with links in place of its long tables, and the CSV files by name.
 
-    stem : beginning of the files' names; the heading above a table follows.
+    stem : beginning of the files' names; the heading or generated part of a table follows.
     """
     tables: dict[str, str] = {}
 
@@ -53,8 +54,8 @@ def separated(text: str, stem: str) -> tuple[str, dict[str, str]]:
         rows = [_cells(line) for n, line in enumerate(lines) if n != 1]
         if len(rows) <= LONG:
             return match[0]
-        headings = _HEADING.findall(text[: match.start()])
-        words = re.sub(r"[^a-z0-9]+", "-", headings[-1].lower()).strip("-") if headings else ""
+        titles = _TITLE.findall(text[: match.start()]) or [stem]
+        words = re.sub(r"[^a-z0-9]+", "-", titles[-1].lower()).strip("-")
         name, number = f"{stem}-{words}.csv", 1
         while name in tables:
             number += 1
