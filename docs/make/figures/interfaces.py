@@ -38,7 +38,7 @@ def commands_page() -> str:
     left = [name for name in parsers if name not in grouped]
     sections = [
         "# Commands",
-        "`mitsuba-diffraction COMMAND --help` lists all options with defaults. Made by "
+        "`--help` behind the name of a command lists all options with defaults. Made by "
         "`python -m docs.make.figures.interfaces -o docs`.",
     ]
     for title, names in {**GROUPS, **({"More": tuple(left)} if left else {})}.items():
