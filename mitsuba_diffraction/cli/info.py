@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..heights.recipes import Recipe
     from ..heights.source import Source
 
+# What `render MESH` and `tangents` do with a mesh without normals
+_SMOOTH = "none in the file; render MESH and tangents make smooth ones over all edges"
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
 
@@ -31,10 +33,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "glTF, USD, serialized) and whether its tangents suit a measured patch.",
     )  # fmt: skip
     plot = path_ending_in(".png", ".pdf", ".svg")
-    options.add_option(parser, "FILE", "table, table of orders, heights, recipe or mesh", Path)
+    options.add_option(
+        parser, "FILE", "table, table of orders, heights, recipe or mesh", Path, more={"nargs": "?"}
+    )
     options.add_json(parser, "the description", nargs="?", const=STDOUT)
     options.add_options(
         parser,
+        ("--formats", "list the formats of scans: what is read, from which instruments, and what "
+         "to export in place of others", bool),
         ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", plot),
         ("--energy", "a table's albedo for three materials, raw and conserved, and R + T of a "
          "dielectric and of a thin sheet", bool),
@@ -47,6 +53,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> Figures:
     """Print the description, and return the figures."""
+    if args.formats:
+        others = ("file", "albedo", "energy", "picture", *options.HEIGHTS, *_TABLE)
+        options.refuse(args, others, " with --formats, which is about no file")
+        return _formats(args)
+    if args.file is None:
+        raise DiffractionError("name a file, or give --formats")
     data = {"file": str(args.file), **_describe(args.file, args)}
     for name, kinds, what in (
         ("energy", ("table",), "a table"),
@@ -67,6 +79,24 @@ def run(args: argparse.Namespace) -> Figures:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         print("\n".join(lines_of(data)))
+    return data
+
+
+def _formats(args: argparse.Namespace) -> Figures:
+    """Print the formats of scans, and return the figures."""
+    from ..heights.formats.catalogue import sections
+
+    data = sections()
+    if args.json == STDOUT:
+        print(json.dumps(data, indent=2, ensure_ascii=False))
+        return data
+    for title, rows in data.items():
+        print(f"{title}:")
+        for row in rows:
+            name, suffixes, makers, last = row.values()
+            what = list(row)[-1]
+            end = "" if last == "none" else f"; {what}: {last}"
+            print(f"  {name} ({suffixes}): {makers}{end}")
     return data
 
 
@@ -199,6 +229,6 @@ def _mesh(file: Path) -> dict[str, Any]:
         "kind": "mesh",
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
         **summary,
-        "normals": summary["normals"] and has_own_normals(file),
+        "normals": "in the file" if has_own_normals(file) else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }

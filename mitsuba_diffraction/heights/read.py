@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError, warn
-from ..files import FileKind, kind_of, readable_file
+from ..files import FileKind, beginning, kind_of, readable_file
 from ..retired import retired_value
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
+from .formats.catalogue import way_out
 from .formats.grids import read_npy, read_text
 from .formats.images import read_exr, read_image
 from .formats.instruments import read_instrument
@@ -177,10 +178,7 @@ def _by_default(field: HeightField, option: str) -> HeightField:
 def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHeights, bool]:
     """Read the heights of a file; also return whether an instrument wrote it."""
     if kind is FileKind.JPEG:
-        raise DiffractionError(
-            f"{str(file)!r} is a JPEG, whose compression changes heights; export PNG or TIFF "
-            "(8- or 16-bit grey) or numbers instead"
-        )
+        raise DiffractionError(f"{str(file)!r} {way_out(file, beginning(file, 8))}")
     if kind in (FileKind.EXR, FileKind.TABLE):
         return read_exr(file, None if channel is None else str(channel)), False
     if kind not in _READERS:

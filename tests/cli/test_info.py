@@ -186,7 +186,7 @@ def test_a_recipe_is_drawn_and_a_table_is_not(run, table, tmp_path):
     for option in (
         ("--picture", tmp_path / "table.png"),
         ("--coherence-width", "5"),
-        ("--wavelength-range", "400", "700"),
+        ("--wavelength-range", "400:700"),
     ):
         ran = run("info", table, *option)
         assert ran.code == 2
@@ -239,4 +239,19 @@ def test_normals_are_those_of_the_file(run, tmp_path, kind, own):
     file = tmp_path / f"mesh.{kind}"
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
     data = json.loads(run("info", file, "--json").out)
-    assert data["normals"] is own
+    assert (data["normals"] == "in the file") is own
+
+
+def test_formats_are_listed_with_what_to_export_for_others(run, tmp_path):
+    ran = run("info", "--formats")
+    assert ran.code == 0
+    assert "NanoScope (.spm" in ran.out
+    data = json.loads(run("info", "--formats", "--json").out)
+    for row in data["not read"]:
+        assert row["instead"]
+    (tmp_path / "a.sxm").write_bytes(b":NANONIS_VERSION:\n2\n")
+    said = run("info", tmp_path / "a.sxm").failed_in_one_line()
+    assert "Nanonis" in said
+    assert "Gwyddion" in said
+    assert "--formats" in run("info").failed_in_one_line()
+    assert "--level" in run("info", "--formats", "--level", "plane").err

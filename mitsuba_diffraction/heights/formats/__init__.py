@@ -5,7 +5,8 @@ Contents
 images       PNG, BMP, TIFF and EXR
 grids        grids of numbers: NPY, TXT, CSV
 instruments  files of scanning-probe instruments (extra `afm`)
-nanoscope    size of a scan by a NanoScope header, a witness beside the library
+catalogue    what is read, from which instruments, and what to export else
+headers      sizes of scans by the headers of instrument files, a witness beside the library
 """
 
 from __future__ import annotations

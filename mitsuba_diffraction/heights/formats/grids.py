@@ -24,8 +24,11 @@ _BLOCK = 1 << 22  # values that are copied at a time
 _LARGEST = 24 * 3 * MOST_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
 # Repetitions are possessive: a line of n characters takes n steps, and not n².
+_WIDTH = "Width|Breite|Largeur|Ancho|Larghezza|Largura|Šířka|Ширина"
+_HEIGHT = "Height|Höhe|Hauteur|Alto|Altura|Altezza|Výška|Высота"
 _SIZE = re.compile(
-    r"[#;%\s]*+(Width|Height)\s*+[:=]\s*+([-+.\deE]++)\s*+(\S++)\s*+$", re.IGNORECASE
+    rf"[#;%\s]*+(?:({_WIDTH})|{_HEIGHT})\s*+[:=]\s*+([-+.,\deE]++)\s*+(\S++)\s*+$",
+    re.IGNORECASE,
 )
 _VALUES = re.compile(r"[#;%\s]*+Value units\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE)
 
@@ -95,6 +98,11 @@ def read_text(path: Path) -> RawHeights:
         raise DiffractionError(f"{shown} has no line of numbers; expected heights in µm")
     values = table.with_gaps(range(table.numbers.shape[1]), "a grid of heights in µm")
     ny, nx = values.shape
+    if nx == 2 and ny > 2 and (np.diff(values[:, 0]) > 0.0).all():
+        raise DiffractionError(
+            f"{shown} holds two columns, the first ascending: a profile of {ny} points; a height "
+            "field needs a map (ny, nx)"
+        )
     check_pixel_count(ny, nx, shown) if values.size > 3 * MOST_PIXELS else None
     unit, stated, size = _read_header(table.header.values(), shown)
     points = nx == 3 and ny > 3 and size is None  # a header with sizes belongs to a grid
@@ -135,7 +143,8 @@ def _read_header(
             unit, stated = _factor(match[1], shown), match[1]
         elif match := _SIZE.match(line):
             try:
-                sizes[match[1].lower()] = float(match[2]) * _factor(match[3], shown)
+                number = float(match[2].replace(",", "."))
+                sizes["width" if match[1] else "height"] = number * _factor(match[3], shown)
             except ValueError as error:
                 raise DiffractionError(f"{shown}: {line.strip()!r} is not a size") from error
     if len(sizes) < 2:

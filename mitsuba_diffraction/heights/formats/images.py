@@ -123,9 +123,14 @@ def _doubles(path: Path, shown: str) -> npt.NDArray[np.float64] | None:
                 at + 8 if size <= 4 else struct.unpack(f"{order}I", content[at + 8 : at + 12])[0]
             )
             tags[tag] = struct.unpack(f"{order}{number}{letter}", content[place : place + size])
-        wanted = {258: (64,), 259: (1,), 277: (1,), 339: (3,)}
-        if any(tags.get(tag, (1,)) != value for tag, value in wanted.items()):
+        doubles = {258: (64,), 277: (1,), 339: (3,)}
+        if any(tags.get(tag, (1,)) != value for tag, value in doubles.items()):
             return None
+        if tags.get(259, (1,)) != (1,) or 273 not in tags:
+            raise DiffractionError(
+                f"{shown} has 64-bit floats that are compressed or in tiles; save it uncompressed, "
+                "or as 32-bit float in µm"
+            )
         (nx,), (ny,) = tags[256], tags[257]
         check_pixel_count(ny, nx, shown)
         strips = zip(tags[273], tags[279], strict=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from ...limits import bounded_lines, bounded_memory, check_archive, check_conten
 from ..field import check_pixel_count
 from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
-from .nanoscope import stated_size
+from .catalogue import way_out
+from .headers import stated_sizes
 
 # Signals that instruments record in nanometres beside the topography.
 _NOT_HEIGHT = re.compile(
@@ -25,9 +27,16 @@ _NOT_HEIGHT = re.compile(
     r"|dissipation|indentation|mask",
     re.IGNORECASE,
 )
+# Names of maps of heights, the last part of a path in HDF5.
+_HEIGHT = re.compile(
+    r"(?:^|[^a-z])(?:height\w*|topo\w*|z|surface|elevation)(?:$|[^a-z])[^/]*$", re.IGNORECASE
+)
 _MICROMETRE = "µm"
 #: Relative difference up to which two statements of a size are one: rounding.
 _SAME_SIZE = 0.01
+#: Ratio up to which two statements of the heights' span are one: programs print the span of a
+#: levelled or filtered image. Units differ by more.
+_SAME_SPAN = 5.0
 
 
 def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
@@ -51,6 +60,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         Heights in µm, rows upwards as in an image; points without data are NaN.
     """
     shown, size = repr(str(path)), path.stat().st_size
+    if known := way_out(path, beginning(path, 64)):
+        raise DiffractionError(f"{shown} {known}")
     check_archive(path, shown)
     if b"\0" not in beginning(path, 1 << 16):  # text: some readers take n² steps for long lines
         with path.open(encoding="latin-1") as stream:
@@ -66,11 +77,7 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         try:
             reader = topography.open_topography(str(path))
         except unknown as error:
-            raise DiffractionError(
-                f"{shown} is not a height field of a known kind; expected an image (PNG, BMP, "
-                "TIFF, EXR), an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument "
-                "file, undamaged"
-            ) from error
+            raise _why_unknown(path, topography.readers) from error
         except MemoryError:
             raise
         except Exception as error:
@@ -90,23 +97,68 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     return _witnessed(raw, path)
 
 
-def _witnessed(raw: RawHeights, path: Path) -> RawHeights:
-    """Compare the size with the file's header, which wins, and say so in a note."""
-    stated = stated_size(path)
-    if stated is None or raw.pixel_size is None:
-        return raw
-    (ny, nx), (dx, dy), (width, height, aspect) = raw.values.shape, raw.pixel_size, stated
-    if abs(nx * dx / width - 1.0) < _SAME_SIZE and abs(ny * dy / height - 1.0) < _SAME_SIZE:
-        return raw
-    raw.pixel_size = (width / nx, height / ny)
-    line = (
-        f"the header states {width:.4g} x {height:.4g} µm (aspect ratio {aspect}), and the library "
-        f"that reads it {nx * dx:.4g} x {ny * dy:.4g} µm: the header's are taken; pixel_size "
-        "overrides them"
+def _why_unknown(path: Path, readers: Sequence[Any]) -> DiffractionError:
+    """Return the error of a file that no reader takes: the reason of the one it is made for."""
+    shown, begins = repr(str(path)), beginning(path, 1 << 12)
+    for reader in readers:
+        named = path.suffix.lower().lstrip(".") in reader.file_extensions()
+        if named or reader.can_read(begins).name == "YES":
+            try:
+                reader(str(path)).close()
+            except Exception as error:
+                if type(error).__name__ != "FileFormatMismatch":
+                    return DiffractionError(
+                        f"{shown} is damaged or not supported, as {reader.name()}: "
+                        f"{first_line(error)}"
+                    )
+    return DiffractionError(
+        f"{shown} is not a height field of a known kind; expected an image (PNG, BMP, TIFF, EXR), "
+        "an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument file, undamaged; "
+        "'mitsuba-diffraction info --formats' lists them"
     )
-    warn(f"{str(path)!r}: {line}")
-    raw.notes = (*raw.notes, line)
+
+
+def _witnessed(raw: RawHeights, path: Path) -> RawHeights:
+    """Compare size and heights with the file's header; its size wins, and a note says so.
+
+    Raises a DiffractionError where the header contradicts the library and does not say which image
+    it means, or about the heights.
+    """
+    stated = stated_sizes(path)
+    if not stated or raw.pixel_size is None:
+        return raw
+    (ny, nx), (dx, dy) = raw.values.shape, raw.pixel_size
+    read = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
+    sizes = [f"{s.width:.4g} x {s.height:.4g} µm{f' ({s.words})' * bool(s.words)}" for s in stated]
+    fits = [s for s in stated if _same(nx * dx, s.width, nx) and _same(ny * dy, s.height, ny)]
+    if not fits and len(stated) > 1:
+        raise DiffractionError(
+            f"{str(path)!r}: the header states {' and '.join(sizes[:4])}, and the library that "
+            f"reads it {read}; export the heights as text, with their size"
+        )
+    span = (fits or stated)[0].span
+    factor = 1.0 if raw.unit is None else raw.unit
+    if span is not None and np.isfinite(raw.values).any():
+        found = float(np.nanmax(raw.values) - np.nanmin(raw.values)) * factor
+        if not span / _SAME_SPAN <= found <= span * _SAME_SPAN:
+            raise DiffractionError(
+                f"{str(path)!r}: the header states heights that span {span:.4g} µm, and the "
+                f"library that reads it {found:.4g} µm; export the heights as text, with their unit"
+            )
+    if not fits:
+        raw.pixel_size = (stated[0].width / nx, stated[0].height / ny)
+        line = (
+            f"the header states {sizes[0]}, and the library that reads it {read}: the header's are "
+            "taken; pixel_size overrides them"
+        )
+        warn(f"{str(path)!r}: {line}")
+        raw.notes = (*raw.notes, line)
     return raw
+
+
+def _same(size: float, stated: float, pixels: int) -> bool:
+    """Whether two sizes are one: to rounding, or to a pixel, if one is between the outer pixels."""
+    return abs(size / stated - 1.0) < max(_SAME_SIZE, 1.01 / pixels)
 
 
 def _choose(channels: list[Any], requested: str | int | None, shown: str) -> tuple[Any, str]:
@@ -119,7 +171,7 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> tup
         return channel, f"channel {channel.name!r}, chosen among {listed}"
     heights = [c for c in channels if _is_height(c) and not _NOT_HEIGHT.search(c.name)]
     if not heights:  # without units, which the user may know
-        heights = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
+        heights = _without_units(channels, shown)
     if not heights:
         raise _why_none(channels, shown)
     note = f"channel {heights[0].name!r}"
@@ -128,6 +180,21 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> tup
     if len(heights) > 1:
         note += "; channel chooses another"
     return heights[0], note
+
+
+def _without_units(channels: list[Any], shown: str) -> list[Any]:
+    """Return the maps without units, data sets of HDF5 for instance, those of heights by name.
+
+    Raises a DiffractionError if there are several and no name says heights.
+    """
+    maps = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
+    named = [c for c in maps if _HEIGHT.search(c.name) and not _NOT_HEIGHT.search(c.name)]
+    if len(maps) > 1 and not named:
+        raise DiffractionError(
+            f"{shown} has {len(maps)} maps without units, and none is called height; name the one "
+            f"with heights with channel: {_list(maps)}"
+        )
+    return named or maps
 
 
 def _list(channels: list[Any]) -> str:

@@ -207,8 +207,8 @@ class Transport:
         gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
         densities = [(mixture.density, gain)]
         if mixture.beats is not None:
-            ends = (np.broadcast_to(each, gain.shape) for each in (cos_i, nodes.cosine))
-            zeroth, _ = self._gain.order_0(*ends, nodes.azimuth, self._orders.sigma_0)
+            start, end = (np.broadcast_to(each, gain.shape) for each in (cos_i, nodes.cosine))
+            zeroth, _ = self._gain.order_0(start, end, nodes.azimuth, self._orders.sigma_0)
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
         position = np.minimum(
             self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001

@@ -43,6 +43,22 @@ def test_an_exported_header_gives_size_and_unit(tmp_path):
     assert field.heights[1] == pytest.approx([0.001, 0.002, 0.003, 0.004], rel=1e-12)
 
 
+def test_sizes_of_a_header_in_another_language_are_read(tmp_path):
+    path = tmp_path / "a.txt"
+    head = "# Kanal: Topographie\n# Breite: 12,34 µm\n# Höhe: 5678,9 nm\n# Value units: nm\n"
+    path.write_text(head + "1 1,5 3\n-2 -3 -6\n0 0 0\n9 9 9\n", encoding="utf-8")
+    field = HeightField.load(path, level="none")
+    assert field.extent == pytest.approx((12.34, 5.6789))
+    assert field.range == pytest.approx(0.015)
+
+
+def test_a_profile_in_two_columns_is_no_map(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("0 1\n0.1 4\n0.2 2\n0.3 2\n")
+    with pytest.raises(DiffractionError, match="profile of 4 points"):
+        HeightField.load(path, pixel_size=0.1)
+
+
 def test_a_grid_three_pixels_wide_with_a_header_is_no_list_of_points(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("# Width: 3 um\n# Height: 4 um\n" + "1 2 3\n" * 4, encoding="utf-8")

@@ -132,7 +132,7 @@ def test_sixteen_bits_of_colour_are_not_read_as_eight(tmp_path):
 
 def test_a_jpeg_is_refused_for_what_it_is(tmp_path):
     Image.fromarray(BYTES).save(tmp_path / "a.png", format="JPEG")
-    assert "is a JPEG, whose compression changes heights" in refusal(tmp_path / "a.png", **SIZES)
+    assert "is a JPEG, which is not read as heights" in refusal(tmp_path / "a.png", **SIZES)
 
 
 def test_lengths_that_an_image_lacks_are_asked_for(tmp_path):
@@ -307,6 +307,9 @@ def test_doubles_of_a_tiff_are_read(tmp_path, order):
     path.write_bytes(head + data + struct.pack(f"{order}H", len(tags)) + entries + bytes(4))
     found = HeightField.load(path, pixel_size=0.1, level="none").heights
     np.testing.assert_array_equal(found, heights[::-1])
+    packed = struct.pack(f"{order}HHIH", 259, 3, 1, 1), struct.pack(f"{order}HHIH", 259, 3, 1, 8)
+    path.write_bytes(path.read_bytes().replace(*packed))
+    assert "save it uncompressed" in refusal(path, pixel_size=0.1)
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(DiffractionError):
         HeightField.load(path, pixel_size=0.1)

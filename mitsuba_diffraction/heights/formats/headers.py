@@ -1,0 +1,217 @@
+"""Sizes of scans by the headers of instrument files: a witness beside the library that reads them.
+
+Each function takes the beginning of a file and returns what its header states about the images.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import struct
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..lengths import micrometres_of
+
+_HEADER = 1 << 17  # bytes, more than any header
+_IMAGE = re.compile(r"\\\*Ciao image list(.*?)(?=\\\*|\Z)", re.DOTALL)
+_SIZE = re.compile(r"\\Scan Size: ([\d.eE+-]+) ([\d.eE+-]+) (~m|[^\s\\]+)", re.IGNORECASE)
+_ASPECT = re.compile(r"\\Aspect ratio: ([\d.]+):([\d.]+)", re.IGNORECASE)
+_SLOW = re.compile(r"\\Slow Axis Size: ([\d.eE+-]+) (~m|[^\s\\]+)", re.IGNORECASE)
+_ROWS = re.compile(r"\\Number of lines: (\d+)", re.IGNORECASE)
+_LINES = re.compile(r"\\Lines: (\d+)", re.IGNORECASE)
+# Bytes of Gwyddion's components without a length of their own.
+_GWY_ATOMS = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
+_GWY_ARRAYS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
+# Exceptions of headers that are damaged, or of a kind that is not known here.
+_UNCLEAR = (
+    ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error, zipfile.BadZipFile,
+    RecursionError, RuntimeError, NotImplementedError, EOFError, OSError,
+)  # fmt: skip
+
+
+class Stated(NamedTuple):
+    """Size of an image as a header states it.
+
+    Attributes
+    ----------
+    width, height : µm, along the rows and across them.
+    words : what else the header says about them, for messages; "" without.
+    span : µm from the lowest height to the highest; None if the header does not say.
+    """
+
+    width: float
+    height: float
+    words: str = ""
+    span: float | None = None
+
+
+def stated_sizes(path: Path) -> list[Stated]:
+    """Return the sizes of the images of a file, each once; empty for formats without a witness."""
+    with path.open("rb") as stream:
+        head = stream.read(_HEADER)
+    for begins, witness in _WITNESSES:
+        if head.startswith(begins):
+            # a header that the witness does not understand says nothing
+            with suppress(*_UNCLEAR):
+                sizes = witness(path, head)
+                return list(dict.fromkeys(s for s in sizes if s.width > 0.0 and s.height > 0.0))
+    return []
+
+
+def _nanoscope(path: Path, head: bytes) -> Iterator[Stated]:
+    r"""Two equal lengths and an aspect ratio, width to height, or two lengths that differ."""
+    text = head.decode("latin-1")
+    for image in _IMAGE.findall(text):
+        size, aspect = _SIZE.search(image), _ASPECT.search(image) or _ASPECT.search(text)
+        unit = size and micrometres_of(size[3].replace("~m", "µm"))
+        if not (size and unit):
+            continue
+        width, height = float(size[1]) * unit, float(size[2]) * unit
+        across, along = (float(aspect[1]), float(aspect[2])) if aspect else (1.0, 1.0)
+        if not min(width, height, across, along) > 0.0:
+            return
+        if abs(height / width - 1.0) < 1e-3:
+            height = width * along / across
+        slow, rows = _SLOW.search(text), _ROWS.search(image)
+        if slow is None or (slow_unit := micrometres_of(slow[2].replace("~m", "µm"))) is None:
+            yield Stated(width, height, f"aspect ratio {across:g}:{along:g}")
+            return
+        # the length of the slow axis, of which a capture that was stopped has a part
+        height, lines = float(slow[1]) * slow_unit, _LINES.search(text)
+        yield Stated(width, height, "slow axis size")
+        if rows and lines and 0 < int(rows[1]) < int(lines[1]):
+            yield Stated(width, height * int(rows[1]) / int(lines[1]), "part of the slow axis")
+        return
+
+
+def _gwyddion(path: Path, head: bytes) -> Iterator[Stated]:
+    """`xreal` and `yreal` of each data field, in the unit `si_unit_xy`, metres without prefix."""
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as file:
+        (container,) = _gwy_objects(file, 4, len(file))
+    for name, value in container[1].items():
+        if re.fullmatch(r"/\d+/data", name) and isinstance(value, tuple):
+            field = value[1]
+            unit = micrometres_of(field["si_unit_xy"][1].get("unitstr", ""))
+            if unit is not None:
+                yield Stated(abs(field["xreal"]) * unit, abs(field["yreal"]) * unit)
+
+
+def _gwy_objects(content: mmap.mmap, start: int, stop: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield name and components of the objects between two places; arrays are passed over."""
+    while start < stop:
+        name, start = _gwy_text(content, start)
+        (size,) = struct.unpack_from("<I", content, start)
+        start += 4
+        yield name, _gwy_components(content, start, start + size)
+        start += size
+
+
+def _gwy_components(content: mmap.mmap, at: int, stop: int) -> dict[str, Any]:
+    """Return the components of an object by name: numbers, texts, and objects as (name, parts)."""
+    found: dict[str, Any] = {}
+    while at < stop:
+        name, at = _gwy_text(content, at)
+        kind, at = content[at : at + 1], at + 1
+        if kind in _GWY_ATOMS:
+            if kind in b"id":
+                (found[name],) = struct.unpack_from("<" + kind.decode(), content, at)
+            at += _GWY_ATOMS[kind]
+        elif kind == b"s":
+            found[name], at = _gwy_text(content, at)
+        elif kind == b"o":
+            _, end = _gwy_text(content, at)
+            (size,) = struct.unpack_from("<I", content, end)
+            (found[name],) = _gwy_objects(content, at, end + 4 + size)
+            at = end + 4 + size
+        elif kind in _GWY_ARRAYS:
+            (count,) = struct.unpack_from("<I", content, at)
+            at += 4 + count * _GWY_ARRAYS[kind]
+        else:
+            raise ValueError
+    return found
+
+
+def _gwy_text(content: mmap.mmap, at: int) -> tuple[str, int]:
+    """Return a text that ends with a zero, and the place behind it."""
+    end = content.find(b"\0", at)
+    if end < 0:
+        raise ValueError
+    return content[at:end].decode("utf-8", "replace"), end + 1
+
+
+def _x3p(path: Path, head: bytes) -> Iterator[Stated]:
+    """`Increment`, m, of CX and CY times the size of the matrix (ISO 25178-72)."""
+    with zipfile.ZipFile(path) as archive:
+        text = archive.open("main.xml").read(_HEADER)
+
+    def value(*tags: str) -> float:
+        at = 0
+        for tag in tags:
+            match = re.compile(rf"<(?:\w+:)?{tag}>\s*([^<\s]*)".encode()).search(text, at)
+            if match is None:
+                raise ValueError
+            at = match.end()
+        return float(match[1]) if match else 0.0
+
+    width, height = (value(f"C{n}", "Increment") * value(f"Size{n}") * 1e6 for n in "XY")
+    yield Stated(width, height)
+
+
+def _sdf(path: Path, head: bytes) -> Iterator[Stated]:
+    """`Xscale` and `Yscale`, m, times the numbers of points and profiles (ISO 25178-71)."""
+    if head.startswith(b"b"):
+        points, profiles, x, y = struct.unpack_from("<HHdd", head, 42)
+    else:
+        points, profiles, x, y = (
+            _value(head, rf"^{name}\s*=\s*(\S+)")
+            for name in ("NumPoints", "NumProfiles", "Xscale", "Yscale")
+        )
+    yield Stated(points * x * 1e6, profiles * y * 1e6)
+
+
+def _mi(path: Path, head: bytes) -> Iterator[Stated]:
+    """`xLength` and `yLength`, m; keys have 14 letters."""
+    x, y = (_value(head, rf"^{axis}Length\s*(\S+)") * 1e6 for axis in "xy")
+    yield Stated(x, y)
+
+
+def _wsxm(path: Path, head: bytes) -> Iterator[Stated]:
+    """Amplitudes along x, y and z, with their units."""
+    lengths = []
+    for axis, otherwise in (("X", ""), ("Y", "X"), ("Z", "")):
+        match = None
+        for name in filter(None, (axis, otherwise)):
+            match = match or re.search(rf"^ *+{name} Amplitude: (\S+) (\S+)".encode(), head, re.M)
+        unit = micrometres_of(match[2].decode("latin-1")) if match else None
+        lengths.append(float(match[1]) * unit if match and unit else 0.0)
+    yield Stated(lengths[0], lengths[1], span=lengths[2] or None)
+
+
+def _bcr(path: Path, head: bytes) -> Iterator[Stated]:
+    """`xlength` and `ylength` in `xunit`, nm without."""
+    head = head.lstrip(b"\xff\xfe").replace(b"\0", b"")  # UTF-16 or Latin
+    unit = re.search(rb"^xunit\s*=\s*(\S+)", head, re.MULTILINE)
+    factor = micrometres_of(unit[1].decode("latin-1")) if unit else 1e-3
+    x, y = (_value(head, rf"^{axis}length\s*=\s*(\S+)") for axis in "xy")
+    if factor is not None:
+        yield Stated(x * factor, y * factor)
+
+
+def _value(head: bytes, pattern: str) -> float:
+    """Return the number that a pattern finds in a header of lines."""
+    match = re.search(pattern.encode(), head, re.MULTILINE)
+    if match is None:
+        raise ValueError
+    return float(match[1])
+
+
+_WITNESSES: tuple[tuple[bytes, Callable[[Path, bytes], Iterator[Stated]]], ...] = (
+    *((begins, _nanoscope) for begins in (b"\\*File list", b"\\*Force file list", b"?*File list")),
+    (b"GWYP", _gwyddion), (b"PK\x03\x04", _x3p), (b"aISO-1.0", _sdf), (b"bISO-1.0", _sdf),
+    (b"fileType", _mi), (b"WSxM file copyright", _wsxm), (b"fileformat = bcr", _bcr),
+    *((mark + "fileformat = bcr".encode("utf-16-le"), _bcr) for mark in (b"", b"\xff\xfe")),
+)  # fmt: skip
