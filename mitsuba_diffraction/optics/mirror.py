@@ -93,13 +93,12 @@ def correction_within(
 
     sigma_0 : σ₀, µm; k : 2π/λ above, rad/µm.
     """
-    squares = outside_square(cos_i, n), outside_square(cos_o, n)
-    xp = of(*squares)
-    beyond = [square < 0.0 for square in squares]
-    cone = horizon_correction(*(sigma_0 * xp.absolute(square) for square in squares), k)
-    ends = (sigma_0 * (n * (cosine * cosine)) for cosine in (cos_i, cos_o))
-    both = xp.where(beyond[0], cone * horizon_correction(*ends, k), cone)
-    return xp.where((beyond[0] & beyond[1]) | ~(beyond[0] | beyond[1]), both, 0.0)
+    into, out = outside_square(cos_i, n), outside_square(cos_o, n)
+    xp = of(into, out)
+    cone = horizon_correction(sigma_0 * xp.absolute(into), sigma_0 * xp.absolute(out), k)
+    horizon = horizon_correction(sigma_0 * n * cos_i * cos_i, sigma_0 * n * cos_o * cos_o, k)
+    visible = xp.where(into < 0.0, cone * horizon, cone)
+    return xp.where((into < 0.0) & (out < 0.0) | (into >= 0.0) & (out >= 0.0), visible, 0.0)
 
 
 def mirror(geometry: Geometry, cosine: Number, index: Index) -> Jones:

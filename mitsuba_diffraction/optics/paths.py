@@ -174,18 +174,17 @@ class Path:
         sigma_0 : of the lobe's window, µm.
         """
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
-        squares = self.came.outside(cos_i), self.left.outside(cos_o)
-        leaves = (squares[0] > 0.0) & (squares[1] > 0.0)
+        into, out = self.came.outside(cos_i), self.left.outside(cos_o)
+        leaves = (into > 0.0) & (out > 0.0)
+        above_i, above_o = np.sqrt(np.maximum(into, 0.0)), np.sqrt(np.maximum(out, 0.0))
         if self.let_through:
-            levels = (sigma_0 * np.maximum(square, 0.0) for square in squares)
-            visible = leaves * horizon_correction(*levels, k)
+            visible = leaves * horizon_correction(sigma_0 * above_i**2, sigma_0 * above_o**2, k)
         else:
             visible = correction_within(cos_i, cos_o, self.left.index, sigma_0, k)
         none = np.zeros_like(visible)
-        outer = [np.sqrt(np.maximum(square, 0.0)) for square in squares]
-        wi, wo = directions(*outer, cos_turn)
+        wi, wo = directions(above_i, above_o, cos_turn)
         half = boundary.geometry(wi, wo).cos_half
-        cosine = mirror_cosine(half, *outer, np.asarray(k * sigma_0))
+        cosine = mirror_cosine(half, above_i, above_o, np.asarray(k * sigma_0))
         if self.let_through:
             return visible * self._passed(cosine), none
         if not self.thin:

@@ -198,7 +198,7 @@ class Transport:
         gain, face = self._gain.order_0(cos_in, cos_o, np.pi, self._orders.sigma_0)
         parts *= gain * power + face
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
-        return to_rows.summed(parts).matrix.toarray()
+        return to_rows.summed(np.asarray(parts, np.float32)).matrix.toarray()
 
     def _weak_shares(self, theta: Real, phi: Real) -> Array:
         """Return shares (t, p, n) of the quadrature's directions, at azimuths turned by phi."""
