@@ -151,7 +151,8 @@ def _densities(table: DiffractionTable) -> NDArray[np.float64]:
     last = powers_at(table, largest).ravel().astype(np.float64)
     even = shares.mean(axis=0) + last / np.maximum(last.sum(), 1e-30)
     mixed = (1.0 - _EVEN) * shares + 0.5 * _EVEN * even
-    return np.asarray(mixed / np.maximum(mixed.sum(axis=1, keepdims=True), 1e-30))
+    mixed[mixed.sum(axis=1) == 0.0] = 1.0  # a mirror has no order to draw
+    return np.asarray(mixed / mixed.sum(axis=1, keepdims=True))
 
 
 def interpolated(textures: PatchTextures, kappa: float) -> NDArray[np.float64]:
