@@ -23,7 +23,8 @@ height_unit : string [from the file]
 channel : string or integer [the heights]
     Channel of an instrument file, by name or index; of an EXR image, by name.
 crop : float or string [none]
-    Size of the central region to keep, µm: one number for a square, or "width, height".
+    Size of the central region to keep, µm: one number for a square, or "width, height"; or of one
+    elsewhere, with its lower left corner: "width, height, x, y".
 fill : string [none]
     Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
     `harmonic` spans a membrane over the gap.
