@@ -26,7 +26,7 @@ _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 PLUGINS = {
     "diffraction": _FOLDER / "diffraction.py",
     "diffraction_dielectric": _FOLDER / "diffraction_dielectric.py",
-    "diffraction_orders": _FOLDER / "orders/diffraction_orders.py",
+    "diffraction_orders": _FOLDER.parent / "orders/bsdf/diffraction_orders.py",
 }
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
