@@ -14,6 +14,7 @@ characterization of iridescent colours in biological studies, Interface Focus 9,
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +38,12 @@ HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
 #: Saturation below which a colour counts as grey.
 GREY = 0.1
 
-#: Unordered surfaces of which `chance_iridescence` is the mean.
+#: Unordered surfaces of which `light_and_chance` takes the mean.
 CHANCES = 3
 
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
-SHORTEST, LONGEST, STEP = 380.0, 780.0, 5.0
+SHORTEST, LONGEST, STEP = 380.0, 780.0, 10.0
 # Side of a direction's cell, in sines: half of the narrowest lobe's standard deviation.
 _CELL = 0.008
 # Luminance, relative to the brightest direction, below which a direction has no colour.
@@ -101,24 +102,30 @@ class DiffractedLight:
         return np.asarray(self.xyz[lit])
 
 
-def chance_iridescence(table: DiffractionTable, light: LightDirection) -> float:
-    """Return the index of an unordered surface of the same size and roughness, by chance alone.
+def light_and_chance(
+    table: DiffractionTable, light: LightDirection
+) -> tuple[DiffractedLight, float]:
+    """Return the diffracted light, and the part of its index that chance explains.
 
-    The mean over `CHANCES` surfaces. Each order has the median power of all orders at its
-    frequency, times a random factor as of speckle, exponentially distributed.
+    Chance is an unordered surface of the same size and roughness, the mean over `CHANCES`: each
+    order has the median power of all orders at its frequency, times a random factor as of speckle,
+    exponentially distributed. The index is a root mean square over the light, so that chance has a
+    part in it by its share of the luminance: a grating's lobes are above the median and have none.
     """
     last = table.grid.last
     shape = (2 * last[1] + 1, 2 * last[0] + 1)
-    indices = []
-    for seed in range(CHANCES):
-        speckle = np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
-        indices.append(diffracted_light(table, light, speckle=speckle).iridescence())
-    return float(np.mean(indices))
+    speckles = [
+        np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
+        for seed in range(CHANCES)
+    ]
+    own, *unordered = _by_direction(table, light, speckles)
+    chance = float(np.mean([each.iridescence() for each in unordered]))
+    total = float(own.xyz[..., 1].sum())
+    share = float(np.mean([each.xyz[..., 1].sum() for each in unordered])) / max(total, 1e-300)
+    return own, chance * math.sqrt(min(share, 1.0))
 
 
-def diffracted_light(
-    table: DiffractionTable, light: LightDirection, *, speckle: Reals | None = None
-) -> DiffractedLight:
+def diffracted_light(table: DiffractionTable, light: LightDirection) -> DiffractedLight:
     """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
@@ -127,10 +134,18 @@ def diffracted_light(
     Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
-    speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its
-        frequency, which replaces its own.
 
     Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
+    """
+    return _by_direction(table, light, [])[0]
+
+
+def _by_direction(
+    table: DiffractionTable, light: LightDirection, speckles: Sequence[Reals]
+) -> list[DiffractedLight]:
+    """Collect the orders, and once more for each field of factors that replaces their powers.
+
+    speckles : factors (2 ny + 1, 2 nx + 1) on the median power of all orders at a frequency.
     """
     if table.wavelength_range[0] > SHORTEST:
         raise DiffractionError(
@@ -150,8 +165,8 @@ def diffracted_light(
     mirror = frequency < (1.0 + 1e-6) * 2.0 * math.pi / width
     rings = np.round(frequency / min(table.spacing)).astype(int)
     count = 2 * math.ceil(1.15 / _CELL)
-    xyz = np.zeros((count, count, 3))
-    central = np.zeros(3)
+    xyz = np.zeros((1 + len(speckles), count, count, 3))
+    central = np.zeros((1 + len(speckles), 3))
     for wavelength in np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP):
         k = float(wavenumber(wavelength))
         x, y = qx / k - light.direction[0], qy / k - light.direction[1]
@@ -163,21 +178,24 @@ def diffracted_light(
         factors = expansion.weights(k * w) / scale
         interval = expansion.interval(k * w)
         power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
-        power = np.maximum(power, 0.0)
-        if speckle is not None:
+        powers = [np.maximum(power, 0.0)]
+        if speckles:
             ring = rings[rows, columns]
-            medians = median(power, ring, np.arange(rings.max() + 1))
-            power = np.nan_to_num(medians)[ring] * speckle[rows, columns]
-        power *= _obliquity(sines, cosine, light)
+            medians = median(powers[0], ring, np.arange(rings.max() + 1))
+            unordered = np.nan_to_num(medians)[ring]
+            powers += [unordered * speckle[rows, columns] for speckle in speckles]
+        obliquity = _obliquity(sines, cosine, light)
         near = mirror[rows, columns]
         weights = response(wavelength) * STEP
-        central += weights * power[near].sum()
-        order_0 = order_0_power(table.averaged, np.array(2.0 * k * light.direction[2]))
-        central += weights * float(order_0)
+        order_0 = float(order_0_power(table.averaged, np.array(2.0 * k * light.direction[2])))
         lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
-        xyz += _spread(sines[~near], power[~near], lobe, count)[..., None] * weights
-    diffracted = float(xyz[..., 1].sum())
-    return DiffractedLight(xyz, diffracted / max(diffracted + central[1], 1e-300))
+        for n, each in enumerate(powers):
+            each = each * obliquity
+            central[n] += weights * (each[near].sum() + order_0)
+            xyz[n] += _spread(sines[~near], each[~near], lobe, count)[..., None] * weights
+    diffracted = xyz[..., 1].sum(axis=(1, 2))
+    shares = diffracted / np.maximum(diffracted + central[:, 1], 1e-300)
+    return [DiffractedLight(*both) for both in zip(xyz, shares.tolist(), strict=True)]
 
 
 def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:

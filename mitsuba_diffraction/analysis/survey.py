@@ -32,7 +32,7 @@ from ..tables.source import TableSource
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .crops import crops_of
-from .iridescence import WINDOW, chance_iridescence, diffracted_light
+from .iridescence import WINDOW, light_and_chance
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
@@ -42,7 +42,7 @@ from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 8
+VERSION = 9
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -144,14 +144,14 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
-    # without a material ideal reflection: the effect of the structure alone
-    bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
+    # without a material ideal reflection: the effect of the structure alone, as in the index
+    ideal = {"material": "none", "energy_conserving": False}
+    bsdf = bsdf_of(table, **(dict(job.surface) or ideal))
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     light = LightDirection(job.theta, phi)
-    diffracted = diffracted_light(table, light)
-    row["diffracted"] = diffracted.share
-    index, floor = diffracted.iridescence(), chance_iridescence(table, light)
+    diffracted, floor = light_and_chance(table, light)
+    row["diffracted"], index = diffracted.share, diffracted.iridescence()
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (
@@ -255,7 +255,8 @@ def run_survey(
                 rows[len(named)] = stored
             named.append(name)
     todo = list(jobs)
-    progress(0, len(todo), "scans")
+    files_of_jobs = [Path(named[n]["file"]).name for n in todo]
+    progress(0, len(todo), _next(files_of_jobs, 0, client))
     results = run_jobs(client, measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
@@ -264,13 +265,18 @@ def run_survey(
         else:
             rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
         write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
-        progress(done, len(todo), "scans")
+        progress(done, len(todo), _next(files_of_jobs, done, client))
     result = write_rows(folder / TABLE, named, rows)
     write_repeats(folder / SAMPLES, result)
     ranking = ranked(result)
     write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
     write_sheets(folder, ranking)
     return result
+
+
+def _next(names: Sequence[str], done: int, client: Any) -> str:
+    """Return the scan that is measured next, for a progress bar; workers measure several."""
+    return names[done] if client is None and done < len(names) else "scans"
 
 
 def files_in(folder: Path) -> list[Path]:

@@ -15,7 +15,7 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
-from mitsuba_diffraction.analysis.iridescence import chance_iridescence, diffracted_light
+from mitsuba_diffraction.analysis.iridescence import light_and_chance
 from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
@@ -295,8 +295,8 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
     light = LightDirection(30.0, 0.0)
     for field, above in ((rough, 1.25), (grating, 1.3)):
         table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
-        index = diffracted_light(table, light).iridescence()
-        chance = chance_iridescence(table, light)
+        diffracted, chance = light_and_chance(table, light)
+        index = diffracted.iridescence()
         # chance differs by some 10 % from patch to patch
         assert (index > above * chance) == (field is grating), (index, chance)
 
