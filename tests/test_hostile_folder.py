@@ -40,7 +40,7 @@ DONE = [
      "100", "--no-compiled", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],
     ["solve", "lamellar", "--period", "0.6", "--depth", "0.1", "--resolution", "80",
-     "--wavelength-range", "590,610", "--theta", "0", "--step", "20", *_METAL, "-o",
+     "--wavelength-range", "590:610", "--theta", "0", "--step", "20", *_METAL, "-o",
      "out/orders.nc"],
     ["orders", "out/orders.nc", "--theta", "0", "--wavelength", "600", "-o", "out/orders.csv"],
     ["export-shader", *_TABLE, *_METAL, "-o", "out/shader"],

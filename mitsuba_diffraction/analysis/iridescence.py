@@ -14,12 +14,13 @@ characterization of iridescent colours in biological studies, Interface Focus 9,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, median
+from scipy.ndimage import gaussian_filter, map_coordinates, median
 
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
@@ -44,7 +45,7 @@ CHANCES = 3
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
 SHORTEST, LONGEST, STEP = 380.0, 780.0, 10.0
-# Side of a direction's cell, in sines: half of the narrowest lobe's standard deviation.
+# Side of a direction's cell, in sines: at most the narrowest lobe's standard deviation, a scan's.
 _CELL = 0.008
 # Luminance, relative to the brightest direction, below which a direction has no colour.
 _DARK = 1e-9
@@ -62,6 +63,21 @@ class DiffractedLight:
 
     xyz: Reals
     share: float
+
+    def brightest(self) -> tuple[float, float, float]:
+        """Return the largest luminous reflectance factor, and its direction θ, φ in degrees.
+
+        Relative to a white Lambertian standard of the same place: π Y over the cell's area. 0 in
+        the direction of the normal if no light is diffracted.
+        """
+        luminance = self.xyz[..., 1]
+        row, column = np.unravel_index(np.argmax(luminance), luminance.shape)
+        if not luminance[row, column] > 0.0:
+            return 0.0, 0.0, 0.0
+        x, y = ((n - 0.5 * len(luminance)) * _CELL for n in (column, row))
+        theta = math.degrees(math.asin(min(math.hypot(x, y), 1.0)))
+        phi = math.degrees(math.atan2(y, x))
+        return float(luminance[row, column]) * math.pi / _CELL**2, theta, phi
 
     def iridescence(self) -> float:
         """Return the root mean square distance of the chromaticity u'v' from its mean.
@@ -102,8 +118,89 @@ class DiffractedLight:
         return np.asarray(self.xyz[lit])
 
 
+#: Factor of a material on the power of an order, and w = κ/k: functions of the sines (n, 2) of
+#: directions and a wavelength, nm; see `MaterialFactor.at`.
+Factor = Callable[[Reals, float], tuple[Reals, Reals]]
+
+# Polar angles, and azimuths from the light's, at which a material's factor is tabulated, degrees.
+_POLAR, _AZIMUTHS = np.linspace(0.0, 90.0, 91), np.linspace(0.0, 180.0, 37)
+
+
+@dataclass(frozen=True)
+class MaterialFactor:
+    """Factor of a material, layers and coat on the power of orders, for light of one polar angle.
+
+    It belongs to the material alone: scans of one survey share it.
+
+    Attributes
+    ----------
+    wavelengths : (n,), nm, those of the index.
+    factor : (n, polar, azimuths) on the power.
+    excess : (n, polar, azimuths), w less the sum of both cosines, which a coat changes.
+    """
+
+    wavelengths: Reals
+    factor: Reals
+    excess: Reals
+
+    @classmethod
+    def of(cls, bsdf: Any, theta: float) -> MaterialFactor:
+        """Tabulate the factor of a BSDF for light `theta` degrees from the normal.
+
+        bsdf : `diffraction` of the current variant, spectral and vectorised. Its pigment does not
+            diffract and is left out; so is the scale by which energy is conserved.
+        """
+        import drjit as dr
+        import mitsuba as mi
+
+        from ..plugin.memory import upload
+        from .maps.hemisphere import flat_interaction
+
+        light = LightDirection(theta, 0.0)
+        polar, azimuth = (np.radians(a) for a in np.meshgrid(_POLAR, _AZIMUTHS, indexing="ij"))
+        cosine = np.maximum(np.cos(polar), 1e-4)
+        sine = np.sqrt(1.0 - cosine**2)
+        columns = sine * np.cos(azimuth), sine * np.sin(azimuth), cosine
+        x, y, z = (upload(mi.Float, c.ravel().astype(np.float32)) for c in columns)
+        wo = mi.Vector3f(x, y, z)
+        si = flat_interaction(mi.Vector3f(light.direction.tolist()), cosine.size)
+        factors, excesses = [], []
+        wavelengths = np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP)
+        for wavelength in wavelengths:
+            channel = mi.Float(float(wavelength))
+            dr.make_opaque(channel)  # one kernel for all wavelengths
+            si.wavelengths = mi.UnpolarizedSpectrum(channel)
+            site = bsdf.site_at(si, mi.Mask(True))
+            value, w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
+            shape = np.ones(cosine.size)
+            factors.append((np.array(value[0], np.float64) * shape).reshape(cosine.shape))
+            w = (np.array(w, np.float64) * shape).reshape(cosine.shape)
+            excesses.append(w - cosine - light.direction[2])
+        return cls(wavelengths, np.stack(factors), np.stack(excesses))
+
+    def at(self, light: LightDirection) -> Factor:
+        """Return the factor for light from a direction, whose polar angle is the table's."""
+
+        def factor(sines: Reals, wavelength: float) -> tuple[Reals, Reals]:
+            n = int(np.argmin(np.abs(self.wavelengths - wavelength)))
+            radius = np.minimum(np.hypot(*sines.T), 1.0)
+            turn = np.arctan2(sines[:, 1], sines[:, 0]) - math.radians(light.phi)
+            turn = np.abs((turn + math.pi) % (2.0 * math.pi) - math.pi)
+            place = (
+                np.degrees(np.arcsin(radius)) / _POLAR[1],
+                np.degrees(turn) / _AZIMUTHS[1],
+            )
+            value, excess = (
+                map_coordinates(field[n], place, order=1, mode="nearest")
+                for field in (self.factor, self.excess)
+            )
+            return value, light.direction[2] + np.sqrt(1.0 - radius**2) + excess
+
+        return factor
+
+
 def light_and_chance(
-    table: DiffractionTable, light: LightDirection
+    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
 ) -> tuple[DiffractedLight, float]:
     """Return the diffracted light, and the part of its index that chance explains.
 
@@ -111,6 +208,8 @@ def light_and_chance(
     order has the median power of all orders at its frequency, times a random factor as of speckle,
     exponentially distributed. The index is a root mean square over the light, so that chance has a
     part in it by its share of the luminance: a grating's lobes are above the median and have none.
+
+    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
     """
     last = table.grid.last
     shape = (2 * last[1] + 1, 2 * last[0] + 1)
@@ -118,15 +217,17 @@ def light_and_chance(
         np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
         for seed in range(CHANCES)
     ]
-    own, *unordered = _by_direction(table, light, speckles)
+    own, *unordered = _by_direction(table, light, factor, speckles)
     chance = float(np.mean([each.iridescence() for each in unordered]))
     total = float(own.xyz[..., 1].sum())
     share = float(np.mean([each.xyz[..., 1].sum() for each in unordered])) / max(total, 1e-300)
     return own, chance * math.sqrt(min(share, 1.0))
 
 
-def diffracted_light(table: DiffractionTable, light: LightDirection) -> DiffractedLight:
-    """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
+def diffracted_light(
+    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
+) -> DiffractedLight:
+    """Collect the orders of a table by direction, in daylight (D65).
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
     coherence window of `WINDOW`, or the table's if that is narrower. Orders of periods as long as
@@ -134,14 +235,18 @@ def diffracted_light(table: DiffractionTable, light: LightDirection) -> Diffract
     Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
+    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
 
     Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
     """
-    return _by_direction(table, light, [])[0]
+    return _by_direction(table, light, factor)[0]
 
 
 def _by_direction(
-    table: DiffractionTable, light: LightDirection, speckles: Sequence[Reals]
+    table: DiffractionTable,
+    light: LightDirection,
+    factor: Factor | None,
+    speckles: Sequence[Reals] = (),
 ) -> list[DiffractedLight]:
     """Collect the orders, and once more for each field of factors that replaces their powers.
 
@@ -174,7 +279,11 @@ def _by_direction(
         rows, columns = np.nonzero(z2 > 0.0)
         sines = np.stack([x[columns], y[rows]], axis=-1)
         cosine = np.sqrt(z2[rows, columns])
-        w = light.direction[2] + cosine
+        w, reflected = light.direction[2] + cosine, np.ones(1)
+        r_0, w_0 = np.ones(1), np.array([2.0 * light.direction[2]])
+        if factor is not None:
+            reflected, w = factor(sines, float(wavelength))
+            r_0, w_0 = factor(light.mirror[None, :2], float(wavelength))
         factors = expansion.weights(k * w) / scale
         interval = expansion.interval(k * w)
         power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
@@ -184,15 +293,14 @@ def _by_direction(
             medians = median(powers[0], ring, np.arange(rings.max() + 1))
             unordered = np.nan_to_num(medians)[ring]
             powers += [unordered * speckle[rows, columns] for speckle in speckles]
-        obliquity = _obliquity(sines, cosine, light)
+        reflected = reflected * _obliquity(sines, cosine, light)
         near = mirror[rows, columns]
         weights = response(wavelength) * STEP
-        order_0 = float(order_0_power(table.averaged, np.array(2.0 * k * light.direction[2])))
+        order_0 = float(r_0[0] * order_0_power(table.averaged, k * w_0)[0])
         lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
-        for n, each in enumerate(powers):
-            each = each * obliquity
-            central[n] += weights * (each[near].sum() + order_0)
-            xyz[n] += _spread(sines[~near], each[~near], lobe, count)[..., None] * weights
+        sent = np.stack(powers) * reflected
+        central += weights * (sent[:, near].sum(axis=1) + order_0)[:, None]
+        xyz += _spread(sines[~near], sent[:, ~near], lobe, count)[..., None] * weights
     diffracted = xyz[..., 1].sum(axis=(1, 2))
     shares = diffracted / np.maximum(diffracted + central[:, 1], 1e-300)
     return [DiffractedLight(*both) for both in zip(xyz, shares.tolist(), strict=True)]
@@ -210,20 +318,23 @@ def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
     return np.asarray((dot / w) ** 2 / (cos_i * cosine))
 
 
-def _spread(sines: Reals, power: Reals, lobe: float, count: int) -> Reals:
-    """Distribute powers (n,) at sines (n, 2) over the cells (count, count), with their lobes."""
+def _spread(sines: Reals, powers: Reals, lobe: float, count: int) -> Reals:
+    """Distribute powers (m, n) at sines (n, 2) over cells (m, count, count), with their lobes."""
     position = sines / _CELL + 0.5 * count
-    lower = np.floor(position).astype(int)
-    part = position - lower
-    cells = np.zeros(count * count)
-    for right in (0, 1):
-        for up in (0, 1):
-            weight = power * np.abs(1 - right - part[:, 0]) * np.abs(1 - up - part[:, 1])
-            index = (lower[:, 1] + up) * count + lower[:, 0] + right
-            cells += np.bincount(index, weight, minlength=count * count)
-    # Linear weights have widened the lobe by the variance 1/6 on average
-    deviation = math.sqrt((lobe / _CELL) ** 2 - 1.0 / 6.0)
-    return np.asarray(gaussian_filter(cells.reshape(count, count), deviation, mode="constant"))
+    nearest = np.round(position).astype(int)
+    part = position - nearest
+    # quadratic B-splines, whose variance is 1/4 wherever the position lies between cells
+    weights = 0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2
+    cells = np.zeros((len(powers), count * count))
+    for right, along in enumerate(weights):
+        for up, across in enumerate(weights):
+            index = (nearest[:, 1] + up - 1) * count + nearest[:, 0] + right - 1
+            share = along[:, 0] * across[:, 1]
+            for n, power in enumerate(powers):
+                cells[n] += np.bincount(index, power * share, minlength=count * count)
+    deviation = math.sqrt((lobe / _CELL) ** 2 - 0.25)
+    fields = cells.reshape(-1, count, count)
+    return np.stack([gaussian_filter(each, deviation, mode="constant") for each in fields])
 
 
 def _chromaticity(xyz: Reals) -> Reals:

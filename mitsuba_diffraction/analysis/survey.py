@@ -32,7 +32,7 @@ from ..tables.source import TableSource
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .crops import crops_of
-from .iridescence import WINDOW, light_and_chance
+from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
@@ -42,11 +42,13 @@ from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 9
+VERSION = 10
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
 TABLE, SAMPLES, SCANS = "survey.csv", "samples.csv", "scans"
+# Of the last surface, by surface, angle of the light and variant.
+_materials: dict[Any, MaterialFactor] = {}
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Job:
     resolution: int  # pixels a side of the map
     variant: str  # variant of Mitsuba
     threads: int  # threads of Dr.Jit
-    surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF of the map; R = 1 without
+    surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF
     # which crop of `iridescence.WINDOW` of how many; None for the whole scan
     crop: tuple[int, int] | None = None
 
@@ -144,14 +146,18 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
-    # without a material ideal reflection: the effect of the structure alone, as in the index
-    ideal = {"material": "none", "energy_conserving": False}
-    bsdf = bsdf_of(table, **(dict(job.surface) or ideal))
+    # the energy of a metal is solved for some ten seconds; neither map nor index need it
+    surface = {**dict(job.surface), "energy_conserving": False}
+    bsdf = bsdf_of(table, **surface)
+    row["surface"] = bsdf.describe().summary
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     light = LightDirection(job.theta, phi)
-    diffracted, floor = light_and_chance(table, light)
-    row["diffracted"], index = diffracted.share, diffracted.iridescence()
+    diffracted, floor = light_and_chance(table, light, _material(job, table).at(light))
+    row["diffracted"] = diffracted.share
+    brightest, theta, phi = diffracted.brightest()
+    row |= {"brightest": brightest, "brightest_theta_deg": theta, "brightest_phi_deg": phi}
+    index = diffracted.iridescence()
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (
@@ -161,6 +167,23 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row["ranked_among"] = f"scans {'from' if enough else 'below'} {WINDOW:g} µm"
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": _exr(table), ".png": _png(measured)}
+
+
+def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
+    """Return the factor of the surface's material, which all scans share.
+
+    Mitsuba takes seconds to change the variant: it loads its integrators again.
+    """
+    from ..scene.load import set_variant
+
+    key = job.surface, job.theta, job.variant
+    if key not in _materials:
+        set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
+        bsdf = bsdf_of(table, **{**dict(job.surface), "energy_conserving": False})
+        _materials.clear()
+        _materials[key] = MaterialFactor.of(bsdf, job.theta)
+        set_variant(job.variant)
+    return _materials[key]
 
 
 def _exr(table: DiffractionTable) -> bytes:
@@ -217,7 +240,7 @@ def run_survey(
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
-    surface : parameters of the map's BSDF, e.g. {"material": "keratin"}; R = 1 without.
+    surface : parameters of the BSDF, e.g. {"material": "keratin"}; a dielectric of 1.5 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     crops : measure so many crops of each scan, of `iridescence.WINDOW`, or as many as fit; scans
         that are narrower, and recipes, are measured as a whole.

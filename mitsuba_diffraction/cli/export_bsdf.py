@@ -16,7 +16,9 @@ from .options import whole_number
 from .report import Figures, check_outputs, elapsed, output_name
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
-_SUFFIXES = {"rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf")}
+_SUFFIXES = {
+    "rgl": (".bsdf",), "zemax": (".bsdf",), "bird": (".json", ".brdf"), "csv": (".csv",),
+}  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -24,15 +26,17 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "export-bsdf", run, "write a surface's BRDF for other programs",
         "Write the reflected light on a grid of directions, for programs that have no diffraction: "
         "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
-        "the BiRD project. Lobes narrower than the grid become as wide as it.",
+        "the BiRD project, csv for lines of scatter in 1/sr. Lobes narrower than the grid "
+        "become as wide as it, with all their light.",
         *SURFACE_SOURCE,
         ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
-         options.path_ending_in(".bsdf", ".json", ".brdf")),
+         options.path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
         options.MODE,
     )  # fmt: skip
     options.add_options(
         parser.add_argument_group("the file"),
-        ("--format", "default: rgl for .bsdf, bird for .json and .brdf", tuple(_SUFFIXES)),
+        ("--format", "default: rgl for .bsdf, bird for .json and .brdf, csv for .csv",
+         tuple(_SUFFIXES)),
         ("--theta DEG", "angles of the light from the normal, e.g. 0:80:10; default: by format",
          options.numbers),
         ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "
@@ -40,7 +44,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default "
          "550; default: by format", options.numbers, None, {"dest": "wavelengths"}),
         ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
-         "for zemax, 18 for bird", whole_number(8)),
+         "for zemax, 18 for bird and csv", whole_number(8)),
     )  # fmt: skip
     add_surface(parser.add_argument_group("the surface"))
     options.add_heights(parser)
@@ -51,17 +55,18 @@ def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)
     output = output_name(args.output, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
-    name = args.format or ("rgl" if output.suffix.lower() == ".bsdf" else "bird")
-    if output.suffix.lower() not in _SUFFIXES[name]:
+    suffix = output.suffix.lower()
+    name = args.format or next(name for name, known in _SUFFIXES.items() if suffix in known)
+    if suffix not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
     check_outputs([output])
 
     from ..scene.load import set_variant
 
     set_variant(args.mode)
-    from ..analysis.export import bird, rgl, zemax
+    from ..analysis.export import rgl, scatter, zemax
 
-    module: Any = {"rgl": rgl, "zemax": zemax, "bird": bird}[name]
+    module: Any = {"rgl": rgl, "zemax": zemax}.get(name, scatter)
     chosen = options.given(args, ("theta", "phi", "wavelengths"))
     arrays = {name: np.asarray(values, np.float64) for name, values in chosen.items()}
     grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
@@ -81,4 +86,4 @@ def run(args: argparse.Namespace) -> Figures:
 
 
 def _default_suffix(name: str | None) -> str:
-    return "json" if name == "bird" else "bsdf"
+    return {"bird": "json", "csv": "csv"}.get(name or "", "bsdf")

@@ -152,6 +152,14 @@ def numbers(text: str) -> tuple[float, ...]:
         ) from error
 
 
+def limits(text: str) -> tuple[float, float]:
+    """Type of argument: FIRST:LAST, two numbers; see `settings` for what they may be."""
+    with contextlib.suppress(ValueError):
+        first, last = (float(part) for part in text.split(":"))
+        return first, last
+    raise argparse.ArgumentTypeError(f"expected FIRST:LAST, such as 400:700, got {quoted(text)}")
+
+
 def numbers_of(text: str, most: int) -> list[float]:
     """Return a number, or at most so many from FIRST to LAST by STEP; else raise a ValueError."""
     if ":" not in text:
@@ -286,8 +294,10 @@ def add_table(group: Group, names: Sequence[str] = TABLE, **defaults: str) -> No
     """Add the settings of a table. defaults: texts for the help in place of the default values."""
     for name in names:
         item = described_setting(name)
-        kind = item.choices or (whole_number(1) if item.type is int else item.type)
-        values = (item.metavar,) if isinstance(item.metavar, str) else item.metavar or ()
+        kind: Any = item.choices or (whole_number(1) if item.type is int else item.type)
+        values = (item.metavar,) if isinstance(item.metavar, str) else ()
+        if isinstance(item.metavar, tuple):
+            kind, values = limits, (":".join(item.metavar),)
         default = defaults.get(name, item.default_text)
         add_option(
             group, " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind

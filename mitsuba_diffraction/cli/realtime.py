@@ -12,7 +12,7 @@ from ..realtime.glsl.source import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
-from .console import Bar, mitsuba_warnings, say_warning
+from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import path_ending_in, whole_number
 from .report import Figures, check_outputs, elapsed, output_name, plain, save_json
 
@@ -219,7 +219,7 @@ def _set_variant(args: argparse.Namespace) -> str:
 
 def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
     """Load the scene, and check that it has the requested sensor."""
-    scene = load_scene(args.scene, parameters)
+    scene = load_scene(args.scene, parameters, say=say)
     sensor_of(scene, args.sensor)
     return scene
 

@@ -64,7 +64,7 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
 
     A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
     """
-    from ..scene.additions import MATERIAL, PRESET
+    from ..scene.surfaces import MATERIAL, PRESET
 
     parameters = _definitions(args)
     surfaces = list(args.materials)

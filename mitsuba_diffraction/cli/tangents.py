@@ -44,13 +44,11 @@ def run(args: argparse.Namespace) -> Figures:
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.mesh_files import load_mesh, write_ply
     from ..scene.orientation.tangents import BREAK, check_tangents
-    from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
+    from ..scene.orientation.trimesh import oriented_mesh
 
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
         positions, normals, uv, faces = load_mesh(args.mesh)
-        if normals is None:
-            normals = vertex_normals(positions, faces)
         bar(0, 0, "solving for the field")
         field = direction_field(positions, normals, faces, args.along, smoothing=args.smoothing)
         directions = turned(field.directions, normals, args.turn)

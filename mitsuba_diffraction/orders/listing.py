@@ -88,7 +88,7 @@ def list_orders(
             f"wavelengths from {lights[0][0]:g} to {lights[0][-1]:g} nm: the table has {low:g} to "
             f"{high:g} nm"
         )
-    orders = _orders(table, lights[0][0])
+    orders = orders_of(table, lights[0][0])
     _check_count(lights, len(orders))
     lam, polar, azimuth, n = (
         axis.ravel() for axis in np.meshgrid(*lights, np.arange(len(orders)), indexing="ij")
@@ -117,7 +117,7 @@ def list_orders(
     return Listing(columns, np.column_stack([lam, polar, azimuth, *numbers, *shares]))
 
 
-def _orders(table: OrderTable, shortest: float) -> NDArray[np.int64]:
+def orders_of(table: OrderTable, shortest: float) -> NDArray[np.int64]:
     """Return all orders (m, 2) that may propagate from some wavelength on, nm."""
     if isinstance(table.response, ListedResponse):
         return table.response.orders

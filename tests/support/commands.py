@@ -26,7 +26,7 @@ from tests.support.pages import blocks, spans, typed
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan", "--crossed"}
 # one wavelength stands for all, and few points do
 _PERFECT = ["--material", "none"]
-_NARROW = ["--wavelength-range", "590,610"]
+_NARROW = ["--wavelength-range", "590:610"]
 # as small as commands may be asked to be; the last option of a name counts
 SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
@@ -110,7 +110,7 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if "--import" in rest or (command == "export-shader" and rest[0].endswith(".nc")):
         return []  # as small as its file
     if any(word.startswith("--theta") for word in rest) and command == "solve":
-        return ["--wavelength-range", "550,555"]
+        return ["--wavelength-range", "550:555"]
     small = SMALL.get(command, [])
     if "--block" in rest:  # by coupled waves
         return [*small, "--period", "0.3", "--resolution", "10"]

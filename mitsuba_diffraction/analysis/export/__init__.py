@@ -4,8 +4,8 @@ Lobes and orders narrower than a cell of the grid become as wide as the cell, wi
 
 Contents
 --------
-cells    means of the BRDF over cells of directions
+nodes    light laid on the nodes of a file
 rgl      RGL's tensors (.bsdf), which Mitsuba's BSDF `measured` renders
 zemax    tabular BSDF of OpticStudio (.bsdf), one wavelength
-bird     JSON of the BiRD project (.json, .brdf)
+scatter  JSON of the BiRD project (.json, .brdf), and long CSV
 """

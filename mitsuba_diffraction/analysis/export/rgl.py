@@ -13,15 +13,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic import atomic_path
-from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, CellSample, ExportGrid, means, unit_vector
+from ..maps.hemisphere import polar
+from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
 DEFAULT = ExportGrid(
@@ -40,31 +39,25 @@ def save_rgl(
     n = grid.resolution
     grid.checked(n * n)
     theta, phi = np.radians(grid.theta), np.radians(grid.phi)
-    nodes = np.linspace(0.0, 1.0, n)
-    axes = np.meshgrid(phi, theta, nodes, nodes, indexing="ij")
-
-    def sample(
-        azimuth: Float, elevation: Float, v: Float, u: Float, a: Float, b: Float
-    ) -> CellSample:
-        place = dr.minimum(dr.abs(u + a / (n - 1)), 1.0)
-        theta_m = 0.5 * np.pi * dr.square(place)
-        half = unit_vector(theta_m, np.pi * (2.0 * (v + b / (n - 1)) - 1.0))
-        wi = unit_vector(elevation, azimuth)
-        cosine = dr.dot(wi, half)
-        solid = place * dr.sin(theta_m) * dr.maximum(cosine, 0.0)
-        return CellSample(wi, 2.0 * cosine * half - wi, solid)
-
-    cells = Cells([axis.ravel() for axis in axes], sample)
-    values = means(bsdf, cells, grid.wavelengths, np.pi / (n - 1), True, progress)
-    shape = len(phi), len(theta), n, n
-    # density in u and v by which light is drawn: f cosθo times dω/(du dv), and an even share
-    density = (values.mean(axis=1) * np.array(cells.middle().weight)).reshape(shape)
+    nodes = Nodes(
+        n - 1, np.linspace(0.0, 1.0, n), (0.0, 1.0), _directions, _place,
+        lambda u: (2.0 * np.sin(0.5 * np.pi * u * u), 2.0 * np.pi * u), pole=True, cosine=True,
+    )  # fmt: skip
+    spectra = np.empty((len(phi) * len(theta), len(grid.wavelengths), n, n), np.float32)
+    powers = np.empty((len(phi) * len(theta), n, n))
+    for place, of_light in enumerate(laid(bsdf, nodes, grid, light_vectors(grid), progress)):
+        values, light = (np.concatenate([part, part[:1]]) for part in of_light)
+        spectra[place], powers[place] = np.moveaxis(values, -1, 0), light.mean(axis=-1)
+    spectra = spectra.reshape(len(phi), len(theta), *spectra.shape[1:])
+    # density in u and v by which light is drawn: the light at each node, and an even share; nodes
+    # at the ends of u have half a cell
+    density = powers.reshape(len(phi), len(theta), n, n)
+    density[..., [0, -1]] *= 2.0
     density += 1e-2 * density.mean(axis=(2, 3), keepdims=True) + 1e-9
     ones = np.ones((2, 2))
-    spectra = np.moveaxis(values.reshape(*shape, -1), -1, 2)
     tensors = {
         "phi_i": phi, "theta_i": theta, "wavelengths": grid.wavelengths, "ndf": ones, "sigma": ones,
-        "vndf": np.ones((*shape[:2], 2, 2)), "luminance": density, "spectra": spectra,
+        "vndf": np.ones((len(phi), len(theta), 2, 2)), "luminance": density, "spectra": spectra,
     }  # fmt: skip
     numbers = {name: array.astype(np.float32) for name, array in tensors.items()}
     # Mitsuba's writer prints the file's name, and loses the error of a full disk when it closes
@@ -74,6 +67,20 @@ def save_rgl(
                 str(temporary), description=text or "-", jacobian=np.zeros(1, np.uint8), **numbers
             )
         _check_written(temporary, numbers)
+
+
+def _directions(wi: Reals, p: Reals, u: Reals) -> tuple[Reals, Reals]:
+    theta_m = 0.5 * np.pi * u * u
+    half = polar(theta_m, p - np.pi)
+    cosine = np.maximum(half @ wi, 0.0)
+    # dω = 4 cos dω_m, dθ_m = π u du
+    return 2.0 * cosine[:, None] * half - wi, 4.0 * cosine * np.sin(theta_m) * np.pi * u
+
+
+def _place(wi: Reals, wo: Reals) -> tuple[Reals, Reals]:
+    x, y, z = (wi + wo).T
+    theta_m = np.arctan2(np.hypot(x, y), z)
+    return (np.arctan2(y, x) + np.pi) % (2.0 * np.pi), np.sqrt(theta_m * (2.0 / np.pi))
 
 
 def _check_written(file: Path, tensors: Mapping[str, NDArray[np.float32]]) -> None:

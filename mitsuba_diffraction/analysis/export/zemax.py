@@ -10,15 +10,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...plugin.types import Float
 from ...progress import Progress, silent
-from .cells import Cells, CellSample, ExportGrid, Reals, means, unit_vector
+from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
 DEFAULT = ExportGrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
@@ -41,31 +38,11 @@ def save_zemax(
         )
     grid.checked(_AZIMUTHS * grid.resolution)
     azimuths, radials = np.linspace(0.0, 360.0, _AZIMUTHS), np.linspace(0, _REACH, grid.resolution)
+    nodes = Nodes(
+        _AZIMUTHS - 1, np.radians(radials), (0.0, np.radians(_REACH)), _directions, _place,
+        lambda q: (np.sin(q), 1.0), pole=True,
+    )  # fmt: skip
     axes = grid.phi, grid.theta, azimuths, radials
-    nodes = [np.radians(axis.ravel()) for axis in np.meshgrid(*axes, indexing="ij")]
-    steps = np.radians(azimuths[1]), np.radians(radials[1])
-
-    def sample(
-        rotation: Float, theta: Float, azimuth: Float, radial: Float, a: Float, b: Float
-    ) -> CellSample:
-        mirror = unit_vector(theta, rotation)
-        # from the mirror direction towards the normal, and counter-clockwise from there
-        up = -unit_vector(theta + 0.5 * np.pi, rotation)
-        turned, away = azimuth + a * steps[0], dr.abs(radial + b * steps[1])
-        around = dr.cos(turned) * up + dr.sin(turned) * dr.cross(mirror, up)
-        wo = dr.cos(away) * mirror + dr.sin(away) * around
-        return CellSample(mi.Vector3f(-mirror.x, -mirror.y, mirror.z), wo, dr.sin(away))
-
-    cells = Cells(nodes, sample)
-    values = means(bsdf, cells, grid.wavelengths, float(max(steps)), False, progress)[:, 0]
-    azimuth, radial = nodes[2:]
-    shape = tuple(len(axis) for axis in axes)
-    # TIS: ∫ f cosθ dω, linear between nodes: ∫ (1 − r/h) r dr = h²/6; azimuth 0 is there twice
-    solid = np.where(radial == 0.0, steps[1] ** 2 / 6.0, steps[1] * np.sin(radial)) * steps[0]
-    solid *= np.where((azimuth == 0.0) | (azimuth > 2.0 * np.pi - 1e-6), 0.5, 1.0)
-    cosines = np.maximum(np.array(cells.middle().wo.z), 0.0)
-    tis = (values * cosines * solid).reshape(shape).sum(axis=(2, 3))
-    table = values.reshape(shape)
     lines = [
         "# rotation: azimuth of the mirror direction from the structure's x axis, towards y",
         *(f"# {line}" for line in text.splitlines()),
@@ -76,11 +53,33 @@ def save_zemax(
     for name, axis in zip(names, axes, strict=True):
         lines += [f"{name}  {len(axis)}", _row(axis)]
     lines += ["", "Monochrome", "DataBegin"]
-    for r in range(shape[0]):
-        for t in range(shape[1]):
-            lines += [f"TIS {tis[r, t]:.6g}", *(_row(row) for row in table[r, t])]
+    # light comes from the other side of the normal
+    for of_light in laid(bsdf, nodes, grid, light_vectors(grid) * [-1.0, -1.0, 1.0], progress):
+        table = of_light.values[..., 0]
+        lines.append(f"TIS {of_light.light.sum():.6g}")
+        lines += [_row(row) for row in (*table, table[0])]
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join([*lines, "DataEnd", ""]), "ascii", "replace")
+
+
+def _frame(wi: Reals) -> tuple[Reals, Reals, Reals]:
+    """Return the mirror direction, and the axes of azimuth 0 (towards the normal) and 90°."""
+    mirror = wi * [-1.0, -1.0, 1.0]
+    sine = np.hypot(*mirror[:2])
+    up = np.array([*(-mirror[:2] / sine * mirror[2]), sine])
+    return mirror, up, np.cross(mirror, up)
+
+
+def _directions(wi: Reals, p: Reals, q: Reals) -> tuple[Reals, Reals]:
+    mirror, up, left = _frame(wi)
+    across = np.cos(p)[:, None] * up + np.sin(p)[:, None] * left
+    return np.cos(q)[:, None] * mirror + np.sin(q)[:, None] * across, np.sin(q)
+
+
+def _place(wi: Reals, wo: Reals) -> tuple[Reals, Reals]:
+    mirror, up, left = _frame(wi)
+    x, y = wo @ up, wo @ left
+    return np.arctan2(y, x) % (2.0 * np.pi), np.arctan2(np.hypot(x, y), wo @ mirror)
 
 
 def _row(values: Reals) -> str:

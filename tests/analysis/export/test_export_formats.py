@@ -9,11 +9,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.export import bird, rgl, zemax
-from mitsuba_diffraction.analysis.export.cells import ExportGrid
+from mitsuba_diffraction.analysis.export import rgl, scatter, zemax
+from mitsuba_diffraction.analysis.export.nodes import ExportGrid
+from mitsuba_diffraction.columns import read_columns
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.orders import OrderTable
 from tests.support.orders import thin_grating
@@ -75,7 +77,7 @@ def test_mitsuba_renders_the_tensors_as_the_surface(tmp_path):
     rgl.save_rgl(mi.load_dict(surface), tmp_path / "grating.bsdf", grid)
     measured = {"type": "measured", "filename": str(tmp_path / "grating.bsdf")}
     pictures = [
-        np.array(mi.render(ball(each), spp=64, seed=mi.UInt32(1)))[..., :3]
+        np.array(mi.render(ball(each), spp=256, seed=mi.UInt32(1)))[..., :3]
         for each in (surface, measured)
     ]
     difference = delta_e(*pictures)
@@ -84,22 +86,54 @@ def test_mitsuba_renders_the_tensors_as_the_surface(tmp_path):
     assert pictures[1].mean() == pytest.approx(pictures[0].mean(), rel=0.02)
 
 
-def test_narrow_orders_keep_their_power_in_tensors(tmp_path):
-    """Order 0 of a mirror, 0.3° wide, as a lobe as wide as the cell: 60 % of white light."""
-    mirror = OrderTable.mirror(0.6, 0.6)
-    grid = ExportGrid(
-        np.linspace(0, 60, 3), np.linspace(-180, 180, 9), np.array([500.0, 540, 580]), 24
-    )
-    rgl.save_rgl(mi.load_dict(md.bsdf_dict(mirror)), tmp_path / "m.bsdf", grid)
+def orders_of(table, theta, phi, wavelength, orientation=0.0):
+    """Directions and efficiencies of a table's orders, for light from θ and φ, degrees."""
+    turn = np.radians(orientation)
+    axis = np.array([np.cos(turn), np.sin(turn)])
+    wi = polar(theta, phi)[:2]
+    x, y = -wi @ axis, -(wi[1] * axis[0] - wi[0] * axis[1])
+    found = []
+    for order in range(-6, 7):
+        out = x + order * wavelength / (1e3 * table.period), y
+        if (square := 1.0 - out[0] ** 2 - out[1] ** 2) > 1e-9:
+            tangential = out[0] * axis + out[1] * np.array([-axis[1], axis[0]])
+            share = float(table.efficiency(x, y, wavelength, order))
+            found.append(([*tangential, np.sqrt(square)], share))
+    return (np.array(part) for part in zip(*found, strict=True))
+
+
+def by_order(directions, power, orders):
+    """Power of directions (n, 3), summed over those nearest to each order."""
+    nearest = (directions @ orders.T).argmax(axis=1)
+    return np.bincount(nearest, power, len(orders))
+
+
+#: Light at nodes of the files; orders are apart by more than two nodes of either.
+LIGHTS = ((0.0, 0.0), (30.0, 60.0), (60.0, 240.0))
+
+
+def test_mitsuba_integrates_each_order_of_the_tensors(tmp_path):
+    """Within 1 %, of a turned grating: orders 0.2° wide, cells of some degrees."""
+    table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))
+    bsdf = mi.load_dict(md.bsdf_dict(table, orientation=30.0))
+    grid = ExportGrid(np.linspace(0, 60, 3), np.arange(-180.0, 181, 60), np.array([550.0, 551]), 48)
+    rgl.save_rgl(bsdf, tmp_path / "m.bsdf", grid)
     measured = mi.load_dict({"type": "measured", "filename": str(tmp_path / "m.bsdf")})
-    random = mi.PCG32(1 << 16)
-    for theta in (0.0, 30.0):
-        si = dr.zeros(mi.SurfaceInteraction3f, 1 << 16)
-        si.wi, si.wavelengths = mi.Vector3f(polar(theta, 20.0).tolist()), mi.Spectrum(540.0)
-        pair = mi.Point2f(random.next_float32(), random.next_float32())
-        weight = measured.sample(mi.BSDFContext(), si, 0.5, pair)[1]
-        # 64 samples of the lobe in a cell; light is drawn in proportion
-        assert np.mean(np.array(weight[0])) == pytest.approx(0.6, rel=0.05)
+    u, v = ((np.arange(n) + 0.5) / n for n in (47 * 16, 47 * 8))
+    u, v = (axis.ravel() for axis in np.meshgrid(u, v, indexing="ij"))
+    theta_m = 0.5 * np.pi * u * u
+    half = polar(np.degrees(theta_m), 360.0 * v)
+    for theta, phi in LIGHTS:
+        wi = polar(theta, phi)
+        cosine = half @ wi
+        wo = 2.0 * cosine[:, None] * half - wi
+        solid = 4.0 * cosine * np.sin(theta_m) * np.pi * u * 2.0 * np.pi / len(u)
+        lit = (wo[:, 2] > 1e-6) & (cosine > 0.0)
+        power = f(measured, wi, wo[lit], 550.0) * wo[lit, 2] * solid[lit]
+        directions, expected = orders_of(table, theta, phi, 550.0, 30.0)
+        got = by_order(wo[lit], power, directions)
+        assert power.sum() == pytest.approx(expected.sum(), rel=0.01)
+        np.testing.assert_allclose(got, expected, rtol=0.01, atol=1e-3)
 
 
 def read_zemax(path):
@@ -150,21 +184,89 @@ def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
     assert 0.7 < tis.min() < tis.max() < 1.0  # of aluminium, 0.91 at the normal
 
 
-def test_narrow_orders_keep_their_power_in_zemax_s_file(tmp_path):
-    mirror = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6, 0.6)))
+def zemax_directions(theta, rotation, azimuth, radial):
+    """Directions (…, 3) at angles about the mirror direction, degrees."""
+    mirror = polar(theta, rotation)
+    to_normal = polar(theta + 90.0, rotation) * -1.0
+    left = np.cross(mirror, to_normal)
+    azimuth, radial = (np.radians(part)[..., None] for part in (azimuth, radial))
+    across = np.cos(azimuth) * to_normal + np.sin(azimuth) * left
+    return np.cos(radial) * mirror + np.sin(radial) * across
+
+
+def zemax_power(axes, values, theta, rotation):
+    """Directions (n, 3) and power of f, linear between nodes, at the middles of fine parts."""
+    azimuth, radial = axes["ScatterAzimuth"], axes["ScatterRadial"]
+    fine = np.arange(0.25, 360.0, 0.5), np.arange(0.05, radial[-1], 0.1)
+    a, r = np.meshgrid(*fine, indexing="ij")
+    wo = zemax_directions(theta, rotation, a, r)
+    between = RegularGridInterpolator((azimuth, radial), values)((a, r))
+    solid = np.sin(np.radians(r)) * np.radians(0.5) * np.radians(0.1)
+    power = between * np.maximum(wo[..., 2], 0.0) * solid
+    return wo.reshape(-1, 3), power.ravel()
+
+
+def test_each_order_of_zemax_s_file_has_the_table_s_light(tmp_path):
+    """Within 1 %, of a turned grating: orders 0.2° wide, nodes 5° and 2° apart."""
+    table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))
+    bsdf = mi.load_dict(md.bsdf_dict(table, orientation=30.0))
+    rotations, thetas = np.array([0.0, 60, 240]), np.array([0.0, 30, 60])
+    grid = ExportGrid(thetas, rotations, np.array([550.0]), 86)
+    zemax.save_zemax(bsdf, tmp_path / "m.bsdf", grid)
+    _, axes, tis, values = read_zemax(tmp_path / "m.bsdf")
+    for n, (theta, rotation) in enumerate(zip(thetas, rotations, strict=True)):
+        directions, expected = orders_of(table, theta, rotation + 180.0, 550.0, 30.0)
+        assert tis[n, n] == pytest.approx(expected.sum(), rel=1e-3)
+        wo, power = zemax_power(axes, values[n, n], theta, rotation)
+        assert power.sum() == pytest.approx(expected.sum(), rel=0.01)
+        np.testing.assert_allclose(by_order(wo, power, directions), expected, rtol=0.01, atol=1e-3)
+
+
+def test_mirrors_and_narrow_lobes_keep_their_light_in_zemax_s_file(tmp_path):
+    """A flat mirror under windows of 65 µm: Fresnel's reflectance of aluminium, in the mirror's
+    direction, whether its lobe is rendered by heights or by a table."""
     grid = ExportGrid(np.array([0.0, 30]), np.array([0.0]), np.array([550.0]), 86)
-    zemax.save_zemax(mirror, tmp_path / "m.bsdf", grid)
-    tis, values = read_zemax(tmp_path / "m.bsdf")[2:]
-    assert tis == pytest.approx(0.6, rel=0.05)  # 64 samples of the lobe
-    assert values[0, 0, 0, 0] > 100
+    for surface, expected in (
+        (md.bsdf_dict(OrderTable.mirror(0.6, 0.6)), 0.6),
+        (md.bsdf_dict(FLAT, material="none"), 1.0),
+    ):
+        zemax.save_zemax(mi.load_dict(surface), tmp_path / "m.bsdf", grid)
+        _, axes, tis, values = read_zemax(tmp_path / "m.bsdf")
+        assert tis == pytest.approx(expected, rel=0.01)
+        wo, power = zemax_power(axes, values[0, 1], 30.0, 0.0)
+        near = wo @ polar(30.0, 0.0) > np.cos(np.radians(5.0))
+        assert power[near].sum() == pytest.approx(expected, rel=0.01)
     with pytest.raises(DiffractionError, match="expected one"):
-        zemax.save_zemax(mirror, tmp_path / "m.bsdf", bird.DEFAULT)
+        zemax.save_zemax(mi.load_dict(surface), tmp_path / "m.bsdf", scatter.DEFAULT)
+
+
+def test_windows_too_wide_to_integrate_are_refused(tmp_path):
+    wide = mi.load_dict(md.bsdf_dict(FLAT, coherence_width=500.0))
+    grid = ExportGrid(np.array([0.0]), np.array([0.0]), np.array([550.0]), 86)
+    with pytest.raises(DiffractionError, match="narrower"):
+        zemax.save_zemax(wide, tmp_path / "m.bsdf", grid)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_csv_has_the_scatter_of_each_pair(tmp_path):
+    """The same numbers as the JSON, with the columns that its first line names."""
+    bsdf = mi.load_dict(grating(material="Al"))
+    grid = ExportGrid(np.array([0.0, 40]), np.array([30.0]), np.array([500.0, 600]), 16)
+    scatter.save_csv(bsdf, tmp_path / "s.csv", grid)
+    scatter.save_bird(bsdf, tmp_path / "s.json", grid)
+    columns = read_columns(tmp_path / "s.csv").of(scatter.CSV_COLUMNS)
+    data = json.loads((tmp_path / "s.json").read_text("utf-8"))["data"]
+    np.testing.assert_allclose(columns[:, 5], data["BRDF"]["values"], rtol=1e-5)
+    one = (columns[:, 0] == 40.0) & (columns[:, 4] == 500.0)
+    wo = polar(columns[one, 2], columns[one, 3])
+    expected = f(bsdf, polar(40.0, 30.0), wo, 500.0)
+    assert np.corrcoef(columns[one, 5], expected)[0, 1] > 0.98
 
 
 def test_bird_s_json_has_f_of_each_pair(tmp_path):
     bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.brdf"
     grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([500.0, 600]), 16)
-    bird.save_bird(bsdf, file, grid, "Al grating")
+    scatter.save_bird(bsdf, file, grid, "Al grating")
     content = json.loads(file.read_text("utf-8"))
     meta, data = content["metadata"], content["data"]
     assert (meta["type"], meta["method"], meta["sample"]["name"]) == (

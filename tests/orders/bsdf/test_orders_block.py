@@ -11,7 +11,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.export.cells import FILES
+from mitsuba_diffraction.analysis.export.nodes import FILES
 from tests.support.blocks import (
     BLOCK,
     INDEX,
