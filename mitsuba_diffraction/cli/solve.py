@@ -63,7 +63,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--depth H", "µm, of a generator", number_between(0, 100)),
         ("--duty F", "ridge, lamellar", number_between(0, 1)),
         ("--direction", "towards +x, blazed", ("descending", "ascending")),
-        ("--material M", "conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, or none "
+        ("--material M", "conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, a file of "
+         "refractiveindex.info (.csv, .yml), a glass of a catalogue (schott.agf:N-BK7), or none "
          "(reflects all); default: Al"),
         ("--superstrate N", "index of the clear medium above the grooves, e.g. 1.58 under "
          "polycarbonate; default: 1", number_between(1, 5)),
