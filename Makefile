@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
+.PHONY: setup extras demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -21,6 +21,12 @@ setup: .venv/packages .venv/libraries  ## create .venv with the package, and an 
 
 .venv/browser: .venv/packages
 	@.ci/setup browser
+
+extras: .venv/extras  ## install what pictures may need: meshes of glTF and USD, films as MP4, denoising
+	@:
+
+.venv/extras: .venv/packages
+	@.ci/setup extras
 
 demo: setup  ## tabulate a snake scale, render three scenes with it, the snake in two lights
 	@mkdir -p out
@@ -50,7 +56,7 @@ package: setup .venv/browser  ## test wheel and sdist in empty environments, wit
 	@.ci/package
 
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
-bench: setup  ## measure speed and noise: docs/benchmarks.md
+bench: setup  ## measure speed and noise: docs/performance.md
 	@mkdir -p out
 	@$(PYTHON3) -m docs.make.bench $(if $(MEASURED),--measured $(MEASURED)) --json out/bench.json
 	@$(PYTHON3) -m docs.make.figures.tables speed out/bench.json
@@ -62,20 +68,20 @@ figures: setup  ## make the pictures in docs/images
 gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
 	@$(PYTHON3) -m docs.make.figures.gallery -o docs
 
-evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted periods
-	@$(PYTHON3) -m docs.make.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
+evaluation: setup  ## make docs/thesis.md: ridges, grating equation, fitted periods
+	@$(PYTHON3) -m docs.make.figures.evaluation -o docs/thesis.md $(if $(MEASURED),--measured $(MEASURED))
 
-sweeps: setup  ## make docs/sweeps.md: contact sheets of BRDF maps
+sweeps: setup  ## make docs/thesis.md: contact sheets of BRDF maps
 	@$(PYTHON3) -m docs.make.figures.thesis sweeps $(if $(MEASURED),--measured $(MEASURED))
 
-methods: setup  ## measure the methods: docs/methods.md
+methods: setup  ## measure the methods: docs/thesis.md
 	@$(PYTHON3) -m docs.make.figures.thesis methods $(if $(MEASURED),--measured $(MEASURED))
 
 tradeoff: setup  ## measure accuracy against speed and memory: docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff
 	@$(PYTHON3) -m docs.make.figures.tables tradeoff out/tradeoff
 
-plan: setup  ## plan the snake's scene: docs/benchmarks.md and docs/plan.md
+plan: setup  ## plan the snake's scene: docs/performance.md
 	@mkdir -p out
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
 	@$(PYTHON3) -m docs.make.figures.tables plan out/plan.json

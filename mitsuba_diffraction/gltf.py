@@ -25,6 +25,14 @@ from .limits import MOST_PLACED, bounded_memory, check_content, check_count, tre
 _BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
+# Compressions of meshes by their extension, and attributes that are read
+_COMPRESSED = {
+    "KHR_draco_mesh_compression": "Draco",
+    "EXT_meshopt_compression": "meshopt",
+    "KHR_meshopt_compression": "meshopt",
+}
+_READ = ("POSITION", "NORMAL", "TEXCOORD_0")
+
 
 class _Folder:
     """Resolver of names for `trimesh`, which by itself opens pipes, and before 5.0 any file."""
@@ -86,10 +94,14 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
     document, rest = _parts(file)
     size, folder = file.stat().st_size, _Folder(file)
     _check(document, size + folder.size_of(document), f"'{file}'")
+    _check_encoding(document, f"'{file}'")
     if not materials:  # `trimesh` decodes pictures of some, and keeps UV only beside a material
-        document["materials"] = [{} for _ in document.get("materials", ())]
+        document["materials"] = [{}]
         document.pop("images", None)
         document.pop("textures", None)
+        for mesh in document.get("meshes", ()):
+            for primitive in mesh.get("primitives", ()):
+                primitive["material"] = 0
     for number, material in enumerate(document.get("materials", ())):
         material["name"] = str(number)
     content = json.dumps(document).encode()
@@ -141,6 +153,31 @@ def _parts(file: Path) -> tuple[dict[str, Any], bytes | None]:
     if not isinstance(document, dict):
         raise ValueError("its document must be an object")
     return document, rest
+
+
+def _check_encoding(document: dict[str, Any], shown: str) -> None:
+    """Refuse meshes that `trimesh` does not read, or reads as other numbers.
+
+    Integers that stand for fractions (`normalized`: glTF 2.0, 3.6.2) are read as integers.
+    """
+    required = set(document.get("extensionsRequired", ()))
+    for name, encoding in _COMPRESSED.items():
+        if name in required:
+            raise DiffractionError(
+                f"{shown}: its meshes are compressed by {encoding} ({name}), which is not read; "
+                "import it into Blender and export it as glTF with Compression off, or save it "
+                "as PLY, OBJ or USD"
+            )
+    accessors = document.get("accessors", [])
+    for mesh in document.get("meshes", ()):
+        for primitive in mesh.get("primitives", ()):
+            for name, number in primitive.get("attributes", {}).items():
+                if name in _READ and accessors[number].get("normalized", False):
+                    raise DiffractionError(
+                        f"{shown}: its {name} are integers that stand for fractions (quantized), "
+                        "which are not read; export it without quantization, as floating-point "
+                        "numbers"
+                    )
 
 
 def _check(document: dict[str, Any], size: int, shown: str) -> None:

@@ -176,7 +176,7 @@ class TableSettings:
     )  # fmt: skip
     wavelength_range: tuple[float, float] = _setting(
         (360.0, 830.0), _wavelengths, "nm",
-        "two rising wavelengths in nm, between 10 and 100000", metavar=("MIN", "MAX"),
+        "two rising wavelengths in nm, between 10 and 100000", metavar=("FIRST", "LAST"),
     )  # fmt: skip
     height_scale_max: float = _setting(
         1.5, _between(0.0, MAX_HEIGHT_SCALE), "largest height_scale that the table serves",
@@ -276,7 +276,7 @@ def described_setting(name: str) -> Setting:
     """Describe the field of this name."""
     default, described = _BY_NAME[name].default, _BY_NAME[name].metadata
     values = default if isinstance(default, tuple) else (default,)
-    text = " ".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
+    text = ":".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
     return Setting(
         help=described["help"],
         default_text=text or described.get("text", "as many as the tolerance requires"),

@@ -100,13 +100,6 @@ CLAIMS = (
         VALIDATION,
     ),
     Claim(
-        "the same walls, light from 30°: largest deviation",
-        "at worst 170 %",
-        "docs/validation/gratings.md",
-        line("keratin, 1.1/0.4 µm", "170 %"),
-        VALIDATION,
-    ),
-    Claim(
         "colours of solved tables against independent solutions",
         "0.8 %",
         "docs/orders.md",

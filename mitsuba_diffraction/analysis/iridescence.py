@@ -14,7 +14,9 @@ characterization of iridescent colours in biological studies, Interface Focus 9,
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +45,7 @@ CHANCES = 3
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
 SHORTEST, LONGEST, STEP = 380.0, 780.0, 5.0
-# Side of a direction's cell, in sines: half of the narrowest lobe's standard deviation.
+# Side of a direction's cell, in sines: at most the narrowest lobe's standard deviation, a scan's.
 _CELL = 0.008
 # Luminance, relative to the brightest direction, below which a direction has no colour.
 _DARK = 1e-9
@@ -61,6 +63,21 @@ class DiffractedLight:
 
     xyz: Reals
     share: float
+
+    def brightest(self) -> tuple[float, float, float]:
+        """Return the largest luminous reflectance factor, and its direction θ, φ in degrees.
+
+        Relative to a white Lambertian standard of the same place: π Y over the cell's area. 0 in
+        the direction of the normal if no light is diffracted.
+        """
+        luminance = self.xyz[..., 1]
+        row, column = np.unravel_index(np.argmax(luminance), luminance.shape)
+        if not luminance[row, column] > 0.0:
+            return 0.0, 0.0, 0.0
+        x, y = ((n - 0.5 * len(luminance)) * _CELL for n in (column, row))
+        theta = math.degrees(math.asin(min(math.hypot(x, y), 1.0)))
+        phi = math.degrees(math.atan2(y, x))
+        return float(luminance[row, column]) * math.pi / _CELL**2, theta, phi
 
     def iridescence(self) -> float:
         """Return the root mean square distance of the chromaticity u'v' from its mean.
@@ -101,7 +118,42 @@ class DiffractedLight:
         return np.asarray(self.xyz[lit])
 
 
-def chance_iridescence(table: DiffractionTable, light: LightDirection) -> float:
+#: Factor of a material on the power of an order, and w = κ/k: functions of the sines (n, 2) of
+#: directions and a wavelength, nm; see `material_factor`.
+Factor = Callable[[Reals, float], tuple[Reals, Reals]]
+
+
+def material_factor(bsdf: Any, light: LightDirection) -> Factor:
+    """Return the factor of a surface's material, layers and coat on the power of its orders.
+
+    bsdf : `diffraction` of the current variant, spectral and vectorised. Its pigment does not
+        diffract and is left out; so is the scale by which energy is conserved.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    from ..plugin.memory import upload
+    from .maps.hemisphere import flat_interaction
+
+    towards = mi.Vector3f(light.direction.tolist())
+
+    def factor(sines: Reals, wavelength: float) -> tuple[Reals, Reals]:
+        x, y = (upload(mi.Float, column.astype(np.float32)) for column in sines.T)
+        si = flat_interaction(towards, len(sines))
+        channel = mi.Float(wavelength)
+        dr.make_opaque(channel)  # one kernel for all wavelengths
+        si.wavelengths = mi.UnpolarizedSpectrum(channel)
+        wo = mi.Vector3f(x, y, dr.safe_sqrt(1.0 - dr.square(x) - dr.square(y)))
+        site = bsdf.site_at(si, mi.Mask(True))
+        value, w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
+        return np.array(value[0], np.float64), np.broadcast_to(np.array(w), len(sines))
+
+    return factor
+
+
+def chance_iridescence(
+    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
+) -> float:
     """Return the index of an unordered surface of the same size and roughness, by chance alone.
 
     The mean over `CHANCES` surfaces. Each order has the median power of all orders at its
@@ -112,14 +164,19 @@ def chance_iridescence(table: DiffractionTable, light: LightDirection) -> float:
     indices = []
     for seed in range(CHANCES):
         speckle = np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
-        indices.append(diffracted_light(table, light, speckle=speckle).iridescence())
+        parts = diffracted_light(table, light, speckle=speckle, factor=factor)
+        indices.append(parts.iridescence())
     return float(np.mean(indices))
 
 
 def diffracted_light(
-    table: DiffractionTable, light: LightDirection, *, speckle: Reals | None = None
+    table: DiffractionTable,
+    light: LightDirection,
+    *,
+    speckle: Reals | None = None,
+    factor: Factor | None = None,
 ) -> DiffractedLight:
-    """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
+    """Collect the orders of a table by direction, in daylight (D65).
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
     coherence window of `WINDOW`, or the table's if that is narrower. Orders of periods as long as
@@ -129,6 +186,7 @@ def diffracted_light(
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
     speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its
         frequency, which replaces its own.
+    factor : of the surface's material (`material_factor`); R = 1 without.
 
     Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
     """
@@ -159,7 +217,9 @@ def diffracted_light(
         rows, columns = np.nonzero(z2 > 0.0)
         sines = np.stack([x[columns], y[rows]], axis=-1)
         cosine = np.sqrt(z2[rows, columns])
-        w = light.direction[2] + cosine
+        w, reflected = light.direction[2] + cosine, np.ones(1)
+        if factor is not None:
+            reflected, w = factor(sines, float(wavelength))
         factors = expansion.weights(k * w) / scale
         interval = expansion.interval(k * w)
         power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
@@ -168,12 +228,14 @@ def diffracted_light(
             ring = rings[rows, columns]
             medians = median(power, ring, np.arange(rings.max() + 1))
             power = np.nan_to_num(medians)[ring] * speckle[rows, columns]
-        power *= _obliquity(sines, cosine, light)
+        power *= _obliquity(sines, cosine, light) * reflected
         near = mirror[rows, columns]
         weights = response(wavelength) * STEP
         central += weights * power[near].sum()
-        order_0 = order_0_power(table.averaged, np.array(2.0 * k * light.direction[2]))
-        central += weights * float(order_0)
+        r, w_0 = np.ones(1), np.array([2.0 * light.direction[2]])
+        if factor is not None:
+            r, w_0 = factor(light.mirror[None, :2], float(wavelength))
+        central += weights * float(r[0] * order_0_power(table.averaged, k * w_0)[0])
         lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
         xyz += _spread(sines[~near], power[~near], lobe, count)[..., None] * weights
     diffracted = float(xyz[..., 1].sum())
@@ -195,16 +257,17 @@ def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
 def _spread(sines: Reals, power: Reals, lobe: float, count: int) -> Reals:
     """Distribute powers (n,) at sines (n, 2) over the cells (count, count), with their lobes."""
     position = sines / _CELL + 0.5 * count
-    lower = np.floor(position).astype(int)
-    part = position - lower
+    nearest = np.round(position).astype(int)
+    part = position - nearest
+    # quadratic B-splines, whose variance is 1/4 wherever the position lies between cells
+    weights = 0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2
     cells = np.zeros(count * count)
-    for right in (0, 1):
-        for up in (0, 1):
-            weight = power * np.abs(1 - right - part[:, 0]) * np.abs(1 - up - part[:, 1])
-            index = (lower[:, 1] + up) * count + lower[:, 0] + right
+    for right, along in enumerate(weights):
+        for up, across in enumerate(weights):
+            index = (nearest[:, 1] + up - 1) * count + nearest[:, 0] + right - 1
+            weight = power * along[:, 0] * across[:, 1]
             cells += np.bincount(index, weight, minlength=count * count)
-    # Linear weights have widened the lobe by the variance 1/6 on average
-    deviation = math.sqrt((lobe / _CELL) ** 2 - 1.0 / 6.0)
+    deviation = math.sqrt((lobe / _CELL) ** 2 - 0.25)
     return np.asarray(gaussian_filter(cells.reshape(count, count), deviation, mode="constant"))
 
 

@@ -20,7 +20,7 @@ from .survey_files import write_table
 REPEATS = ("name", "folder")
 #: Columns of rows that are averaged over repeated scans.
 AVERAGED = (
-    "range_um", "rms_height_um", "rms_slope", "period_1_um", "share_1", "diffracted",
+    "range_um", "rms_height_um", "rms_slope", "period_1_um", "share_1", "diffracted", "brightest",
     "iridescence", "iridescent_light", *(f"share_{name}" for name in (*HUES, "grey")),
 )  # fmt: skip
 

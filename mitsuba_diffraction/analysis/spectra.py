@@ -29,10 +29,10 @@ from ..llvm import require_loaded_llvm
 from ..optics.colour import LONGEST, SHORTEST
 from ..optics.geometry import wavenumber
 from ..optics.mirror import horizon_correction
-from ..plugin.description import VARYING, Consumer, Feature, Surface, describe
+from ..plugin.description import VARYING, Consumer, Description, Feature, Surface, describe
 from ..plugin.memory import upload
 from ..progress import Progress, silent
-from .known_wavelengths import check_material
+from .known_wavelengths import check_material, known_range
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction
 from .spectrometer import MeasurementGeometry, across_plane, cone, light_direction, lobe_width
@@ -124,7 +124,7 @@ def spectrum(
     relative : "white", relative to a Lambertian standard of reflectance 1; "mirror", relative to a
         perfect mirror, seen where it reflects the lamp to; "none", the share of the incident light
         that enters the detector.
-    wavelengths : nm; default: 360 to 830 in steps of 5.
+    wavelengths : nm; default: 300 to 830 in steps of 5, as far as table and material are known.
     before : called with each wavelength, nm, before it is measured, to change the BSDF's
         parameters that depend on it, as `media.follow` does.
     progress : called as progress(done, total, text).
@@ -139,12 +139,10 @@ def spectrum(
             "llvm_ad_spectral_polarized for s and p"
         )
     require_loaded_llvm()
-    lam = check_wavelengths(
-        np.arange(360.0, LAST + 1.0, STEP) if wavelengths is None else wavelengths
-    )
     sigma = None
     if (described := describe(bsdf)) is not None:
         SPECTRA.check(described)
+    lam = check_wavelengths(_usual(described) if wavelengths is None else wavelengths)
     if isinstance(described, Surface):
         sigma = described.sigma
         if described.material:
@@ -165,6 +163,15 @@ def spectrum(
         signals = signals / _of_mirror(sigma, geometry, lam)
     value, s, p = signals if mi.is_polarized else (signals[0], None, None)
     return Spectra(lam, value, geometry, relative, s, p)
+
+
+def _usual(described: Description | None) -> Reals:
+    """Return the default wavelengths (n,), nm, at which a surface is known."""
+    lam = np.arange(FIRST, LAST + 1.0, STEP)
+    if not isinstance(described, Surface):
+        return lam
+    first, last = known_range(described.material or None)
+    return lam[(lam >= max(first, described.shortest_wavelength)) & (lam <= last)]
 
 
 def check_wavelengths(wavelengths: ArrayLike) -> Reals:

@@ -32,7 +32,7 @@ from ..tables.source import TableSource
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .crops import crops_of
-from .iridescence import WINDOW, chance_iridescence, diffracted_light
+from .iridescence import WINDOW, chance_iridescence, diffracted_light, material_factor
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
@@ -42,7 +42,7 @@ from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 8
+VERSION = 9
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -60,7 +60,7 @@ class Job:
     resolution: int  # pixels a side of the map
     variant: str  # variant of Mitsuba
     threads: int  # threads of Dr.Jit
-    surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF of the map; R = 1 without
+    surface: tuple[tuple[str, Any], ...] = ()  # parameters of the BSDF
     # which crop of `iridescence.WINDOW` of how many; None for the whole scan
     crop: tuple[int, int] | None = None
 
@@ -144,14 +144,18 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
-    # without a material ideal reflection: the effect of the structure alone
-    bsdf = bsdf_of(table, **(dict(job.surface) or {"material": "none"}))
+    bsdf = bsdf_of(table, **dict(job.surface))
+    row["surface"] = bsdf.describe().summary
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     light = LightDirection(job.theta, phi)
-    diffracted = diffracted_light(table, light)
+    set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
+    factor = material_factor(bsdf_of(table, **dict(job.surface)), light)
+    diffracted = diffracted_light(table, light, factor=factor)
     row["diffracted"] = diffracted.share
-    index, floor = diffracted.iridescence(), chance_iridescence(table, light)
+    brightest, theta, phi = diffracted.brightest()
+    row |= {"brightest": brightest, "brightest_theta_deg": theta, "brightest_phi_deg": phi}
+    index, floor = diffracted.iridescence(), chance_iridescence(table, light, factor)
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (
@@ -217,7 +221,7 @@ def run_survey(
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
-    surface : parameters of the map's BSDF, e.g. {"material": "keratin"}; R = 1 without.
+    surface : parameters of the BSDF, e.g. {"material": "keratin"}; a dielectric of 1.5 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     crops : measure so many crops of each scan, of `iridescence.WINDOW`, or as many as fit; scans
         that are narrower, and recipes, are measured as a whole.

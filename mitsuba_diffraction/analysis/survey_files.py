@@ -19,7 +19,7 @@ SHEET = "sheet"
 #: Columns of a scan's files by suffix.
 FILES = {".exr": "table", ".png": "map"}
 # Columns that are texts, and those that contact sheets and summaries need.
-_TEXTS = ("reason", "warnings", "tiling", "ranked_among", *FILES.values())
+_TEXTS = ("reason", "warnings", "surface", "tiling", "ranked_among", *FILES.values())
 _NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light", "tiling")
 # First characters of formulas.
 _FORMULAS = ("=", "+", "-", "@", "\t")

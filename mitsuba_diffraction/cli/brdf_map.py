@@ -327,7 +327,7 @@ def _surface(bsdf: Any) -> str:
         return "; ".join([described.text, width, *turned])
     return "; ".join(
         [
-            "R = 1" if described.text == "none" else f"{described.text}, {described.model}",
+            described.summary,
             f"{described.coherence}, coherence width {described.patch.width_text}",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *turned,

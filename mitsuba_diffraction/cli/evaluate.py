@@ -46,9 +46,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_wavelengths(group)
     options.add_options(
         group,
-        ("--angles LOW HIGH", "viewing angles, degrees, positive on the light's side; default: "
-         "from the mirror direction to where the order of the patch's own period ends, or to 80",
-         float),
+        ("--angles FIRST:LAST", "viewing angles, degrees, positive away from the light; default: "
+         "from where the order of the patch's own period ends, or -80, to the mirror direction",
+         options.limits),
         ("--angle-step DEG", "", float, 0.1),
         ("--order M", "order that is followed", int, 1),
     )  # fmt: skip
@@ -60,10 +60,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         coherence="ensemble for spectral, patch for the thesis' own methods",
     )
     options.add_option(
-        group, "--windows N", "window positions whose own periods are fitted, for the spread; 0 "
+        group, "--positions N", "window positions whose own periods are fitted, for the spread; 0 "
         "leaves them out", whole_number(0), 32, {"dest": "positions"},
     )  # fmt: skip
-    group = parser.add_argument_group("the surface, by default R = 1")
+    group = parser.add_argument_group("the surface; methods other than spectral have R = 1")
     options.add_options(group, *MATERIAL)
     options.add_json(parser)
     options.add_heights(parser)
@@ -187,7 +187,7 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
     """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
     patch, settings = experiment.patch, experiment.settings
-    if not (surface := surface_parameters(args)):
+    if args.method != "spectral" or settings.get("coherence") == "patch":
         from ..thesis.methods import make
 
         method = make(args.method, patch, period=args.period, progress=bar, **settings)
@@ -206,7 +206,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     asked["wavelength_range"] = table_range(steps)
     source = in_medium(TableSource.of(patch), args.ext_ior)
     table = table_of(source, source.settings_for(asked), bar)
-    return partial(brdf_values, bsdf_of(table, **surface)), table.sigma
+    return partial(brdf_values, bsdf_of(table, **surface_parameters(args))), table.sigma
 
 
 def _write(
@@ -291,11 +291,11 @@ def viewing_angles(
         # mirrored for negative orders: the sine on the order's own side
         sine = 1.25 * abs(reach) - sign * math.sin(math.radians(theta))
         end = min(end, max(math.degrees(math.asin(min(sine, 1.0))), _NARROWEST - sign * theta))
-    low, high = limits or sorted((-theta, sign * end))
+    low, high = limits or sorted((theta, -sign * end))
     if not -90.0 < low < high < 90.0:
         raise DiffractionError(
-            f"angles={low:g} to {high:g} degrees are none; give the lower first, both within -90 "
-            "and 90, e.g. -75 60"
+            f"angles={low:g}:{high:g} degrees are none; give the lower first, both within -90 "
+            "and 90, e.g. -60:75"
         )
     if not 1e-3 <= step <= high - low:
         raise DiffractionError(

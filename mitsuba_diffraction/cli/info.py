@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..heights.recipes import Recipe
     from ..heights.source import Source
 
+# What `render MESH` and `tangents` do with a mesh without normals
+_SMOOTH = "none in the file; render MESH and tangents make smooth ones over all edges"
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
 
@@ -227,6 +229,6 @@ def _mesh(file: Path) -> dict[str, Any]:
         "kind": "mesh",
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
         **summary,
-        "normals": summary["normals"] and has_own_normals(file),
+        "normals": "in the file" if has_own_normals(file) else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }

@@ -49,6 +49,7 @@ from .arguments import note_arguments
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
 from .report import STDOUT, check_outputs, save_report
+from .spellings import current
 
 #: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
@@ -82,9 +83,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _main(argv: Sequence[str] | None) -> int:
     try:
-        for text in sys.argv[1:] if argv is None else argv:
+        words = list(sys.argv[1:] if argv is None else argv)
+        for text in words:
             check_name(text)
-        args, unknown = build_parser().parse_known_args(argv)
+        args, unknown = build_parser().parse_known_args(current(words))
         if unknown:  # of the command, whose usage helps
             args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     except DiffractionError as error:

@@ -51,7 +51,7 @@ def run_observed(args: argparse.Namespace) -> Figures:
         result = scene_options.rendered(
             args,
             variant,
-            lambda _: load_scene(args.scene, parameters, bands=bands),
+            lambda _: load_scene(args.scene, parameters, bands=bands, say=say),
             lambda *_: check_outputs([output, png]),  # of what only loading tells
         )[2]
     if bad := count_bad(result.bitmap):

@@ -91,8 +91,8 @@ MODE = (
 )  # fmt: skip
 #: View by which a picture's linear light is shown.
 VIEW = (
-    "--view", "natural keeps hues and turns bright light white; standard clips each channel by "
-    "itself", VIEWS, "natural",
+    "--tonemap", "natural keeps hues and turns bright light white; standard clips each channel by "
+    "itself", VIEWS, "natural", {"dest": "view"},
 )  # fmt: skip
 
 
@@ -146,6 +146,14 @@ def numbers(text: str) -> tuple[float, ...]:
             "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
             f"{_MOST_NUMBERS} of them), got {quoted(text)}"
         ) from error
+
+
+def limits(text: str) -> tuple[float, float]:
+    """Type of argument: FIRST:LAST, two numbers; see `settings` for what they may be."""
+    with contextlib.suppress(ValueError):
+        first, last = (float(part) for part in text.split(":"))
+        return first, last
+    raise argparse.ArgumentTypeError(f"expected FIRST:LAST, such as 400:700, got {quoted(text)}")
 
 
 def numbers_of(text: str, most: int) -> list[float]:
@@ -282,8 +290,10 @@ def add_table(group: Group, names: Sequence[str] = TABLE, **defaults: str) -> No
     """Add the settings of a table. defaults: texts for the help in place of the default values."""
     for name in names:
         item = described_setting(name)
-        kind = item.choices or (whole_number(1) if item.type is int else item.type)
-        values = (item.metavar,) if isinstance(item.metavar, str) else item.metavar or ()
+        kind: Any = item.choices or (whole_number(1) if item.type is int else item.type)
+        values = (item.metavar,) if isinstance(item.metavar, str) else ()
+        if isinstance(item.metavar, tuple):
+            kind, values = limits, (":".join(item.metavar),)
         default = defaults.get(name, item.default_text)
         add_option(
             group, " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind

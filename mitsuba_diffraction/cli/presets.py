@@ -11,7 +11,7 @@ from .report import Figures
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "presets", run, "list the named looks",
-        "List the named looks, which --preset takes in place of a patch: docs/presets.md.",
+        "List the presets, which --preset uses in place of a patch: docs/gallery.md.",
     )  # fmt: skip
     options.add_json(parser, "the looks")
 

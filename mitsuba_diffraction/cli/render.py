@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from ..errors import DiffractionError
 from ..extras import optional
 from ..scene.denoise import denoised
+from ..scene.elements import surfaces_text
 from ..scene.frames import (
     FILMS,
     Frame,
@@ -161,7 +162,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
             _check_colours(args, outputs.png, film.scene, film.sensor)
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
-                report = _finish(args, result, outputs, variant)
+                report = _finish(args, result, outputs, variant, film.scene)
                 film.forget(0)
                 return report | {"workers": say_report(film)}
     say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
@@ -174,7 +175,7 @@ def _run_one(args: argparse.Namespace) -> Figures:
     outputs = _outputs(args)
 
     def load(bar: Bar) -> Any:
-        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
+        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise, say=say)
         return whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
 
     variant = set_variant(args.mode)
@@ -186,7 +187,7 @@ def _run_one(args: argparse.Namespace) -> Figures:
 
     with mitsuba_warnings():
         scene, sensor, result = scene_options.rendered(args, variant, load, check)
-        report = _finish(args, result, outputs, variant)
+        report = _finish(args, result, outputs, variant, scene)
         if args.denoise:
             clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
             _write_denoised(args, clean, outputs.denoised)
@@ -194,7 +195,9 @@ def _run_one(args: argparse.Namespace) -> Figures:
     return report
 
 
-def _finish(args: argparse.Namespace, result: Result, outputs: Outputs, variant: str) -> Figures:
+def _finish(
+    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str, scene: Any
+) -> Figures:
     """Write the picture, print warnings and a summary, and return the figures for --json."""
     bad = count_bad(result.bitmap)
     if bad:
@@ -211,13 +214,14 @@ def _finish(args: argparse.Namespace, result: Result, outputs: Outputs, variant:
         write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
     (width, height), samples = result.bitmap.size(), f"{result.spp} samples"
-    seconds = elapsed(args)
+    seconds, surfaces = elapsed(args), surfaces_text(scene)
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
-        f"{seconds:.1f} s, {variant}"
+        f"{seconds:.1f} s, {variant}{surfaces}"
     )
     return {
         "scene": args.scene, "files": written, "pixels": [width, height],
+        "surfaces": surfaces.removeprefix("; "),
         "spp": result.spp, "seed": args.seed, "variant": variant,
         "interrupted": result.interrupted, "seconds": seconds,
     }  # fmt: skip
@@ -263,7 +267,9 @@ def _run_frames(args: argparse.Namespace) -> Figures:
         variant = set_variant(args.mode)
         with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
             bar(0, 0, "loading")
-            for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
+            for _ in render_frames(
+                args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+            ):
                 done += 1
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,

@@ -80,7 +80,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_options(
         parser.add_argument_group("the table"),
-        ("--wavelength-range A,B", "nm; default: 380,780", _pair),
+        ("--wavelength-range FIRST:LAST", "nm; default: 380:780", options.limits),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
         ("--solver", "Chandezon's method, for slopes; boundary integral (extra solve); coupled "
@@ -278,14 +278,6 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
         yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"
-
-
-def _pair(text: str) -> tuple[float, float]:
-    try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"expected two numbers A,B, got '{text[:40]}'") from error
-    return low, high
 
 
 def _layer(text: str) -> Layers:

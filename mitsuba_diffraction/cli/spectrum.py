@@ -61,8 +61,8 @@ _SPECTROMETER = (
     ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
      ("white", "mirror", "none"), "white"),
     ("--polarisation", "also light polarised across (s) and in (p) the plane of incidence", bool),
-    ("--wavelength-range FIRST LAST", "nm; default: 300 830, or from where a table begins",
-     number_between(100, 10000)),
+    ("--wavelength-range FIRST:LAST", "nm; default: 300:830, or from where a table begins",
+     options.limits),
     ("--step NM", "between wavelengths", number_between(0.01, 1000), 5.0),
 )  # fmt: skip
 
@@ -246,8 +246,11 @@ def _wavelengths(args: argparse.Namespace) -> Any:
     import numpy as np
 
     first, last = args.wavelength_range or _RANGE
-    if first > last:
-        args.parser.error("argument --wavelength-range: give the shortest first, e.g. 400 700")
+    if not 100.0 <= first <= last <= 10000.0:
+        args.parser.error(
+            f"argument --wavelength-range: {first:g}:{last:g} must be FIRST:LAST in nm, from 100 "
+            "to 10000 and the shortest first, e.g. 400:700"
+        )
     count = int((last - first) / args.step + 1e-9) + 1
     return first + args.step * np.arange(count)
 

@@ -43,7 +43,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "different sizes, and gives errors of single scans", whole_number(1)),
         options.MODE,
     )  # fmt: skip
-    group = parser.add_argument_group("the surface of the maps, by default R = 1")
+    group = parser.add_argument_group("the surface, of maps and numbers")
     options.add_options(group, *MATERIAL)
     options.add_heights(parser)
     group = parser.add_argument_group("the tables")
@@ -80,10 +80,11 @@ def run(args: argparse.Namespace) -> Figures:
         say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
     measured = "scans" if args.crops is None else "crops and whole scans"
     seconds = elapsed(args)
+    surface = next((f"{row['surface']}, " for row in rows if not row["reason"]), "")
     print(
         f"{args.output}: {len(rows) - failed} {measured} in "
         f"survey.csv, {failed} failed, "
-        f"{len({row['sample'] for row in rows})} samples in samples.csv, {seconds:.1f} s"
+        f"{len({row['sample'] for row in rows})} samples in samples.csv, {surface}{seconds:.1f} s"
     )
     args.code = 1 if failed else 0
     return {"rows": rows, "seconds": seconds}

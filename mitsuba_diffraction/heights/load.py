@@ -97,7 +97,7 @@ def notes_line(
         values["coherence_width"] = settings.coherence_width
     words = ["mitsuba-diffraction", "info", os.fspath(path)]
     if settings.wavelength_range != TableSettings.wavelength_range:
-        words += ["--wavelength-range", *(f"{end:g}" for end in settings.wavelength_range)]
+        words += ["--wavelength-range", "{:g}:{:g}".format(*settings.wavelength_range)]
     for name, value in values.items():
         numbers = value if isinstance(value, tuple) else (value,)
         text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)

@@ -85,17 +85,17 @@ class PluginBSDF(mi.BSDF):
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """Return f |cosθo| per wavelength, as the context's mode of transport has it."""
-        return mi.Spectrum(self.answers(ctx, si, wo, active, "v")[0])
+        return mi.Spectrum(self.answers(ctx, si, mi.Vector3f(wo), active, "v")[0])
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Return the density of `sample` per solid angle."""
-        return self.answers(ctx, si, wo, active, "d")[0]
+        return self.answers(ctx, si, mi.Vector3f(wo), active, "d")[0]
 
     def eval_pdf(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
         """Return `eval` and `pdf` at once."""
-        value, density = self.answers(ctx, si, wo, active, "vd")
+        value, density = self.answers(ctx, si, mi.Vector3f(wo), active, "vd")
         return mi.Spectrum(value), density
 
     # ------------------------------------------------------------------ changes of parameters
@@ -262,6 +262,7 @@ class SurfaceBSDF(PluginBSDF):
         Lobes of a nested BSDF that have a single direction are returned alone: the diffraction has
         no share in them. All others are mixed with it, in value and density.
         """
+        sample1, sample2 = mi.Float(sample1), mi.Point2f(sample2)
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & ((cos_i != 0.0) if self.transmits else (cos_i > 0.0))
         site = self.site_at(si, active)

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -179,6 +180,14 @@ class Surface:
     def solved(self) -> bool:
         """Whether the surface has solved orders, of grooves or of a crossed grating."""
         return not isinstance(self.table, DiffractionTable)
+
+    @property
+    def summary(self) -> str:
+        """Material with its layers, and model of the boundary, for people."""
+        if self.solved:
+            periods = " x ".join(f"{d:g}" for d in self.orders.periods if math.isfinite(d))
+            return f"solved orders, period {periods} µm"
+        return "R = 1" if self.text == "none" else f"{self.text}, {self.model}"
 
     @property
     def sigma(self) -> float:

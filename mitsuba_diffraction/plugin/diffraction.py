@@ -1,88 +1,69 @@
 """The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract the light they reflect.
 
-Parameters, with defaults in brackets; ∂: differentiable. Lengths are in µm, wavelengths in nm.
-`docs/parameters.md` is made of this text. Surfaces that light goes through as well are of the
-plugin `diffraction_dielectric`.
+Parameters, with defaults in brackets; ∂: differentiable. Lengths are in µm, wavelengths and
+film_thickness in nm. `docs/parameters.md` is made of this text. Surfaces that light goes through as
+well are of the plugin `diffraction_dielectric`.
 
 The surface
 -----------
 heightfield : string
-    File of heights: image (PNG, BMP, TIFF, EXR), array (NPY), text, instrument file or recipe
-    (TOML). A table is accepted, too.
+    File of the height map: image, array (NPY), text, instrument file or recipe (TOML). A table is
+    accepted, too.
 table : string
-    Instead: a table made by `mitsuba-diffraction precompute`.
+    Instead: table file of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
-    Instead: heights in µm, shape (ny, nx), in dictionaries only. `md.bsdf_dict` passes a whole
-    HeightField, which needs no pixel_size.
+    Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
 pixel_size : float or string [from the file]
-    Distance between heights in µm: one number, "dx, dy", or "auto".
+    Distance between heights, µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
     Height of white in an integer image, µm, or "auto". Other heights are scaled to this range.
 height_unit : string [from the file]
-    Unit of the numbers in the file, for example `nm`, if the file states none or a wrong one.
+    Unit of the numbers in the file, for example `nm`.
 channel : string or integer [the heights]
     Channel of an instrument file, by name or index; of an EXR image, by name.
 crop : float or string [none]
-    Size of the central region to keep, µm: one number for a square, or "width, height".
+    Size of the central region to keep, µm: one number, or "width, height".
 fill : string [none]
-    Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
-    `harmonic` spans a membrane over the gap.
+    Points without data: `none` refuses them, `nearest` copies the nearest height, `harmonic` spans
+    a membrane over the gap.
 level : string [auto]
-    `plane` subtracts the best plane, `quadratic` the best paraboloid, as of a scanner's arc;
-    `lines` aligns the scan lines by their medians first, then the plane; `none`.
-    `auto` is `plane` for a file of heights whose tilt turns the mirror direction, else `none`.
+    Surface to subtract: `plane`, `quadratic`, `lines` (aligned scan lines, then a plane) or `none`;
+    `auto`: `plane` for files with a visible tilt.
 clip : float [none]
-    Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
+    Number of robust standard deviations, at least 1, beyond which heights are clipped (dust).
 periodic : string [auto]
-    Statement about the edges: `exact`, the patch is whole periods of a surface that repeats, and
-    tiles the plane; `open`, it is a part of a larger surface, seen through windows that fade
-    towards its edges. `auto`: files of heights are open, generated patches tile. Treatments are
-    applied in the order crop, fill, level, clip.
+    Statement about the edges: `exact`, whole periods that tile; `open`, part of a larger surface.
+    `auto`: files are open, generated patches tile.
 orientation : float or texture ∂ [0]
-    Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,
-    in a float format such as EXR) or mesh attribute of three channels, the first two of which are
-    (cos, sin) of the angle. Tangents follow UV coordinates. On a mesh without UV coordinates they
-    are arbitrary and turn from triangle to triangle, of which `info MESH` and `render` warn.
+    Angle, degrees, from ∂p/∂u to the x axis. Textures and mesh attributes hold (cos, sin); 8 and 16
+    bits: (1 + cos)/2, (1 + sin)/2.
 lateral_scale : float or texture ∂ [1]
-    Factor that stretches the patch in its plane, heights unchanged, between 0.01 and 100: a
-    grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
-    channel. Spatial frequencies are divided by it. coherence_width applies at the largest factor,
-    or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
-    same number of periods everywhere. May change up to lateral_scale_max. A table serves factors up
-    to 1. Energy is conserved for it (docs/holograms.md).
+    Factor on lengths in the plane, 0.01 to 100: multiplies the period. Number, raw texture or mesh
+    attribute of one channel.
 lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
-    Largest factor of a texture, above which factors are clipped; required unless the texture is a
-    bitmap. Or the largest value that a number may change to: give 1.5 × lateral_scale to optimise
-    a period in both directions. Tables grow with its square.
+    Largest lateral_scale that can be set later, or of a texture that is no bitmap. Tables grow with
+    its square.
 height_scale : float or texture ∂ [1]
-    Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
-    a mesh attribute of one channel, for worn and fresh places.
+    Factor on the heights, up to 1.5 × max(1, the value loaded). Number, raw texture or mesh
+    attribute of one channel.
 height_scale_max : float [of a bitmap]
-    Largest factor of such a texture, above which factors are clipped. Required unless the texture
-    is a bitmap.
+    Largest factor of a height_scale texture; required unless the texture is a bitmap.
 
 The table
 ---------
 coherence_width : float or string [auto]
-    Width over which light is coherent, µm, 4σ of its Gaussian amplitude window. `auto` is the width
-    of the table or the recipe, else 65 (sunlight). The mirror direction (order 0) has it from any
-    scan. Other orders of a scan have its windows' width at most. Patches that repeat exactly set no
-    limit.
+    Width over which light is coherent, µm, 4σ of a Gaussian window. `auto`: 65 (sunlight), or the
+    width of the table or recipe.
 coherence : string [ensemble]
-    `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
-    `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the
-    window centred where the light falls, the grain seen from close up, whose mean is `ensemble`.
-    `surface` requires UV coordinates, uv_scale or world_scale, and a spectral or mono variant;
-    sampling and energy are as in `ensemble`.
+    `ensemble`: mean over all windows. `patch`: speckle of one window. `surface`: speckle of the
+    window where the light falls.
 uv_scale : float or string [none]
-    µm per unit of the UV coordinates: one number, or "u, v".
+    Size of a unit of the texture coordinates, µm, for coherence=surface: one number, or "u, v".
 world_scale : float [none]
-    Instead: µm per unit of length of the scene, 1000 for mm. Distances on the surface follow from
-    the UV coordinates, whose scale must be the same all over it.
+    Instead: size of a unit of length of the scene, µm; 1000 for mm.
 tiling : string [periodic]
-    Cover of the surface by patches: `periodic`, side by side; or `random`, shifted at random and
-    blended with the same mean and contrast, which hides the repetition (Heitz and Neyret 2018). Use
-    `random` for rough surfaces only: it breaks the lines of a grating.
+    Cover for coherence=surface: `periodic`, side by side; `random`, shifted at random and blended,
+    for rough surfaces without grooves.
 basis : string [auto]
     Basis of the series in κ: `svd` (also `auto`), `chebyshev` or `taylor`.
 tolerance : float [0.001]
@@ -90,79 +71,49 @@ tolerance : float [0.001]
 terms : integer [from tolerance]
     Length of the series.
 windows : float or string [auto]
-    Width, µm, of the windows that an open patch is seen through; several overlap, each is levelled,
-    and their powers are averaged (Welch 1967). `auto`: a scan up to 32 µm is one window, as wide as
-    its smaller side; a wider one has windows of half its side, at least 32 µm and at most
-    coherence_width. Wider windows have narrower lobes and more grain.
+    Width of the windows of an open patch, µm. `auto`: the smaller side up to 32 µm; above, half of
+    it, 32 µm to coherence_width.
 
 The material
 ------------
 material : string or float
-    A tissue or a liquid, with its index over wavelength: `keratin`, `chitin`, `melanin`, `guanine`,
-    `water`, `SiO2`, `MgF2`; an index, `1.56` or `1.56+0.05i`; a conductor by symbol, as in
-    `roughconductor`, or
-    plain name: `Au`, `gold`; or `none`, which reflects all light.
+    Tissue or liquid (`keratin`, `chitin`, `melanin`, `guanine`, `water`, `SiO2`, `MgF2`), index
+    (`1.56`, `1.56+0.05i`), conductor (`Au`, `gold`), or `none` (R = 1).
 eta, k : spectra ∂
-    Instead: the conductor's complex refractive index.
+    Instead: complex refractive index of a conductor.
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin),
-    or names: `water`. The medium changes the reflectance alone. Waves in it are shorter: multiply
-    lateral_scale and height_scale by its index, as `--ext-ior` does.
-    Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
+    Indices of the default dielectric and of the surrounding medium, or names such as `water`. Their
+    ratio is the differentiable `eta`.
 coat_ior : float or string [none]
-    Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
-    a CD (1.58), or `water` on a wet animal. Light is refracted into the layer and out again; its
-    own face is a mirror of the same coherence width. Light that the face sends back is summed as
-    between two mirrors. Light that leaves the structure beyond the critical angle is lost
-    (docs/validation.md). Energy is conserved as without a coat. The index relative to the medium
-    above is the differentiable parameter `coat_eta`. Renderings have water's index at 589 nm in
-    paths and face: at 400 nm, orders are 4 % too dark at most. `spectrum` has n(λ).
+    Index of a flat clear layer over the structure, too thick to interfere: 1.58 (lacquer), `water`.
+    Relative index: the differentiable `coat_eta`.
 film_ior : float or string [none]
-    Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
-    alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
-    above it. The index relative to the medium above is the differentiable parameter `film_eta`.
-    Excludes a coat.
+    Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
+    differentiable `film_eta`. Excludes a coat.
 film_thickness : float ∂ [none]
-    Thickness of the film along the vertical, nm. 2 n d is at most 12 µm, the coherence length. RGB
-    variants sum the film's colours over wavelengths, apart from the orders.
+    Thickness of the film along the vertical, nm; 2 n d is at most 12 µm.
 film_k : float ∂ [0]
-    Absorption of the film: k of its index n + ik, over the index of the medium above. Excludes a
-    nested BSDF.
+    Absorption of the film, k of its index n + ik. Excludes a nested BSDF.
 layers : string [none]
-    Instead of a film: a stack of layers that follows the heights, a TOML file of `layers`, pairs of
-    a material and a thickness in µm from the material upwards; `repeat`; and `spread`, the standard
-    deviation of all thicknesses from place to place, as a share:
-    `layers = [["chitin", 0.09], ["1.33", 0.08]]`. Reflectance is tabulated over angle and
-    wavelength. The model is `kirchhoff`; coats are excluded, and a nested BSDF under layers that
-    absorb. Under a spread, polarised variants keep the mean phase between s and p.
+    TOML file of a stack that follows the heights: `layers`, pairs of material and thickness, µm;
+    `repeat`; `spread`. Excludes film and coat.
 model : string [small_slope]
-    `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
-    where the surface is rough at the scale of an order; polarised variants have its Mueller
-    matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
-    index.
+    Model of the boundary: `small_slope`, blended with Kirchhoff's on rough surfaces; or
+    `kirchhoff`, the tangent plane, default of `none` and stacks.
 energy_conserving : boolean [true]
-    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
-    The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
-    gratings of metal lose some per cent of the light in directions without gain, too
-    (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
-    first time and is cached. It is interpolated over height_scale: an optimisation waits when it
-    enters a new interval. For its derivative, enable the derivative of height_scale before
-    parameters.update(). Derivatives with respect to indices and films hold it constant.
+    Whether s(ωi) s(ωo) scales the BSDF so that no direction reflects more than it receives.
 shadowing : string [none]
     `vcavity`: shadowing of long V-shaped grooves (Torrance and Sparrow 1967); `none`.
 
 The light beneath
 -----------------
 (nested) : BSDF ∂
-    BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected:
-    T(ωi) T(ωo) with T = 1 − a and a the albedo of the surface; under a coat, of both flat faces.
-    Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; the nested BSDF's
-    components follow.
+    Base BSDF beneath a clear material, which receives the light that is not reflected. Any BSDF
+    that only reflects. Its components follow component 0.
 pigment : string or float [none]
-    Instead: a diffuse pigment, by its reflectance: a grey, `r,g,b` (linear), `#804020`, `sienna`,
-    or a spectrum, constant beyond its ends: a text of wavelengths and reflectances, `brown.csv`,
-    `feathers.csv:male` (one column of several), `brown.csv:percent` (or `fraction`). Or a
-    picture, which texture coordinates lay over the surface, or a `.glb` with such a base colour.
+    Instead: diffuse reflectance: grey, `r,g,b`, `#804020`, `sienna`, spectrum (`brown.csv`,
+    `feathers.csv:male`, `brown.csv:percent`), picture or `.glb`.
+
 Variants
 --------
 wavelength : float [550]
@@ -173,14 +124,38 @@ factor of the material:
 
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
 
-N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckmann and Spizzichino
-1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
+**Heights.** Treatments are applied in the order crop, fill, level, clip. Order 0 has the coherence
+width on any scan; other orders have at most the width of the scan's windows (Welch 1967).
 
-Denoisers that ask for an albedo get the reflectance at normal incidence, nested BSDF included.
+**Scales.** coherence_width applies at the largest lateral_scale, or at 1 if none is larger;
+elsewhere the window shrinks with the patch. A table file serves lateral factors up to 1.
 
-Derivatives pass through renderings backward and forward, for all parameters marked ∂. Functions
-of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`: a plain number would be recorded. On
-CUDA Dr.Jit 1.5 cannot record `sample` of a bitmap.
+**Speckle.** `surface` requires texture coordinates of one scale, uv_scale or world_scale, and a
+spectral or mono variant. `random` tiling: Heitz and Neyret (2018).
+
+**Media.** ext_ior changes only the reflectance. For the shorter waves in a medium, multiply
+lateral_scale and height_scale by its index, as `--ext-ior` does.
+
+**Coats.** Light is refracted into the coat and out again; its face is a mirror of the same
+coherence width. Reflections between face and structure are summed. Light beyond the critical angle
+is lost (docs/validation.md). Renderings use water's index at 589 nm for paths: orders at 400 nm are
+up to 4 % too dark. `spectrum` uses n(λ).
+
+**Films and stacks.** RGB variants sum the film's colours over wavelengths, apart from the orders. A
+stack's `spread` is the standard deviation of all thicknesses from place to place, as a share:
+`layers = [["chitin", 0.09], ["1.33", 0.08]]`. Stacks exclude a nested BSDF if they absorb. Under a
+spread, polarised variants keep the mean phase between s and p.
+
+**Energy.** Dielectrics are unaffected; metal gratings lose some per cent in directions without gain
+(docs/energy.md). The scale costs seconds once and is cached. It is interpolated over height_scale.
+For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
+indices and films hold it constant.
+
+**The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface;
+under a coat, of both flat faces. Spectra of pigments are constant beyond their ends.
+
+**Tools.** Functions of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`. On CUDA Dr.Jit 1.5
+cannot record `sample` of a bitmap.
 
 XML and the same in Python:
 
@@ -276,10 +251,7 @@ class Diffraction(DiffractingSurface):
         self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
         """See `SurfaceBSDF.diffracted`."""
-        # Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one
-        pair = Pair(site.si, wo, site.frame, active)
-        if self.coat is not None:
-            pair = CoatedPair(pair, self.coat.eta)
+        pair = self.pair(site, wo, active)  # eq. 1
         drawing = self._drawing_scale(site)
         if kinds == "d":
             density = self.power.density(pair.outer, drawing, site.si)
@@ -308,6 +280,11 @@ class Diffraction(DiffractingSurface):
             # s(ωi) s(ωo), so that no direction reflects more than it receives
             value *= mi.Spectrum(self.energy.factor(site, pair.outer.wo))
         return value
+
+    def pair(self, site: Site, wo: Vector3f, active: Mask) -> Pair:
+        """Return (u, v, w) = ωi + ωo in the patch's frame, eq. 1; within a coat if there is one."""
+        pair = Pair(site.si, wo, site.frame, active)
+        return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
     def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
         """See `SurfaceBSDF.draw`."""

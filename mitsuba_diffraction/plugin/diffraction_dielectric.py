@@ -8,22 +8,21 @@ below. It has no coat, film, nested BSDF or shadowing.
 The dielectric
 --------------
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    Indices of the media below and above the surface; of a sheet, and of both sides of it. Normals
-    point to the side of ext_ior. The ratio, at least 1.01, is the differentiable parameter `eta`.
+    Indices below and above the surface; of a sheet and around it. Normals point to ext_ior. Ratio,
+    at least 1.01: the differentiable `eta`.
 thin : boolean [false]
-    Light goes through a sheet, whose lower side is flat; both sides have ext_ior. Light that the
-    lower side sends back is summed as between two mirrors. Light beyond the sheet's critical angle
-    is lost, unless energy_conserving shares it among all other light.
+    Whether the surface is a sheet with a flat lower side; both sides have ext_ior.
 model : string [small_slope]
     `small_slope` or `kirchhoff`, as of `diffraction`.
 energy_conserving : boolean [true]
-    Makes R + T 1, since a dielectric loses no light: all light is multiplied by s(ωi) s(ωo), s on
-    the directions of both sides. It takes a few seconds the first time and is kept in the cache, in
-    steps of 0.01 of eta, finer near 1. `false` is the model as it is, for checks.
+    Whether s(ωi) s(ωo) scales all light so that R + T = 1. Takes seconds once and is cached, in
+    steps of 0.01 of eta.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that
-change the tangential part by more than 2/λ are left out.
+change the tangential part by more than 2/λ are left out. In a sheet, light reflected at the flat
+side is summed as between two mirrors. Light beyond the critical angle is lost, unless
+energy_conserving shares it among all other light.
 
 [theory/transmission.md](theory/transmission.md) has the equations, from `optics.through`.
 

@@ -98,6 +98,7 @@ class DiffractionMix(PluginBSDF):
 
         Lobes of one direction are that surface's alone.
         """
+        sample1, sample2 = mi.Float(sample1), mi.Point2f(sample2)
         weights = self.weights.at(si, _wide(active, si, sample1, sample2.x))
         shares = self._shares(ctx, weights)
         result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)

@@ -140,6 +140,19 @@ class DiffractingSurface(SurfaceBSDF):
         mirror = self.mirrored(ctx, site, pair, boundary, indices, power.zeroth, active)
         return interfering(others, mirror, power.cosine)
 
+    def material_factor(self, pair: Pair, site: Site) -> tuple[Spectrum, Float]:
+        """Return the power of diffracted orders over a perfect reflector's, and w.
+
+        A lobe's f of eq. 4, without its power ⟨|P|²⟩, over that of R = 1 in the same directions;
+        w, with which κ = k w of the power: within a coat it is larger.
+        """
+        indices = self.boundary.material.indices(site.si, True)
+        args = site.scale, site.wavenumbers, indices, mi.TransportMode.Radiance
+        perfect = dr.square(pair.outer.one_plus_dot) * self.geometry(pair.outer)
+        level = mi.Spectrum(self.geometry(pair) * dr.rcp(perfect))
+        factor = self.boundary.factor(pair, *args)
+        return tinted(level * factor, self.boundary.material), pair.w
+
     def mirrored(
         self,
         ctx: Context,

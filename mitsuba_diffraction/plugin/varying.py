@@ -209,18 +209,28 @@ class LateralScale(Varying):
 MOST_DEGREES = 36_000.0
 
 
+#: Largest error of an angle in degrees, where (cos, sin) are stored in integers of 8 or 16 bits.
+PRECISION = {bits: np.degrees(np.sqrt(2.0) / (2**bits - 1)) for bits in (8, 16)}
+# Directions shorter than this turn nothing: 128 of 255 is not quite 0.
+_SHORTEST = 0.02
+# Share of a bitmap's directions that must have unit length, or none, to tell how it stores them
+_MOST = 0.9
+
+
 class Orientation(Varying):
     """Angle from the first tangent to the patch's x axis: degrees, or a texture of (cos, sin).
 
     A raw texture or mesh attribute has (cos, sin) in its first two channels instead of an angle, so
-    that interpolation has no seam at 360°. They need not be of unit length; where both are 0 the
-    patch is not turned.
+    that interpolation has no seam at 360°. Pictures of 8 and 16 bits, which hold no negative
+    numbers, have (1 + cos)/2 and (1 + sin)/2, as normal maps do. Directions need not be of unit
+    length; where both are 0 the patch is not turned.
 
-    Raises a DiffractionError if a bitmap has one channel, is taken for colours, or cannot hold
-    negative numbers.
+    Raises a DiffractionError if a bitmap has one channel, is taken for colours, or holds directions
+    in neither way.
     """
 
     def __init__(self, value: float | Texture) -> None:
+        self._doubled = False
         super().__init__("orientation", value, -MOST_DEGREES, MOST_DEGREES, unit="°")
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
@@ -228,9 +238,11 @@ class Orientation(Varying):
         if self.texture is None:
             sin, cos = dr.sincos(dr.deg2rad(self.at(si, active)))
             return cos, sin
-        value = self.texture.eval_3(si, active)
+        value, shortest = self.texture.eval_3(si, active), 1e-6
+        if self._doubled:
+            value, shortest = 2.0 * value - 1.0, _SHORTEST
         length = dr.sqrt(dr.square(value.x) + dr.square(value.y))
-        turned = length > 1e-6
+        turned = length > shortest
         scale = dr.rcp(dr.select(turned, length, 1.0))
         return dr.select(turned, value.x * scale, 1.0), dr.select(turned, value.y * scale, 0.0)
 
@@ -243,18 +255,34 @@ class Orientation(Varying):
         """Reason why a texture's values are not directions, or None."""
         if self.texture is None or not is_bitmap(self.texture):
             return None  # attributes of meshes are checked where there is a mesh
-        data = np.array(mi.traverse(self.texture)["data"], np.float32)  # half would overflow
-        if data.shape[-1] < 3:
+        if (channels := mi.traverse(self.texture)["data"].shape[-1]) < 3:
             return (
-                f"orientation: the bitmap has {data.shape[-1]} channel; an orientation has "
+                f"orientation: the bitmap has {channels} channel; an orientation has "
                 "three: cosine, sine and an unused one"
             )
-        levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
-        within = levels.min() >= 0.0 and levels.max() <= 65535.5
-        from_integers = within and np.all(np.abs(levels - np.rint(levels)) < 0.02)
-        if from_integers and np.any((lengths > 0.0) & (np.abs(lengths - 1.0) > 0.02)):
+        data = np.array(mi.traverse(self.texture)["data"], np.float32)[..., :2]
+        levels = 65535.0 * data  # float32: half would overflow
+        integers = levels.min() >= 0.0 and levels.max() <= 65535.5
+        integers = integers and np.all(np.abs(levels - np.rint(levels)) < 0.02)
+        self._doubled = bool(integers and _unit_share(data) <= _MOST)
+        if self._doubled and _unit_share(2.0 * data - 1.0) <= _MOST:
             return (
-                "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
-                "negative numbers; save (cos, sin) in a float format, as EXR"
+                "orientation: the bitmap comes from a picture of 8 or 16 bits, which holds no "
+                "negative numbers: save (1 + cos)/2 and (1 + sin)/2 there, or (cos, sin) in a "
+                "float format, as EXR"
             )
         return None
+
+    def __str__(self) -> str:
+        if not self._doubled:
+            return super().__str__()
+        return (
+            f"{super().__str__()} of (1 + cos)/2, (1 + sin)/2, within {PRECISION[8]:.2g}° in 8 "
+            f"bits and {PRECISION[16]:.2g}° in 16"
+        )
+
+
+def _unit_share(directions: np.ndarray[Any, Any]) -> float:
+    """Return the share of directions (…, 2) that have unit length, or none."""
+    lengths = np.hypot(directions[..., 0], directions[..., 1])
+    return float(np.mean((lengths < _SHORTEST) | (np.abs(lengths - 1.0) < _SHORTEST)))

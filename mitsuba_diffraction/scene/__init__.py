@@ -11,7 +11,8 @@ passes       rendering in passes of samples
 pictures     EXR and PNG of pictures
 denoise      pictures without noise, by Open Image Denoise
 frames       frames of an animation, and a film of them
-additions    meshes and materials put into a scene before Mitsuba makes its objects
+additions    meshes, lights and filters changed before Mitsuba makes a scene's objects
+surfaces     surfaces and their parameters put into a scene
 clamping     integrator that limits the light of single samples
 bands        films with a band for each receptor of an eye, and tables that cover it
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor

@@ -24,6 +24,8 @@ _UNNAMED = "_unnamed"
 _FILE = re.compile(r'\w*Mesh\[\s*name = "([^"]+)"')
 # Mitsuba has no other way to ask a mesh attribute for its name.
 _ATTRIBUTE = re.compile(r'name = "([^"]+)"')
+# Materials that a line names.
+_MOST_SURFACES = 3
 _MADE = "make it with the command 'tangents MESH -o FIELD.ply', and use that file"
 
 
@@ -55,6 +57,14 @@ def _with_article(kind: str) -> str:
     """`AreaLight` as "an area light"."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
     return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
+
+
+def surfaces_text(scene: Any) -> str:
+    """Describe the materials of a scene's diffracting surfaces, after "; "; "" without any."""
+    found = (s.summary for shape in scene.shapes() for s in surfaces_within(shape.bsdf()))
+    first, rest = (texts := list(dict.fromkeys(found)))[:_MOST_SURFACES], texts[_MOST_SURFACES:]
+    more = [f"{len(rest)} more materials"] if rest else []
+    return "".join(f"; {text}" for text in (*first, *more))
 
 
 def surfaces_within(bsdf: Any) -> list[Surface]:

@@ -14,7 +14,7 @@ from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
 from .orientation.mesh_files import load_mesh, load_orientation
 from .orientation.tangents import check_tangents
-from .orientation.trimesh import TriangleMesh, oriented_mesh, vertex_normals
+from .orientation.trimesh import TriangleMesh, oriented_mesh
 
 Floats = NDArray[np.float64]
 
@@ -107,8 +107,6 @@ def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMe
     """
     positions, normals, uv, faces = load_mesh(file)
     placed = fit_of(positions, file, up)
-    if normals is None:
-        normals = vertex_normals(positions, faces)
     orientation = load_orientation(file)
     if orientation is None and check_tangents(positions, normals, uv, faces).usable:
         orientation = np.tile([1.0, 0.0], (len(positions), 1))

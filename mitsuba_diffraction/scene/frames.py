@@ -6,7 +6,7 @@ import errno
 import hashlib
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,13 @@ class Frame:
 
 
 def render_frames(
-    scene: Path, frames: Sequence[Frame], variant: str, *, with_exr: bool, progress: Progress
+    scene: Path,
+    frames: Sequence[Frame],
+    variant: str,
+    *,
+    with_exr: bool,
+    progress: Progress,
+    say: Callable[[str], None] | None = None,
 ) -> Iterator[Frame]:
     """Render and write frame after frame, in the variant that is set; ends early after Ctrl-C.
 
@@ -75,6 +81,7 @@ def render_frames(
         `exposure`, `view`, `preview` and `denoise`.
     with_exr : write a linear EXR beside each PNG.
     progress : called as progress(samples done, samples in all, text).
+    say : called with each change of surfaces of the first frame, see `load_scene`.
 
     Raises a DiffractionError if the scene fails, or its film holds no colours.
     """
@@ -83,7 +90,9 @@ def render_frames(
         for n, frame in enumerate(frames):
             settings = frame.settings
             # the scene before is held until the next is there, and with it its tables
-            loaded = load_scene(scene, frame.values, box_filter=settings["denoise"])
+            loaded = load_scene(
+                scene, frame.values, box_filter=settings["denoise"], say=None if n else say
+            )
             sensor = sensor_of(loaded, settings["sensor"])
             if settings["preview"]:
                 shrink(sensor)

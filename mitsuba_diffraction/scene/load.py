@@ -13,7 +13,7 @@ from __future__ import annotations
 import contextlib
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +25,12 @@ from ..plugin import installed
 from ..system import memory
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
-from .parameters import check_includes, check_parameters, files_of, parameters_of
+from .parameters import check_includes, check_parameters, files_of, numbers_in, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
     from .bands import SensorBands
+    from .surfaces import Edit
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -92,11 +93,13 @@ def load_scene(
     *,
     box_filter: bool = False,
     bands: SensorBands | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> Any:
     """Load an XML scene in the variant that is set.
 
     box_filter : give all films a box as reconstruction filter instead of their own.
     bands : give all films these bands in place of colours, and heights tables that cover them.
+    say : called with a line for each change of surfaces: the shapes and the material that it names.
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
@@ -107,7 +110,8 @@ def load_scene(
     from .orbit import turn_cameras
 
     readable_file(file)
-    values = split_values(parameters, parameters_of(file, parameters) or ())
+    defaults = parameters_of(file, parameters) or {}
+    values = split_values(parameters, defaults)
     known = files_of(file, values.parameters, with_sources=False)
     for each in known:
         note_input(each)
@@ -117,7 +121,8 @@ def load_scene(
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
         with contextlib.nullcontext() if bands is None else wider_tables(bands.first):
-            scene = _instantiated(file, known, values, box_filter, bands)
+            _check_parameters_act(file, values, defaults)
+            scene, edits = _instantiated(file, known, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -134,7 +139,41 @@ def load_scene(
     if bands is not None:
         check_bands(bands, named)
     warn_of_dark_bands(scene.sensors(), named)
+    for edit in edits:
+        if say is not None:
+            say(edit.line(scene))
     return scene
+
+
+def _check_parameters_act(
+    file: Path, values: SceneValues, defaults: Mapping[str, str | None]
+) -> None:
+    """Refuse values other than the defaults that the surfaces put on ids leave without effect."""
+    import mitsuba as mi
+
+    from .surfaces import check_parameters_act, put_materials
+
+    def state(without: str = "") -> Any:
+        config = mi.parser.ParserConfig(mi.variant())
+        given = {name: v for name, v in values.parameters.items() if name != without}
+        parsed = mi.parser.parse_file(config, str(file), **given)
+        put_materials(parsed, values.materials)
+        return parsed
+
+    changed = [
+        name
+        for name, value in values.parameters.items()
+        if (default := defaults.get(name)) is not None and not _same(str(value), default)
+    ]
+    if values.materials and changed:
+        plain = {name: state(name) for name in changed}
+        check_parameters_act(state(), plain, values.parameters, values.materials)
+
+
+def _same(value: str, default: str) -> bool:
+    """Return whether two values of a parameter are equal, as texts or as numbers."""
+    numbers = numbers_in(value)
+    return value == default or (numbers is not None and numbers == numbers_in(default))
 
 
 def _instantiated(
@@ -143,8 +182,10 @@ def _instantiated(
     values: SceneValues,
     box_filter: bool,
     bands: SensorBands | None,
-) -> Any:
+) -> tuple[Any, list[Edit]]:
     """Parse a scene, insert meshes, materials and filters, and create Mitsuba's objects.
+
+    Returns the scene, and the changes of its surfaces.
 
     known : files that the scene may include.
     """
@@ -153,13 +194,12 @@ def _instantiated(
     from .additions import (
         fit_meshes,
         put_box_filters,
-        put_materials,
-        put_surface_parameters,
         remove_dark_lights,
     )
     from .bands import put_bands
     from .clamping import put_clamp
     from .nodes import check_nodes
+    from .surfaces import put_materials, put_surface_parameters
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -178,8 +218,8 @@ def _instantiated(
             _check_films(state)
             _note_files(state)
             fit_meshes(state, Path(folder))
-            put_materials(state, values.materials)
-            put_surface_parameters(state, values.surface)
+            edits = put_materials(state, values.materials)
+            edits += put_surface_parameters(state, values.surface)
             mi.parser.transform_all(config, state)
             check_nodes(state)
             remove_dark_lights(state)
@@ -189,7 +229,7 @@ def _instantiated(
                 put_box_filters(state)
             if bands is not None:
                 put_bands(state, bands)
-            return mi.parser.instantiate(config, state)
+            return mi.parser.instantiate(config, state), edits
     finally:
         mi.set_file_resolver(before)
 

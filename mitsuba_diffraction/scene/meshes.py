@@ -31,6 +31,15 @@ class MeshArrays(NamedTuple):
     faces: Ints
 
 
+class SmoothMesh(NamedTuple):
+    """Arrays of a triangle mesh that has normals; see `MeshArrays`."""
+
+    positions: Floats
+    normals: Floats
+    uv: Floats | None
+    faces: Ints
+
+
 def mesh_arrays(mesh: Any) -> MeshArrays:
     """Read the arrays of a `mi.Mesh`, with one row for each vertex or face.
 

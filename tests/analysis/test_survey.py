@@ -112,8 +112,7 @@ def test_a_survey_and_a_spectrum_of_a_scan_share_its_table(run, scans, tmp_path,
         "--step",
         200,
         "--wavelength-range",
-        400,
-        700,
+        "400:700",
         *how,
     )
     assert ran.code == 0, ran.err

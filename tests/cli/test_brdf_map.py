@@ -55,7 +55,7 @@ def test_a_png_comes_alone(run, heights, here):
 def test_options_reach_the_map(run, heights):
     ran = run(
         "brdf-map", heights, *QUICK, "-o", "a.exr", "--theta", "30", "--phi", "90", "--samples",
-        "2", "--cosine", "--spectral", "--illuminant", "E", "--wavelength-range", "400", "700",
+        "2", "--cosine", "--spectral", "--illuminant", "E", "--wavelength-range", "400:700",
         "--step", "100", "--exposure", "1.5", "--height-scale", "0.5", "--orientation", "90",
         "--material", "none",
     )  # fmt: skip
@@ -123,8 +123,8 @@ def test_materials_reflect_less(run, heights):
         (["--theta", "90"], "theta=90 must be at least 0 and below 90"),
         (["--phi", "1e9"], "phi=1e+09 must be from -360 to 360"),
         (["--step", "500"], "step=500 nm does not fit"),
-        (["--wavelength-range", "700", "400"], "700 to 400 nm"),
-        (["--wavelength-range", "300", "400"], "table's shortest wavelength, 360 nm"),
+        (["--wavelength-range", "700:400"], "700 to 400 nm"),
+        (["--wavelength-range", "300:400"], "table's shortest wavelength, 360 nm"),
         (["--resolution", "99999"], "resolution=99999 must be"),
         (["--samples", "0"], "samples=0 must be"),
         (["--coherence-width", "-1"], "coherence_width='-1'"),

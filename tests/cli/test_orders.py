@@ -47,7 +47,7 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
     lines = (tmp_path / "grating-spectrum.csv").read_text().split()
     first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
     assert 420 <= first < last <= 680
-    refused = run("spectrum", "grating.nc", "--wavelength-range", 300, 400)
+    refused = run("spectrum", "grating.nc", "--wavelength-range", "300:400")
     assert "420 to 680 nm" in refused.err
 
 
@@ -68,7 +68,7 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
 
 def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540,560")
+    grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540:560")
     settings = ("--tolerance", 0.2, "--resolution", 4, "-o", "block.nc")
     ran = run("solve", "lamellar", *grating, "--block", *settings)
     assert ran.code == 0, ran.err
@@ -103,7 +103,7 @@ def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkey
 def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("flat.npy", np.zeros((4, 4)))
-    flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500,500", "--resolution", 4)
+    flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500:500", "--resolution", 4)
     solved = run("solve", "flat.npy", *flags, "-o", "flat.nc")
     assert "1 orders" in solved.out
     assert run("solve", "flat.npy", "--crossed").err.count("--period") > 0

@@ -32,7 +32,7 @@ def recipe(heights):
 def test_options_reach_the_table(run, heights, here):
     ran = run(
         "precompute", heights, "-o", "out.exr", *QUICK, "--tolerance", "1e-4",
-        "--wavelength-range", "400", "700", "--coherence", "patch", "--height-scale-max", "2",
+        "--wavelength-range", "400:700", "--coherence", "patch", "--height-scale-max", "2",
     )  # fmt: skip
     assert ran.code == 0
     table = DiffractionTable.load("out.exr")
@@ -184,7 +184,7 @@ def test_unusable_options_are_usage_errors(run, heights, here, arguments):
         (["--tolerance", "nan"], "tolerance"),
         (["--coherence-width", "0"], "coherence_width"),
         (["--coherence-width", "inf"], "coherence_width"),
-        (["--wavelength-range", "700", "400"], "wavelength"),
+        (["--wavelength-range", "700:400"], "wavelength"),
         (["--basis", "taylor", "--tolerance", "1e-12"], "tolerance"),
         (["--channel", "Height"], "channel"),
     ],
@@ -322,7 +322,7 @@ def test_a_wide_scan_s_table_says_how_sure_its_mean_is(run, tmp_path, monkeypatc
     np.save("wide.npy", 0.03 * np.sin(2 * np.pi * x / 1.6) + 0 * x[:, None])
     ran = run(
         "precompute", "wide.npy", "--pixel-size", 0.1, "--windows", 5,
-        "--tolerance", 0.05, "--wavelength-range", 500, 600,
+        "--tolerance", 0.05, "--wavelength-range", "500:600",
     )  # fmt: skip
     assert ran.code == 0, ran
     assert "mean of 7 windows of 5 x 20 µm; its standard error is" in ran.out

@@ -32,7 +32,7 @@ def test_render_maps_surveys_and_spectra_share_one_file(run, here, monkeypatch):
         ("survey", *scan, "-o", "survey"),
         # in light that Mitsuba renders; a wider range is another table
         ("spectrum", *scan, "-o", "s.csv", "--light", "45", "--detector", "0",
-         "--wavelength-range", "400", "700", "--step", "50"),
+         "--wavelength-range", "400:700", "--step", "50"),
     ):  # fmt: skip
         assert run(*command).code == 0
         assert len(list((here / "cache").glob("table-*"))) == 1, command[0]

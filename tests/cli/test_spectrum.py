@@ -12,7 +12,7 @@ from mitsuba_diffraction.analysis import angular_variables
 from mitsuba_diffraction.heights import gratings
 
 PIXEL = ["--pixel-size", str(1.6 / 64)]
-QUICK = ["--coherence-width", "6", "--wavelength-range", "400", "700", "--step", "50"]
+QUICK = ["--coherence-width", "6", "--wavelength-range", "400:700", "--step", "50"]
 
 
 @pytest.fixture(autouse=True)
@@ -68,7 +68,7 @@ def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
         (["--light", "90"], "90"),
         (["--acceptance", "0"], "acceptance"),
         (["--light-azimuth", "1000"], "1000"),
-        (["--material", "Al", "--wavelength-range", "800", "900"], "885.6 nm"),
+        (["--material", "Al", "--wavelength-range", "800:900"], "885.6 nm"),
         (["--material", "kerratin"], "keratin"),
         (["--pigment", "none.csv"], "none.csv"),
         (["--material", "gold", "--pigment", "0.2"], "gold"),
@@ -160,7 +160,7 @@ def test_samples_that_are_averaged_are_said(run, scans, here):
 
 
 def test_an_observer_has_catches_of_each_column_and_contrasts_of_each_pair(run, scans, here):
-    span = ["--coherence-width", "6", "--wavelength-range", "300", "700", "--step", "50"]
+    span = ["--coherence-width", "6", "--wavelength-range", "300:700", "--step", "50"]
     ran = run("spectrum", scans / "scan0.npy", *PIXEL, *span, "--observer", "avian_uv",
               "--detector", "20", "30", "40", "-o", "o.csv")  # fmt: skip
     assert ran.code == 0, ran.err

@@ -110,7 +110,7 @@ def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_p
     np.save("scan.npy", scan.heights)
     ran = run(
         "precompute", "scan.npy", "--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance",
-        0.02, "--wavelength-range", 500, 600, "--workers", 1,
+        0.02, "--wavelength-range", "500:600", "--workers", 1,
         "--json", "out.json",
     )  # fmt: skip
     assert ran.code == 0, ran

@@ -29,7 +29,7 @@ PROFILE = sinusoidal(0.5, 0.05)
 SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, resolution=48)
 WORDS = [
     "solve", "sinusoidal", "--period", "0.5", "--depth", "0.05", "--material", "none",
-    "--wavelength-range", "520,640", "--tolerance", "0.1", "--resolution", "48",
+    "--wavelength-range", "520:640", "--tolerance", "0.1", "--resolution", "48",
 ]  # fmt: skip
 
 

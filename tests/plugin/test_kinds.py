@@ -48,6 +48,14 @@ def made(kind: str) -> Any:
     return load(wavelength=600.0, **parameters)
 
 
+def named(kind: str) -> Any:
+    """The BSDF of a kind that reflects or transmits, or a mix, in the variant that is set."""
+    if kind == "blended patches":
+        one = md.bsdf_dict(PATCH, coherence_width=WIDTH, material="none", energy_conserving=False)
+        return mi.load_dict({"type": "diffraction_mix", "one": one, "two": one, "weight_one": 0.3})
+    return both(**SIDES[kind]) if kind in SIDES else made(kind)
+
+
 def checked(bsdf: Any, wo: Array, light: tuple[Array, Array]) -> Array:
     """Values, the same by `eval` and `eval_pdf`; the samples' weights are values over densities."""
     wi, lam = light
@@ -103,9 +111,23 @@ def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
         pytest.skip("scalar_rgb is not here")
     mi.set_variant("scalar_rgb")
     wi, wo, lam = lit(4)
-    if kind == "blended patches":
-        one = md.bsdf_dict(PATCH, coherence_width=WIDTH, material="none", energy_conserving=False)
-        bsdf = mi.load_dict({"type": "diffraction_mix", "one": one, "two": one, "weight_one": 0.3})
-    else:
-        bsdf = both(**SIDES[kind]) if kind in SIDES else made(kind)
-    checked(bsdf, wo, (wi, lam))
+    checked(named(kind), wo, (wi, lam))
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
+@pytest.mark.parametrize("kind", ["metal", "dielectric", "sheet", "blended patches"])
+def test_directions_and_samples_are_taken_as_lists(variant, kind):
+    if not runs(variant):
+        pytest.skip(f"{variant} is not here")
+    mi.set_variant(variant)
+    bsdf = named(kind)
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(0.0, 0.0, 1.0)
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0.0, 0.0, 1.0))
+    ctx, wo, pair = mi.BSDFContext(), [0.1, 0.0, 0.995], [0.3, 0.4]
+    for name in ("eval", "pdf", "eval_pdf"):
+        function = getattr(bsdf, name)
+        assert str(function(ctx, si, wo)) == str(function(ctx, si, mi.Vector3f(wo)))
+    drawn, weight = bsdf.sample(ctx, si, 0.5, pair)
+    again, expected = bsdf.sample(ctx, si, mi.Float(0.5), mi.Point2f(pair))
+    assert (str(drawn.wo), str(weight)) == (str(again.wo), str(expected))

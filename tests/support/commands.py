@@ -26,12 +26,21 @@ from tests.support.pages import blocks, spans, typed
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan", "--crossed"}
 # one wavelength stands for all, and few points do
 _PERFECT = ["--material", "none"]
-_NARROW = ["--wavelength-range", "590,610"]
+_NARROW = ["--wavelength-range", "590:610"]
 # as small as commands may be asked to be; the last option of a name counts
 SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
-    "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
+    "evaluate": [
+        "--step",
+        "50",
+        "--angle-step",
+        "2",
+        "--positions",
+        "2",
+        "--coherence-width",
+        "10",
+    ],
     "solve": ["--period", "0.6", "--resolution", "80", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-viewer": ["--method", "exact"],
@@ -110,7 +119,7 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if "--import" in rest or (command == "export-shader" and rest[0].endswith(".nc")):
         return []  # as small as its file
     if any(word.startswith("--theta") for word in rest) and command == "solve":
-        return ["--wavelength-range", "550,555"]
+        return ["--wavelength-range", "550:555"]
     small = SMALL.get(command, [])
     if "--block" in rest:  # by coupled waves
         return [*small, "--period", "0.3", "--resolution", "10"]

@@ -1,6 +1,6 @@
 """Page on the grating equation: every method on every patch, in pictures and numbers.
 
-    python -m docs.make.figures.evaluation -o docs/evaluation.md \\
+    python -m docs.make.figures.evaluation -o docs/thesis.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
 
 The picture goes to `images/evaluation.png` beside the page, the numbers between its markers.
@@ -193,7 +193,7 @@ def _short(value: float) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the picture and the tables."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.evaluation")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/evaluation.md"))
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/thesis.md"))
     add_measured(parser, "height field that is evaluated, too")
     parser.add_argument("--windows", type=int, default=64)
     parser.add_argument("--angle-step", type=float, default=0.05, help="degrees")
@@ -208,7 +208,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not args.small:
             patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
         wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
-        angles = np.linspace(-75.0, 30.0, round(105.0 / args.angle_step) + 1)
+        angles = np.linspace(-30.0, 75.0, round(105.0 / args.angle_step) + 1)
         results = []
         for patch, nominal in patches:
             print(f"evaluating {patch.name}", flush=True)

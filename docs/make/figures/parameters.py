@@ -26,7 +26,7 @@ _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 PLUGINS = {
     "diffraction": _FOLDER / "diffraction.py",
     "diffraction_dielectric": _FOLDER / "diffraction_dielectric.py",
-    "diffraction_orders": _FOLDER / "orders/diffraction_orders.py",
+    "diffraction_orders": _FOLDER.parent / "orders/bsdf/diffraction_orders.py",
 }
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
@@ -86,16 +86,18 @@ def page() -> str:
     sections = [
         "# Parameters of `diffraction`",
         "Made by `make parameters` of the texts at the top of the plugins' modules. ∂: "
-        "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths in nm. In an "
-        "image file the top row is the largest y. Surfaces that light goes through have the plugin "
+        "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths and "
+        "film_thickness in nm. In an image file the top row is the largest y. Surfaces that "
+        "transmit light have the plugin "
         "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric), gratings whose orders "
         "were solved the plugin [`diffraction_orders`](#parameters-of-diffraction_orders).",
         *_parts(reflecting),
-        "[theory.md](theory.md) has all of the model, symbol by symbol.",
+        "[theory.md](theory.md) has the equations.",
     ]
     for plugin, text in zip(list(PLUGINS)[1:], others, strict=True):
         introduction = _GROUP.split(text)[0].partition("\n\n")[2]
-        sections += [f"# Parameters of `{plugin}`", _prose(introduction), *_parts(text)]
+        *parts, _ = _parts(text)  # the example in Python has the same names
+        sections += [f"# Parameters of `{plugin}`", _prose(introduction), *parts]
     return "\n\n".join(sections) + "\n"
 
 
@@ -112,12 +114,13 @@ def _parts(text: str) -> Iterator[str]:
     yield f"```python\n{python}\n```"
 
 
-_HEADER = ("parameter", "type", "default", "meaning")
+_HEADER = ("parameter", "type; default", "meaning")
 
 
 def _row(entry: Parameter) -> tuple[str, ...]:
     names = ", ".join(name[1:-1] if name.startswith("(") else f"`{name}`" for name in entry.names)
-    cells = (names, entry.type + (" ∂" if entry.differentiable else ""), entry.default, entry.text)
+    kind = entry.type + (" ∂" if entry.differentiable else "")
+    cells = (names, f"{kind}; {entry.default}" if entry.default else kind, entry.text)
     return tuple(cell.replace("|", r"\|") for cell in cells)
 
 

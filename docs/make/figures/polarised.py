@@ -24,7 +24,7 @@ from .pages import exit_code, write_jpeg
 #: The command of the page.
 COMMAND = (
     "solve", "blazed", "--period", "0.8333", "--depth", "0.25", "--tolerance", "0.02",
-    "--wavelength-range", "400,700",
+    "--wavelength-range", "400:700",
 )  # fmt: skip
 _THETA = 30.0
 _NAME = "polarised"

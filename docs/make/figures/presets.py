@@ -1,4 +1,4 @@
-"""Balls of all named looks: docs/presets.md.
+"""Balls of all named looks: docs/gallery.md.
 
 python -m docs.make.figures.presets -o docs
 """
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory() as folder:
             picture = draw(Path(folder), args.samples)
             write_jpeg(picture, args.output / PICTURE, most=_MOST)
-        pages.update(args.output / "presets.md", {"presets": table()})
+        pages.update(args.output / "gallery.md", {"presets": table()})
 
     return exit_code("presets", work)
 

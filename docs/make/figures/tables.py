@@ -1,4 +1,4 @@
-"""Tables of docs/benchmarks.md, accuracy.md, plan.md and energy.md, from measurements by commands.
+"""Tables of docs/performance.md, accuracy.md and energy.md, from measurements by commands.
 
 python -m docs.make.bench --json out/bench.json
 python -m docs.make.figures.tables speed out/bench.json
@@ -21,7 +21,7 @@ from typing import Any
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from . import pages
+from . import long_tables, pages
 from .pages import exit_code, from_json
 
 
@@ -232,12 +232,16 @@ class Part:
 
 
 PARTS = {
-    "speed": Part(speed, ("docs/benchmarks.md",), "docs.make.bench --json", "run make bench"),
+    "speed": Part(speed, ("docs/performance.md",), "docs.make.bench --json", "run make bench"),
     "tradeoff": Part(tradeoff, ("docs/accuracy.md",), "tradeoff", "run make tradeoff",
                      ("tradeoff.png", "depth.png")),
-    "plan": Part(plan, ("docs/benchmarks.md", "docs/plan.md"), "plan --json", "run make plan"),
+    "plan": Part(plan, ("docs/performance.md",), "plan --json", "run make plan"),
     "energy": Part(energy, ("docs/energy.md",), "info --energy --json", "run make energy"),
 }  # fmt: skip
+
+
+# Parts whose tables are files beside the page.
+_LONG = ("tradeoff", "energy")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -264,6 +268,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 texts[name] = f"{texts[name]}\n{_rows_of(text)}" if name in texts else text
         for page in args.output or map(Path, part.pages):
             pages.update_present(page, texts)
+            if args.part in _LONG:
+                long_tables.write_page(Path(page), Path(page).read_text(encoding="utf-8"))
         for name in part.pictures:
             with atomic_path(args.images / name) as temporary:
                 shutil.copyfile(args.measured[0] / name, temporary)

@@ -1,4 +1,4 @@
-"""The methods of the thesis: the table of docs/methods.md, and the page of sweeps.
+"""The methods of the thesis: the table of docs/thesis.md, and the page of sweeps.
 
     python -m docs.make.figures.thesis methods \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
@@ -152,12 +152,12 @@ def write_methods(args: argparse.Namespace, scale: HeightField | None) -> None:
         grating, scale, resolution=args.resolution or 128,
         coherence_width=8.0 if args.small else 65.0,
     )  # fmt: skip
-    pages.update(args.output or Path("docs/methods.md"), {"methods": table(measured)})
+    pages.update(args.output or Path("docs/thesis.md"), {"methods": table(measured)})
 
 
 def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
     """Make all sheets and tables."""
-    page = args.output or Path("docs/sweeps.md")
+    page = args.output or Path("docs/thesis.md")
     small = blazed(2.0, 0.2, periods=6, rows=8)
     patch = patch or (small if args.small else elaphe_like())
     parts = {}

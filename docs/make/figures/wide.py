@@ -30,7 +30,7 @@ from .pages import exit_code
 
 EXTENT, MADE = 328.0, 2048  # µm and points a side of the look-alike
 #: Coherence windows of 40 µm: the whole scan is eight of them wide, which tables just read.
-SETTINGS = ("--coherence-width", "40", "--tolerance", "5e-3", "--wavelength-range", "400", "700")
+SETTINGS = ("--coherence-width", "40", "--tolerance", "5e-3", "--wavelength-range", "400:700")
 WAVELENGTH = 0.55  # µm
 DIRECTIONS = 97  # a side
 

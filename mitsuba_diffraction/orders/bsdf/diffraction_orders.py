@@ -10,16 +10,16 @@ table : string
 data : OrderTable
     Instead: a table, in dictionaries only, by `md.bsdf_dict`.
 coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm, over which light is coherent, at least 2 periods (the
-    longer ones). It sets the width of the orders' lobes. `auto` is 65 (sunlight).
+    Width over which light is coherent, µm, at least 2 of the longer periods; sets the width of the
+    lobes. `auto`: 65 (sunlight).
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the direction in which the profile repeats, as of
     `diffraction`.
 wavelength : float [550]
     Wavelength of mono variants, nm.
 (nested) : BSDF ∂
-    BSDF beneath, which receives the light that is in no order, by T(ωi) T(ωo) with T = 1 − Σ η_m:
-    for a dielectric grating over pigment, for example. A metal absorbs that light: nest nothing.
+    Base BSDF beneath a dielectric grating, which receives the light in no order: T(ωi) T(ωo), T = 1
+    − Σ η_m. Not for metals.
 
 The model is a sum of lobes, one for each order m, of the efficiency η_m of the table:
 

@@ -17,10 +17,10 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import MeshArrays, mesh_arrays
+from ..meshes import SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
 from .mesh_indices import CODES, any_line_begins, check_mesh, ply_header
-from .trimesh import TriangleMesh
+from .trimesh import TriangleMesh, vertex_normals
 
 Floats = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ _CODES = {name: np.dtype(code).char for name, code in CODES.items()}
 _NORMAL, _CORNER = re.compile(rb"(?m)^vn .*$"), re.compile(rb"(?<= )(\d+)(/\d+)?/{1,2}\d+(?=\s|$)")
 
 
-def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
-    """Read a mesh file.
+def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
+    """Read a mesh file; where it has no normals, smooth ones are made by `vertex_normals`.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, PLY files of polygons, glTF and USD. Normals
     of an OBJ file are rebuilt, with a warning, if one has length 0.
@@ -51,10 +51,17 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         )
     readable_file(file)
     if _is_interchange(file):
-        return interchange_mesh(file)
-    if mi.variant() is None:
-        mi.set_variant("scalar_rgb")
-    return mesh_arrays(_load(file))
+        mesh = interchange_mesh(file)
+    else:
+        if mi.variant() is None:
+            mi.set_variant("scalar_rgb")
+        mesh = mesh_arrays(_load(file))
+        if not _states_normals(file):  # Mitsuba's have seams where texture coordinates have
+            mesh = mesh._replace(normals=None)
+    positions, normals, uv, faces = mesh
+    if normals is None:
+        normals = vertex_normals(positions, faces)
+    return SmoothMesh(positions, normals, uv, faces)
 
 
 def _is_interchange(file: Path) -> bool:
@@ -62,10 +69,15 @@ def _is_interchange(file: Path) -> bool:
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
-    """Whether the file of a mesh holds vertex normals; otherwise Mitsuba makes smooth ones."""
+    """Whether the file of a mesh holds vertex normals; otherwise `load_mesh` makes smooth ones."""
     file = Path(path)
     if _is_interchange(file):
         return interchange_mesh(file).normals is not None
+    return _states_normals(file)
+
+
+def _states_normals(file: Path) -> bool:
+    """Whether a file that Mitsuba reads holds vertex normals."""
     if file.suffix.lower() == ".ply":
         header = ply_header(readable_file(file))
         vertex = [e for e in header.elements if e.name == "vertex"] if header else []

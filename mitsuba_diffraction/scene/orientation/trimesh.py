@@ -60,10 +60,23 @@ def across(corners: Floats) -> Floats:
 
 
 def vertex_normals(positions: Floats, faces: Ints) -> Floats:
-    """Unit normals (n, 3): the mean over a vertex's triangles, weighted by their areas."""
-    total = np.zeros_like(positions)
-    np.add.at(total, faces, across(positions[faces])[:, None])
-    return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
+    """Return smooth unit normals (n, 3): the mean over the triangles at a vertex's place.
+
+    Triangles count by their angles there (Thürmer and Wüthrich 1998, *Computing vertex normals from
+    polygonal facets*), so that it does not matter how a polygon is cut. Vertices at one place, as
+    along seams of the texture, have one normal.
+    """
+    places, welded = np.unique(positions, axis=0, return_inverse=True)
+    corners = positions[faces]
+    total = np.zeros_like(places)
+    with np.errstate(invalid="ignore", over="ignore"):  # readers refuse what is not finite
+        front = unit(across(corners))
+        for n in range(3):
+            one, other = (unit(corners[:, (n + k) % 3] - corners[:, n]) for k in (1, 2))
+            angle = np.arccos(np.clip((one * other).sum(axis=1, keepdims=True), -1.0, 1.0))
+            np.add.at(total, welded.reshape(-1)[faces[:, n]], angle * front)
+    normals = np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
+    return np.asarray(normals[welded.reshape(-1)])
 
 
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:

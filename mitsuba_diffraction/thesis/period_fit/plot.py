@@ -69,7 +69,7 @@ def figure(
     upper, lower = result.subplots(2, 1, height_ratios=(4, 1), sharex=True)
     shown = draw(upper, response, ridge, period, order)
     result.colorbar(shown, ax=upper, label="angle-resolved scatter f·cos θₒ  [1/sr]")
-    upper.set_ylabel("viewing angle θₒ  [degrees, positive towards the light]")
+    upper.set_ylabel("viewing angle θₒ  [degrees, positive away from the light]")
     upper.set_title(
         f"{title}\nlight at θᵢ = {response.beam.theta:g}°; method {response.label}", fontsize=10
     )

@@ -1,7 +1,8 @@
 """Ridge of maxima of a response, and the period for which the grating equation fits it.
 
 The response is measured by a virtual goniometer: a monochromatic beam, and a detector that swings
-through the plane of incidence.
+through the plane of incidence. Viewing angles have the sign of `spectrum`'s detectors: the mirror
+direction is +θi, and orders m > 0 are on the light's side of it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ...analysis.maps.hemisphere import polar
 from ...analysis.maps.result import LightDirection
 from ...errors import DiffractionError
 from ...optics.geometry import wavenumber
@@ -55,13 +57,11 @@ class Beam(LightDirection):
         return math.sin(math.radians(self.theta))
 
     def views(self, angles: Array) -> Array:
-        """Return ωo (n, 3) of viewing angles in degrees, positive on the light's side."""
-        theta, phi = np.radians(angles), math.radians(self.phi)
-        sine = np.sin(theta)
-        return np.stack([sine * math.cos(phi), sine * math.sin(phi), np.cos(theta)], axis=-1)
+        """Return ωo (n, 3) of viewing angles in degrees, positive away from the light."""
+        return polar(-np.radians(angles), math.radians(self.phi))
 
     def grating_angles(self, wavelength: Array, period: float, order: int) -> Array:
-        """Return the viewing angles with sinθo = mλ/d − sinθi, degrees, or NaN without an order.
+        """Return the viewing angles with sinθo = sinθi − mλ/d, degrees, or NaN without an order.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class Beam(LightDirection):
         period : d, µm.
         order : m.
         """
-        sine = order * wavelength * 1e-3 / period - self.sine
+        sine = self.sine - order * wavelength * 1e-3 / period
         return np.degrees(np.arcsin(np.where(np.abs(sine) <= 1.0, sine, np.nan)))
 
 
@@ -147,8 +147,8 @@ class Ridge:
 
     @property
     def frequency(self) -> Array:
-        """Coordinate |u| = |sinθi + sinθo| of the maxima, (L,)."""
-        return np.abs(self.response.beam.sine + np.sin(np.radians(self.angles)))
+        """Coordinate |u| = |sinθi − sinθo| of the maxima, (L,)."""
+        return np.abs(self.response.beam.sine - np.sin(np.radians(self.angles)))
 
     def grating_angles(self, period: float) -> Array:
         """Return the angles of the grating equation for a period in µm, (L,), degrees."""
@@ -276,12 +276,12 @@ def _contrast(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
 
 
 def _frequencies(response: Response, order: int) -> Array:
-    """Return u = sinθi + sinθo (A,), positive on the side of an order."""
+    """Return u = sinθi − sinθo (A,), positive on the side of an order."""
     if order == 0:
         raise DiffractionError(
             "order=0 is the mirror direction at every wavelength; give 1, -1, 2, ..."
         )
-    u = response.beam.sine + np.sin(np.radians(response.angles))
+    u = response.beam.sine - np.sin(np.radians(response.angles))
     return np.asarray(np.sign(order) * u)
 
 

@@ -111,12 +111,12 @@ def _lattice(count: int) -> Array:
 def thesis_fit(
     table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
 ) -> Fit:
-    """Fit a period by the thesis' procedure, at viewing angles across the normal from the light.
+    """Fit a period by the thesis' procedure, at viewing angles across the normal, from 0.
 
     On the light's side, the response of the procedure grows towards the horizon. The response is
     C·S at κ = k, with the window on the patch's corner, of a table with coherence="patch".
     """
-    gain, across = Gain(), angles[angles <= 0.0]
+    gain, across = Gain(), angles[angles >= 0.0]
 
     def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
         """Return the relative reflectance C·S with the phase exp(ikh)."""

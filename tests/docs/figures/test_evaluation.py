@@ -15,8 +15,8 @@ DOCS = ROOT / "docs"
 
 
 def test_the_page_is_made_by_one_command(tmp_path, capsys):
-    page = tmp_path / "evaluation.md"
-    page.write_text((DOCS / "evaluation.md").read_text(encoding="utf-8"), encoding="utf-8")
+    page = tmp_path / "thesis.md"
+    page.write_text((DOCS / "thesis.md").read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "images").mkdir()
     code = evaluation.main(["-o", str(page), "--small", "--windows", "2", "--angle-step", "0.1"])
     assert code == 0, capsys.readouterr().err

@@ -11,6 +11,7 @@ import pytest
 import mitsuba_diffraction as md
 from docs.make.figures import parameters
 from mitsuba_diffraction.errors import DiffractionError
+from tests.support import ROOT
 
 
 def entries(plugin):
@@ -96,3 +97,15 @@ def test_what_is_marked_differentiable_is(some_variant, patch):
 def test_a_line_that_is_no_entry_is_refused(entry):
     with pytest.raises(DiffractionError, match="expected 'name : type"):
         parameters.groups(f"The surface\n-----------\n{entry}\n\nThe model is that.")
+
+
+@pytest.mark.parametrize("plugin", parameters.PLUGINS)
+def test_a_cell_has_at_most_25_words(plugin):
+    for name, entry in entries(plugin).items():
+        assert len(entry.text.split()) <= 25, name
+
+
+def test_the_page_is_what_the_docstrings_say():
+    text = (ROOT / "docs/parameters.md").read_text(encoding="utf-8")
+    assert text == parameters.page(), "make parameters"
+    assert len(text.split()) <= 2200

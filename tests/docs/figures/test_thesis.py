@@ -29,8 +29,8 @@ def test_the_table_of_methods_is_made_by_one_command(tmp_path, capsys, some_vari
 
 
 def test_the_page_of_sweeps_is_made_by_one_command(tmp_path, capsys):
-    page = tmp_path / "sweeps.md"
-    page.write_text((DOCS / "sweeps.md").read_text(encoding="utf-8"), encoding="utf-8")
+    page = tmp_path / "thesis.md"
+    page.write_text((DOCS / "thesis.md").read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "images").mkdir()
     assert thesis.main(["sweeps", "-o", str(page), "--small", "--resolution", "8"]) == 0, (
         capsys.readouterr()

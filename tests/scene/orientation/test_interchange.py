@@ -100,6 +100,90 @@ def test_without_coordinates_there_are_none(
     assert load_mesh(tmp_path / f"sheet{suffix}").uv is None
 
 
+def _edited_gltf(file: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    """Write a glTF file whose document is edited."""
+    write_gltf(file)
+    document = json.loads(file.read_text("utf-8"))
+    edit(document)
+    file.write_text(json.dumps(document), encoding="utf-8")
+
+
+def test_coordinates_are_kept_without_a_material(tmp_path: Path) -> None:
+    def edit(document: dict[str, Any]) -> None:
+        document.pop("materials", None)
+        document["meshes"][0]["primitives"][0].pop("material", None)
+
+    _edited_gltf(tmp_path / "bare.gltf", edit)
+    uv = load_mesh(tmp_path / "bare.gltf").uv
+    assert uv is not None
+    np.testing.assert_allclose(uv, np.stack([U, 1.0 - V], axis=1), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding"),
+    [("KHR_draco_mesh_compression", "Draco"), ("EXT_meshopt_compression", "meshopt")],
+)
+def test_compressed_meshes_are_refused_with_the_way_out(
+    tmp_path: Path, name: str, encoding: str
+) -> None:
+    _edited_gltf(tmp_path / "small.gltf", lambda d: d.update(extensionsRequired=[name]))
+    with pytest.raises(DiffractionError, match=f"compressed by {encoding}.*Compression off"):
+        load_mesh(tmp_path / "small.gltf")
+
+
+def test_integers_that_stand_for_fractions_are_refused(tmp_path: Path) -> None:
+    def edit(document: dict[str, Any]) -> None:
+        number = document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
+        document["accessors"][number]["normalized"] = True
+
+    _edited_gltf(tmp_path / "quantized.gltf", edit)
+    with pytest.raises(DiffractionError, match=r"TEXCOORD_0 .*without quantization"):
+        load_mesh(tmp_path / "quantized.gltf")
+
+
+#: A cube from −1 to 1, whose normals at the corners are (±1, ±1, ±1) / √3 by symmetry.
+CORNERS = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+
+
+def write_cube(file: Path) -> None:
+    """Write a cube of four-sided polygons without normals; OBJ has a texture on each side."""
+    if file.suffix == ".usda":
+        listed = ", ".join(f"({x}, {y}, {z})" for x, y, z in CORNERS)
+        text = (
+            '#usda 1.0\n(\n    upAxis = "Y"\n)\ndef Mesh "cube"\n{\n'
+            f"    int[] faceVertexCounts = {[4] * 6}\n"
+            f"    int[] faceVertexIndices = {[corner for side in SIDES for corner in side]}\n"
+            f"    point3f[] points = [{listed}]\n}}\n"
+        )
+    elif file.suffix == ".ply":
+        head = ["ply", "format ascii 1.0", "element vertex 8"]
+        head += [f"property float {axis}" for axis in "xyz"]
+        head += ["element face 6", "property list uchar int vertex_indices", "end_header"]
+        rows = [*CORNERS, *([4, *side] for side in SIDES)]
+        text = "\n".join([*head, *(" ".join(map(str, row)) for row in rows), ""])
+    else:
+        lines = [f"v {x} {y} {z}" for x, y, z in CORNERS]
+        lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
+        lines += ["f " + " ".join(f"{c + 1}/{n + 1}" for n, c in enumerate(s)) for s in SIDES]
+        text = "\n".join([*lines, ""])
+    file.write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".ply", ".obj"])
+def test_meshes_without_normals_get_smooth_ones_over_all_seams(
+    tmp_path: Path, suffix: str, some_variant: str
+) -> None:
+    if suffix == ".usda":
+        pytest.importorskip("pxr.Usd")
+    file = tmp_path / f"cube{suffix}"
+    write_cube(file)
+    mesh = load_mesh(file)
+    assert not has_own_normals(file)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals, mesh.positions / np.sqrt(3.0), atol=1e-6)
+
+
 def test_the_axis_of_a_stage_is_its_own(tmp_path: Path) -> None:
     write_usd(tmp_path / "sheet.usda")
     mesh = load_mesh(tmp_path / "sheet.usda")

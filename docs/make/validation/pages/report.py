@@ -8,6 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from docs.make.figures.long_tables import write_page
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
@@ -98,10 +99,16 @@ def write_report(
             picture, draw = _PICTURES[name]
             _write_figure(draw(measured), folder / "images" / f"validation_{picture}.png")
         text = PAGES[name](measured)
-        with atomic_path(paths[-1]) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
+        # the front page's tables say the most
+        write = _write_text if name == "validation" else write_page
+        write(paths[-1], text + "\n")
     tell(len(names), len(names), "done")
     return paths
+
+
+def _write_text(path: Path, text: str) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _write_figure(figure: Figure, path: Path) -> None:

@@ -118,3 +118,63 @@ def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surf
     )  # a metal beneath would look like chrome
     assert ("SmoothDiffuse" in text) == (name == "pigment")
     assert "material = Al" not in text
+
+
+def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
+    spare = EXPORTED.replace("<shape", '<bsdf type="diffuse" id="spare"/><shape', 1)
+    (surface / "scene.xml").write_text(spare)
+    with pytest.raises(DiffractionError, match=r"no shape uses .*'spare'; .*mat-Skin, mat-Ground"):
+        bsdfs(surface, {"spare": SETTINGS})
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_surface_that_another_one_hides_is_refused(surface, order):
+    both = {"mat-Skin": SETTINGS, "elm__0": SETTINGS}
+    with pytest.raises(DiffractionError, match=r"no shape is left .*'mat-Skin', since elm__0"):
+        bsdfs(surface, dict([*both.items()][::order]))
+
+
+def test_two_ids_of_one_bsdf_get_one_surface(surface):
+    alias = EXPORTED.replace("<shape", '<alias id="mat-Skin" as="hide"/><shape', 1)
+    (surface / "scene.xml").write_text(alias)
+    assert "Diffraction[" in bsdfs(surface, {"hide": SETTINGS})["elm__0"]
+    with pytest.raises(DiffractionError, match="both ids are of one BSDF"):
+        bsdfs(surface, {"hide": SETTINGS, "mat-Skin": SETTINGS})
+
+
+@pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
+def test_the_opacity_around_a_replaced_bsdf_is_kept(surface, name):
+    masked = EXPORTED.replace('type="twosided" id="mat-Skin"', 'type="mask" id="mat-Skin"', 1)
+    (surface / "scene.xml").write_text(masked)
+    text = bsdfs(surface, {name: SETTINGS})["elm__0"]
+    assert text.startswith("Mask[")
+    assert "Diffraction[" in text
+    assert "Principled" in text
+
+
+def test_each_edit_is_said_with_its_shapes_and_index(surface):
+    lines: list[str] = []
+    values = {
+        "material:mat-Skin": f"{surface / 'grating.npy'}{SETTINGS},int_ior=1.6",
+        "height_scale": "0.5",
+    }
+    load_scene(surface / "scene.xml", values, say=lines.append)
+    assert lines[0].startswith("mat-Skin: grating.npy")
+    assert lines[1].startswith("height_scale=0.5")
+    assert all("on 1 shape (elm__0)" in line and "n = 1.6" in line for line in lines)
+
+
+def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
+    xml = f"""<scene version="3.0.0"><default name="up" value="0"/><default name="r" value="1"/>
+    <bsdf type="diffraction" id="skin">
+        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
+        <boolean name="energy_conserving" value="false"/><float name="lateral_scale" value="$r"/>
+    </bsdf><shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>
+    <shape type="disk"><ref id="skin"/></shape></scene>"""
+    (surface / "scene.xml").write_text(xml.replace('<default name="up" value="0"/>', ""))
+    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "r": "2"})  # of the sphere
+    (surface / "scene.xml").write_text(xml.replace('scale" value="$r"', 'scale" value="$up"'))
+    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "0.0"})  # the default
+    with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
+        load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "2"})

@@ -1,0 +1,161 @@
+"""Make docs/commands.md of the parser of the commands, and docs/python.md of the public names.
+
+python -m docs.make.figures.interfaces -o docs
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli.options import HEIGHTS
+
+from . import pages
+
+#: Commands by what they are for, in the order of the page.
+GROUPS = {
+    "Measure a surface": ("info", "spectrum", "brdf-map", "survey", "evaluate"),
+    "Render": ("render", "tonemap", "presets", "tangents", "hologram", "plan"),
+    "Tables and solved orders": ("precompute", "solve", "orders"),
+    "Other programs, real time": (
+        "view", "export-viewer", "export-shader", "export-osl", "export-bsdf",
+    ),
+    "Accuracy": ("tradeoff", "compare", "sweep"),
+}  # fmt: skip
+
+
+def commands_page() -> str:
+    """Return the page of all commands."""
+    parsers = subparsers()
+    grouped = [name for names in GROUPS.values() for name in names]
+    left = [name for name in parsers if name not in grouped]
+    sections = [
+        "# Commands",
+        "`--help` behind the name of a command lists all options with defaults. Made by "
+        "`python -m docs.make.figures.interfaces -o docs`.",
+    ]
+    for title, names in {**GROUPS, **({"More": tuple(left)} if left else {})}.items():
+        rows = [
+            (f"`{name}`", _arguments(parsers[name][0]), _sentence(parsers[name][1]))
+            for name in names
+            if name in parsers
+        ]
+        sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
+    rows = [
+        (f"`--{name.replace('_', '-')} {value}`", _cell(text))
+        for name, (value, text) in HEIGHTS.items()
+    ]
+    sections += [
+        "## Options for reading heights",
+        "Commands that read height maps have these options. Recipes and scenes have parameters of "
+        "the same names.",
+        pages.table(("option", "meaning"), rows),
+        "## Ranges, files and exit codes",
+        "A range is `FIRST:LAST` or `FIRST:LAST:STEP`; commas separate values. Write `=` before a "
+        "negative value: `--angles=-60:75`. `--json FILE` writes the printed figures. Exit codes: "
+        "0 done, 1 failed, 2 wrong usage, 130 interrupted. No command replaces a file that it "
+        "reads, and none leaves a half-written file.",
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def subparsers() -> dict[str, tuple[argparse.ArgumentParser, str]]:
+    """Return the parser and the help of each command, by name."""
+    (action,) = (
+        a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)
+    )  # fmt: skip
+    helps = {c.dest: c.help or "" for c in action._get_subactions()}  # noqa: SLF001
+    return {name: (parser, helps[name]) for name, parser in action.choices.items()}
+
+
+def _arguments(parser: argparse.ArgumentParser) -> str:
+    """Return the arguments without an option, and the output's option."""
+    shown = []
+    for action in parser._actions:
+        if not action.option_strings:
+            name = str(action.metavar or action.dest).upper()
+            many = {"+": f"{name} …", "*": f"[{name} …]", "?": f"[{name}]"}
+            shown.append(many.get(str(action.nargs), name))
+        elif "-o" in action.option_strings:
+            shown.append(f"-o {action.metavar or ''}".strip())
+    return f"`{' '.join(shown)}`" if shown else ""
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|").replace("%%", "%")
+
+
+def python_page() -> str:
+    """Return the page of the public names of the package."""
+    entries = _contents(md.__doc__ or "")
+    rows = [(f"`md.{name}`", entries[name], _members(getattr(md, name))) for name in entries]
+    return "\n\n".join([
+        "# In Python",
+        "`import mitsuba_diffraction as md` imports heavy modules at their first use and registers "
+        "the plugins once Mitsuba is imported. `make site` builds a reference with all arguments. "
+        "Made by `python -m docs.make.figures.interfaces -o docs`.",
+        pages.table(("name", "what it is", "names in it"), rows),
+        "Lengths are in µm, wavelengths in nm, angles in degrees; directions are unit vectors that "
+        "point away from the surface. Every bad input is an `md.DiffractionError` of one line; "
+        "doubts are an `md.DiffractionWarning`.",
+    ]) + "\n"  # fmt: skip
+
+
+def _contents(docstring: str) -> dict[str, str]:
+    """Return the entries of a table of contents, by name."""
+    lines = docstring.split("--------\n")[1].split("\n\n")[0]
+    found = re.findall(r"^(\w+) {2,}(.*(?:\n {4,}.*)*)", lines, re.M)
+    return {name: " ".join(text.split()) for name, text in found}
+
+
+def _members(value: object) -> str:
+    """Return the functions and classes of a module; of other values nothing."""
+    if not isinstance(value, ModuleType):
+        return ""
+    names = [n for n in getattr(value, "__all__", []) if not n.startswith("_")]
+    shown = [f"`{name}`" for name in names if not isinstance(getattr(value, name), ModuleType)]
+    more = f" and {len(shown) - _MOST} more" if len(shown) > _MOST else ""
+    return ", ".join(shown[:_MOST]) + more
+
+
+# Names of a module that the page lists.
+_MOST = 10
+
+#: Pages by the name of their file.
+PAGES = {"commands.md": commands_page, "python.md": python_page}
+
+
+def write_pages(folder: Path) -> Iterator[Path]:
+    """Write the pages and yield their paths."""
+    for name, made in PAGES.items():
+        with atomic_path(folder / name) as temporary:
+            temporary.write_text(made(), encoding="utf-8")
+        yield folder / name
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write the pages, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.interfaces")
+    parser.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
+    folder: Path = parser.parse_args(argv).output
+
+    def work() -> None:
+        for path in write_pages(folder):
+            print(f"wrote {path}")
+
+    return pages.exit_code("interfaces", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""Long tables of pages as CSV files beside them, with a link in their place.
+
+python -m docs.make.figures.long_tables docs/validation/gratings.md     # of a page as it is
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import re
+import sys
+from pathlib import Path
+
+from mitsuba_diffraction.atomic import atomic_path
+
+from .pages import exit_code
+
+#: Rows from which a table is a file.
+LONG = 8
+_TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
+# A heading, or the name of a generated part.
+_TITLE = re.compile(r"^(?:#+ |<!-- begin )(.*?)(?: -->)?$", re.M)
+
+
+def write_page(path: Path, text: str) -> list[Path]:
+    """Write a page whose tables of `LONG` rows and more are CSV files beside it.
+
+    Files `STEM-*.csv` that the page does not link are deleted.
+
+    Returns
+    -------
+    Paths of the page and of the files.
+    """
+    shown, tables = separated(text, path.stem)
+    for old in path.parent.glob(f"{path.stem}-*.csv"):
+        if f"]({old.name})" not in shown:
+            old.unlink()
+    for name, content in (*tables.items(), (path.name, shown)):
+        with atomic_path(path.parent / name) as temporary:
+            temporary.write_text(content, encoding="utf-8")
+    return [path, *(path.parent / name for name in tables)]
+
+
+def separated(text: str, stem: str) -> tuple[str, dict[str, str]]:
+    """Return a page with links in place of its long tables, and the CSV files by name.
+
+    stem : beginning of the files' names; the heading or generated part of a table follows.
+    """
+    tables: dict[str, str] = {}
+
+    def replace(match: re.Match[str]) -> str:
+        lines = match[0].strip().splitlines()
+        rows = [_cells(line) for n, line in enumerate(lines) if n != 1]
+        if len(rows) <= LONG:
+            return match[0]
+        titles = _TITLE.findall(text[: match.start()]) or [stem]
+        words = re.sub(r"[^a-z0-9]+", "-", titles[-1].lower()).strip("-")
+        name, number = f"{stem}-{words}.csv", 1
+        while name in tables:
+            number += 1
+            name = f"{stem}-{words}-{number}.csv"
+        stream = io.StringIO()
+        csv.writer(stream, lineterminator="\n").writerows(rows)
+        tables[name] = stream.getvalue()
+        columns = ", ".join(rows[0])
+        return f"[Table of {len(rows) - 1} rows]({name}): {columns}.\n"
+
+    return _TABLE.sub(replace, text), tables
+
+
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line of a table, without Markdown's marks."""
+    cells = re.split(r"(?<!\\)\|", line.strip().strip("|"))
+    return [re.sub(r"[`*]", "", cell).replace("\\|", "|").strip() for cell in cells]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Convert pages, and return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m docs.make.figures.long_tables", description=__doc__.split("\n")[0]
+    )
+    parser.add_argument("pages", metavar="PAGE", type=Path, nargs="+")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        for page in args.pages:
+            if separated(text := page.read_text(encoding="utf-8"), page.stem)[1]:
+                for path in write_page(page, text):
+                    print(f"wrote {path}")
+
+    return exit_code("long_tables", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

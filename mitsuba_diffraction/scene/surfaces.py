@@ -1,0 +1,372 @@
+"""Surfaces and parameters of surfaces put into a parsed scene: each acts on shapes, or is refused.
+
+A surface that the command line puts on an id replaces the BSDF of that id, or the BSDF of the shape
+of that id. `twosided`, `mask`, `bumpmap` and `normalmap` around it are kept.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+from ..files import FileKind, kind_of
+from ..optics.materials import lets_light_through
+from ..orders.file import load_orders
+from ..plugin.description import Surface
+from ..plugin.dictionary import ORDERS, PLUGINS
+from ..plugin.parameters import NAMES
+from ..plugin.presets import MATERIALS, find_preset
+from ..plugin.presets import PLUGIN as PRESET_PLUGIN
+from .elements import own_id, surfaces_within
+
+#: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
+MATERIAL = "material:"
+#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+PRESET = "preset:"
+
+_COMMA = re.compile(r",(?=\s*\w+=)")
+REFLECTING, TRANSMITTING = PLUGINS
+# With one of these the surface is opaque, and nothing lies beneath it.
+_CONDUCTORS = ("eta", "k")
+# BSDFs around another one that stay around the surface
+_WRAPPERS = ("mask", "bumpmap", "normalmap")
+_NAMED = 4  # shapes that a line lists
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change of surfaces of a scene.
+
+    Attributes
+    ----------
+    what : what was put where, for people.
+    shapes : ids of the shapes that it changes.
+    """
+
+    what: str
+    shapes: tuple[str, ...]
+
+    def line(self, scene: Any) -> str:
+        """Return the change in one line: its shapes, and the material of their surfaces.
+
+        scene : `mi.Scene`, loaded.
+        """
+        names = [own_id(name) or "one without id" for name in self.shapes]
+        listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+        count = f"{len(names)} shape{'s' if len(names) > 1 else ''}"
+        found = [s for shape in scene.shapes() if shape.id() in self.shapes
+                 for s in surfaces_within(shape.bsdf())]  # fmt: skip
+        materials = dict.fromkeys(_material(surface) for surface in found)
+        return f"{self.what} on {count} ({listed})" + "".join(f"; {m}" for m in materials if m)
+
+
+def _material(surface: Surface) -> str:
+    """Return the material of a surface and its index in the middle of the visible range."""
+    if surface.index is None:
+        return "" if surface.solved else surface.text
+    n = complex(np.ravel(surface.index(np.array([550.0])))[0])
+    return f"{surface.text}, n = {n.real:.4g}" + (f" + {n.imag:.4g}i" if n.imag else "")
+
+
+def put_materials(state: Any, materials: Mapping[str, str]) -> list[Edit]:
+    """Put surfaces on the BSDFs or shapes of these ids.
+
+    A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor,
+    a table of orders, or a dielectric that light goes through (`thin`) replaces it.
+
+    state : `mi.parser.ParserState`.
+    materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
+
+    Raises a DiffractionError if an id is unknown, with a list of the scene's; if two ids are of one
+    BSDF; or if no shape uses a BSDF.
+    """
+    numbers = {name: _node_of(state, name) for name in materials}
+    for name, number in numbers.items():
+        if twice := [other for other, n in numbers.items() if n == number and other != name]:
+            raise DiffractionError(
+                f"{MATERIAL}{name}, {MATERIAL}{twice[0]}: both ids are of one BSDF; keep one"
+            )
+        if not (state.nodes[number].type == mi.ObjectType.Shape or _shapes_with(state, number)):
+            raise DiffractionError(f"{MATERIAL}{name}: no shape uses the BSDF {name!r}; "
+                                   f"{_used_ids(state)}")  # fmt: skip
+    # BSDFs first: a shape takes over what lies beneath its own surface
+    for name, number in sorted(
+        numbers.items(), key=lambda pair: state.nodes[pair[1]].type == mi.ObjectType.Shape
+    ):
+        _put(state, number, materials[name])
+    edits = []
+    for name, number in numbers.items():
+        is_shape = state.nodes[number].type == mi.ObjectType.Shape
+        shapes = (name,) if is_shape else _shapes_with(state, number)
+        if not shapes:
+            others = ", ".join(other for other in numbers if other != name)
+            raise DiffractionError(
+                f"{MATERIAL}{name}: no shape is left that uses the BSDF {name!r}, since {others} "
+                "got surfaces of their own; leave one out"
+            )
+        file, *rest = _COMMA.split(materials[name], maxsplit=1)
+        label = file.removeprefix(PRESET) if file.startswith(PRESET) else Path(file).name
+        edits.append(Edit(f"{name}: {', '.join([label, *rest])}", shapes))
+    return edits
+
+
+def _used_ids(state: Any) -> str:
+    """Return a sentence on the BSDFs with an id that shapes use."""
+    used = [name for name, n in sorted(state.id_to_index.items(), key=lambda pair: pair[1])
+            if state.nodes[n].type == mi.ObjectType.BSDF and own_id(name)
+            and _shapes_with(state, n)]  # fmt: skip
+    return f"shapes use {', '.join(used)}" if used else "name the shape instead"
+
+
+def _shapes_with(state: Any, number: int) -> tuple[str, ...]:
+    """Return the ids of the shapes that use a BSDF, directly or within another one."""
+    return tuple(
+        node.props.id()
+        for node in state.nodes
+        if node.type == mi.ObjectType.Shape and number in _within(state, node)
+    )
+
+
+def _within(state: Any, node: Any) -> Iterator[int]:
+    """Yield the numbers of the BSDFs of a shape, those within them included."""
+    for target in targets_of(node, state.id_to_index).values():
+        if state.nodes[target].type == mi.ObjectType.BSDF:
+            yield target
+            yield from _within(state, state.nodes[target])
+
+
+def check_parameters_act(
+    edited: Any, plain: Mapping[str, Any], values: Mapping[str, Any], materials: Collection[str]
+) -> None:
+    """Refuse parameters of a scene that only a replaced BSDF reads.
+
+    edited : `mi.parser.ParserState` with all parameters, its surfaces put on ids.
+    plain : by parameter, the same with the default of that parameter.
+    values : of the parameters.
+    materials : ids that surfaces were put on.
+
+    Raises a DiffractionError that names the parameter.
+    """
+    expected = _effective(edited)
+    for name, state in plain.items():
+        if _effective(state) == expected:
+            raise DiffractionError(
+                f"{name}={values[name]} changes nothing: the scene uses it in a BSDF that the "
+                f"surface on {', '.join(materials)} replaces; give that surface the parameter "
+                f"instead, e.g. cd,{name}={values[name]}, or leave it out"
+            )
+
+
+def _effective(state: Any) -> list[str]:
+    """Return the properties of all nodes but those of BSDFs that no shape uses."""
+    hidden = (mi.ObjectType.BSDF, mi.ObjectType.Texture, mi.ObjectType.Scene)
+    waiting = [n for n, node in enumerate(state.nodes) if node.type not in hidden]
+    reached: dict[int, None] = {}
+    while waiting:
+        if (number := waiting.pop()) not in reached:
+            reached[number] = None
+            waiting += targets_of(state.nodes[number], state.id_to_index).values()
+    return [str(state.nodes[number].props) for number in sorted(reached)]
+
+
+def put_surface_parameters(state: Any, values: Mapping[str, Any]) -> list[Edit]:
+    """Set parameters of the BSDF on all diffracting surfaces of shapes that have them.
+
+    state : `mi.parser.ParserState`.
+
+    Raises a DiffractionError if no surface of a shape has one of them.
+    """
+    edits = []
+    for name, text in values.items():
+        value = _value(str(text))
+        shapes = {n: used for n, node in enumerate(state.nodes)
+                  if name in _parameters_of(node) and (used := _shapes_with(state, n))}  # fmt: skip
+        if not shapes:
+            raise DiffractionError(
+                f"{name}={text} is a parameter of a diffracting surface, and no shape of the scene "
+                "has one that takes it; put one on an id as a material or a preset"
+            )
+        for number in shapes:
+            props = state.nodes[number].props
+            for other in MATERIALS if name in MATERIALS else (name,):
+                if other in props:
+                    del props[other]
+            props[name] = value
+        changed = dict.fromkeys(shape for used in shapes.values() for shape in used)
+        edits.append(Edit(f"{name}={text}", tuple(changed)))
+    return edits
+
+
+def _parameters_of(node: Any) -> tuple[str, ...]:
+    """Return the names of a surface's parameters; none of other nodes."""
+    plugin = node.props.plugin_name() if node.type == mi.ObjectType.BSDF else ""
+    if plugin == PRESET_PLUGIN:
+        plugin = find_preset(str(node.props["preset"])).plugin
+    return NAMES.get(plugin, ())
+
+
+def _node_of(state: Any, name: str) -> int:
+    """Return the number of the BSDF or shape of this id."""
+    kinds = (mi.ObjectType.BSDF, mi.ObjectType.Shape)
+    known = {k: n for k, n in state.id_to_index.items() if state.nodes[n].type in kinds}
+    if name not in known:
+        listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
+        raise DiffractionError(
+            f"{MATERIAL}{name}: no BSDF or shape of the scene has this id; there are "
+            f"{listed or 'none: add id attributes to the scene'}"
+        )
+    return int(known[name])
+
+
+def _put(state: Any, number: int, text: str) -> None:
+    """Put a surface on a shape or in place of a BSDF."""
+    # what is read of a node is read before others are appended, which moves all
+    props = state.nodes[number].props
+    name = props.id()
+    if state.nodes[number].type == mi.ObjectType.Shape:
+        targets = _bsdfs(state, number)
+        beneath = [*targets.values()][-1] if targets else None
+        changed = copied(props, props.plugin_name(), leave=[*targets])
+        replaced = _with_surface(state, beneath, text, nested=False)
+        changed["bsdf"] = mi.Properties.ResolvedReference(_append(state, replaced))
+    else:
+        nested = any(
+            other.type == mi.ObjectType.BSDF and number in _bsdfs(state, n).values()
+            for n, other in enumerate(state.nodes)
+        )
+        before = _append(state, copied(props, props.plugin_name()))  # what may lie beneath
+        changed = _with_surface(state, before, text, nested)
+    changed.set_id(name)
+    state.nodes[number].props = changed
+
+
+def _with_surface(state: Any, number: int | None, text: str, nested: bool) -> Any:
+    """Return the properties of a BSDF with the surface in place of what lies in its wrappers.
+
+    number : of the BSDF, or None.
+    nested : whether it is part of another BSDF; otherwise the surface has both sides.
+    """
+    if number is not None:
+        props = state.nodes[number].props
+        name, inner = next(iter(_bsdfs(state, number).items()), ("", number))
+        two_sided = props.plugin_name() == "twosided"
+        if props.plugin_name() in _WRAPPERS or (
+            two_sided and state.nodes[inner].props.plugin_name() in _WRAPPERS
+        ):
+            copy = copied(props, props.plugin_name(), leave=[name])
+            within = _with_surface(state, inner, text, nested or two_sided)
+            copy[name] = mi.Properties.ResolvedReference(_append(state, within))
+            return copy
+        number = inner if two_sided else number
+    surface = _surface(state, text, number)
+    return surface if nested else _two_sided(state, surface)
+
+
+def _bsdfs(state: Any, number: int) -> dict[str, int]:
+    """Return the numbers of the BSDFs that a node names, by the names of its properties."""
+    return {
+        name: target
+        for name, target in targets_of(state.nodes[number], state.id_to_index).items()
+        if state.nodes[target].type == mi.ObjectType.BSDF
+    }
+
+
+def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int]:
+    """Return the numbers of the nodes within a node, by the names of its properties.
+
+    ids : numbers by id, to which references that Mitsuba has not resolved are looked up.
+    """
+    props, kinds = node.props, mi.Properties.Type
+    found = {}
+    for name in list(props.keys()):
+        if props.type(name) == kinds.ResolvedReference:
+            found[name] = int(props[name].index())
+        elif ids and props.type(name) == kinds.Reference and props[name].id() in ids:
+            found[name] = ids[props[name].id()]
+    return found
+
+
+def _surface(state: Any, text: str, beneath: int | None) -> Any:
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
+
+    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
+    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    another diffracting surface it keeps that surface's orientation and what lies beneath that one.
+    """
+    file, *parameters = _COMMA.split(text)
+    pairs = [parameter.partition("=")[::2] for parameter in parameters]
+    values: dict[str, Any] = {name.strip(): _value(value.strip()) for name, value in pairs}
+    named = file.startswith(PRESET)
+    if named:
+        values = find_preset(file.removeprefix(PRESET)).changed(values)
+        plugin = values.pop("type")
+    else:
+        solved = kind_of(file) is FileKind.ORDERS
+        plugin = ORDERS if solved else TRANSMITTING if "thin" in values else REFLECTING
+        values["table" if solved else "heightfield"] = str(Path(file).absolute())
+    names = list(values)
+    props = mi.Properties(plugin)
+    for name, value in values.items():
+        props[name] = value
+    opaque = named or plugin != REFLECTING or bool(set(names) & {*_CONDUCTORS, "pigment"})
+    opaque = opaque or not lets_light_through(values.get("material", "keratin"))
+    if beneath is None:
+        return props
+    old = state.nodes[beneath].props
+    if not old.plugin_name().startswith("diffraction"):
+        if not opaque:
+            props["beneath"] = mi.Properties.ResolvedReference(beneath)
+        return props
+    if "orientation" in old and "orientation" not in names:
+        props["orientation"] = old["orientation"]
+    if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
+        if "pigment" in old:
+            props["pigment"] = old["pigment"]
+        for target in targets_of(state.nodes[beneath]).values():
+            if state.nodes[target].type == mi.ObjectType.BSDF:
+                props["beneath"] = mi.Properties.ResolvedReference(target)
+    return props
+
+
+def _value(text: str) -> float | bool | str:
+    """Return a parameter's value as XML would declare it: number, boolean or string."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _two_sided(state: Any, surface: Any) -> Any:
+    """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
+    name = surface.plugin_name()
+    if name == TRANSMITTING or (name == ORDERS and load_orders(surface["table"]).sides == 2):
+        return surface
+    props = mi.Properties("twosided")
+    props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))
+    return props
+
+
+def _append(state: Any, props: Any) -> int:
+    """Add a BSDF to the scene; return its number."""
+    node = mi.parser.SceneNode()
+    node.type, node.props = mi.ObjectType.BSDF, props
+    state.nodes.append(node)
+    return len(state.nodes) - 1
+
+
+def copied(props: Any, plugin: str, leave: Sequence[str] = ()) -> Any:
+    """Return properties without their id, for a plugin of this name."""
+    copy = mi.Properties(plugin)
+    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
+        if name not in leave:
+            copy[name] = props[name]
+    return copy
