@@ -32,9 +32,7 @@ _NEEDS = {
     "imageio_ffmpeg": _Need(
         "films ending in .mp4 need imageio-ffmpeg", "film", "name a film ending in .webp or .gif"
     ),
-    "imgui_bundle": _Need("view needs imgui-bundle", "view"),
     "moderngl": _Need("the shaders need moderngl", "gl"),
-    "moderngl_window": _Need("view needs moderngl-window", "view"),
     "pxr": _Need("USD files need usd-core", "usd", "export the mesh as GLB, PLY or OBJ"),
     "pyoidn": _Need("denoising needs pyoidn", "denoise"),
     "trimesh": _Need("glTF files need trimesh", "gltf", "export the mesh as PLY or OBJ"),

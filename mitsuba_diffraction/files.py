@@ -112,6 +112,10 @@ def readable_file(path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
 def beginning(path: str | os.PathLike[str], count: int) -> bytes:
     """Return the first bytes of a file, `count` at most; errors as in `readable_file`."""
     shown = repr(os.fspath(path))
@@ -121,7 +125,8 @@ def beginning(path: str | os.PathLike[str], count: int) -> bytes:
         refuse_pipe(file)
         if file.is_dir():
             raise DiffractionError(f"{shown} is a folder; name a file in it")
-        with file.open("rb") as stream:
+        # some files of /proc wait for content as a pipe does
+        with open(file, "rb", opener=_without_waiting) as stream:
             first, size = stream.read(count), os.fstat(stream.fileno()).st_size
     except DiffractionError:
         raise

@@ -97,7 +97,7 @@ def test_the_wheel_declares_command_and_plugin(wheel):
     assert "mitsuba-diffraction = _mitsuba_diffraction:main" in entry_points
     assert "mitsuba_diffraction = mitsuba_diffraction.plugin.registration" in entry_points
     assert f"\nVersion: {md.__version__}\n" in metadata
-    for extra in ("afm", "gl", "view", "notebooks"):
+    for extra in ("afm", "gl", "notebooks"):
         assert f"\nProvides-Extra: {extra}\n" in metadata
 
 

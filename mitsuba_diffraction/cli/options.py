@@ -95,8 +95,8 @@ MODE = (
 )  # fmt: skip
 #: View by which a picture's linear light is shown.
 VIEW = (
-    "--view", "natural keeps hues and turns bright light white; standard clips each channel by "
-    "itself", VIEWS, "natural",
+    "--tonemap", "natural keeps hues and turns bright light white; standard clips each channel by "
+    "itself", VIEWS, "natural", {"dest": "view"},
 )  # fmt: skip
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import re
+import os
+import sys
+import tempfile
+import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
-from ..extras import optional
+from ..errors import DiffractionError
 from ..realtime.glsl.source import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
@@ -21,41 +26,51 @@ _EXPORTED = ("fast", "exact")
 
 def add_view(subparsers: options.Subparsers) -> None:
     options.add_command(
-        subparsers, "view", view, "look at a scene in a window, in real time",
-        "Open a window on a scene, drawn by shaders. Turn it with the left button, drag the "
-        "light with the right one, move with the middle one or shift, zoom with the wheel; "
-        "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
+        subparsers, "view", view, "look at a scene in the browser, in real time",
+        "Write the page of a scene, as export-viewer does, and open it in the browser: orbit, pan, "
+        "zoom, drag the light, change method, exposure and material.",
         *scene_options.SCENE,
-        ("--method", "method of the shaders", METHODS, "fast"),
+        ("--method", "method to start with", WEB_METHODS, "fast"),
         ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
         options.VIEW,
-        ("--size WxH", "size of the window in pixels; default: 1280x800", _size, (1280, 800)),
-        ("-o --output FOLDER", "for screenshots; default: the current folder", Path, Path()),
-        ("--frames N", "close the window after N frames and print their time; default: 0, never",
-         whole_number(0), 0),
-        ("--window", "toolkit of the window; glfw and sdl2 need further packages, headless opens "
-         "none", ("pyglet", "glfw", "sdl2", "headless"), None, {"default": "pyglet"}),
+        ("-o --output OUT", "page to write; default: one in the system's folder of temporary files",
+         path_ending_in(".html")),
     )  # fmt: skip
 
 
 def view(args: argparse.Namespace) -> Figures:
-    """Show the scene, which has no figures."""
+    """Write the page, open it, and return its figures."""
     scene_options.put_on_stage(args)
-    parameters = scene_options.scene_parameters(args)
-    check_outputs([args.output / "view_000.png"])
-    for package in ("moderngl", "moderngl_window", "imgui_bundle"):
-        optional(package)
-    from ..realtime.glsl.viewer import show
+    if args.output is None:
+        folder = Path(tempfile.mkdtemp(prefix="mitsuba-diffraction-"))
+        args.output = folder / f"{args.name.stem}.html"
+        try:
+            figures = _write_page(args, WEB_METHODS)
+        except BaseException:
+            folder.rmdir()
+            raise
+    else:
+        figures = _write_page(args, WEB_METHODS)
+    start = {"method": args.method, "exposure": args.exposure}
+    if args.method in figures["left_out"]:
+        raise DiffractionError(f"method {args.method}: {figures['left_out'][args.method]}")
+    # without a need for it no fragment: some systems open files without
+    started = args.method != WEB_METHODS[0] or args.exposure != 0.0
+    address = args.output.resolve().as_uri() + (f"#{urlencode(start)}" if started else "")
+    if not _opened(address):
+        print(f"no browser is here; open {address} in one with WebGL 2")
+    return figures
 
-    _set_variant(args)
-    with mitsuba_warnings():
-        frames, milliseconds = show(
-            _scene(args, parameters), sensor=args.sensor, method=args.method, stops=args.exposure,
-            view=args.view, size=args.size, folder=args.output, frames=args.frames,
-            window=args.window,
-        )  # fmt: skip
-    print(f"{frames} frames, {milliseconds:.3g} ms each at the end, method {args.method}")
-    return {}
+
+def _opened(address: str) -> bool:
+    """Open a page in a browser with windows; return whether there is one."""
+    shown = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    if sys.platform == "linux" and not any(os.environ.get(name) for name in shown):
+        return False  # a browser in the terminal draws no pictures
+    try:
+        return webbrowser.open(address)
+    except webbrowser.Error:
+        return False
 
 
 def add_compare(subparsers: options.Subparsers) -> None:
@@ -131,6 +146,11 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
 def export_viewer(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     scene_options.put_on_stage(args)
+    return _write_page(args, WEB_METHODS if args.method == "all" else (args.method,), args.title)
+
+
+def _write_page(args: argparse.Namespace, methods: Sequence[str], title: str = "") -> Figures:
+    """Write the page of a scene, and return the figures."""
     parameters = scene_options.scene_parameters(args)
     check_outputs([args.output])
 
@@ -140,9 +160,8 @@ def export_viewer(args: argparse.Namespace) -> Figures:
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         page = export_viewer(
-            _scene(args, parameters), args.output, title=args.title or args.name.stem,
-            sensor=args.sensor, view=args.view, progress=bar,
-            methods=WEB_METHODS if args.method == "all" else (args.method,),
+            _scene(args, parameters), args.output, title=title or args.name.stem,
+            sensor=args.sensor, view=args.view, progress=bar, methods=methods,
         )  # fmt: skip
     if page.omissions:
         say_warning(f"the page does not show: {'; '.join(dict.fromkeys(page.omissions))}")
@@ -222,10 +241,3 @@ def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
     scene = load_scene(args.scene, parameters, say=say)
     sensor_of(scene, args.sensor)
     return scene
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{2,5})x(\d{2,5})", text)
-    if not match:
-        raise argparse.ArgumentTypeError(f"expected a size like 1280x800, got {text!r}")
-    return int(match[1]), int(match[2])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import zipfile
 from collections.abc import Mapping
 from importlib import resources
@@ -29,7 +31,7 @@ MAX_BYTES = 200_000_000
 
 
 def make_addon(folders: Mapping[str, Path], path: Path) -> None:
-    """Write the add-on.
+    """Write the add-on; a texture that several looks have is in it once.
 
     Parameters
     ----------
@@ -53,10 +55,19 @@ def make_addon(folders: Mapping[str, Path], path: Path) -> None:
                     exported = read_folder(folder)
                 except MaterialError as error:
                     raise DiffractionError(str(error)) from error
+                names = {
+                    key: hashlib.sha256(file.read_bytes()).hexdigest()[:16] + ".exr"
+                    for key, file in exported["textures"].items()
+                }
+                for key, file in exported["textures"].items():
+                    if (packed := f"textures/{names[key]}") not in archive.namelist():
+                        archive.write(file, packed)
                 shader = exported["shader"]
-                document = shader.with_suffix(".json")
-                for file in (shader, document, *exported["textures"].values()):
-                    archive.write(file, f"looks/{name}/{file.name}")
+                document = json.loads(shader.with_suffix(".json").read_text(encoding="utf-8"))
+                document["textures"] = names
+                text = json.dumps(document, indent=1, ensure_ascii=False)
+                archive.write(shader, f"looks/{name}/{shader.name}")
+                archive.writestr(f"looks/{name}/{shader.stem}.json", text)
         if (size := temporary.stat().st_size) > MAX_BYTES:
             raise DiffractionError(
                 f"the add-on would have {size / 1e6:.0f} MB, more than {MAX_BYTES / 1e6:.0f}; "

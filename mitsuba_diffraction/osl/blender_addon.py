@@ -49,7 +49,9 @@ def make_library() -> Path:
     for look, own in users.items():
         if own is not None:
             own.name = f"{look} of the file"  # the asset has the name for a moment
-        material = blender_material.add_material(HERE / "looks" / look, name=f"asset {look}")
+        material = blender_material.add_material(
+            HERE / "looks" / look, name=f"asset {look}", shared=HERE / "textures"
+        )
         material.name = look
         material.asset_mark()
         material.asset_data.description = "Diffraction: Cycles with Open Shading Language"
@@ -94,8 +96,9 @@ def classes() -> tuple[Any, ...]:
             """Add the material, to the active mesh if there is one."""
             try:
                 material = blender_material.add_material(
-                    HERE / "looks" / self.look, name=self.look, tangent=self.tangent
-                )
+                    HERE / "looks" / self.look, name=self.look, tangent=self.tangent,
+                    shared=HERE / "textures",
+                )  # fmt: skip
             except blender_material.MaterialError as error:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}

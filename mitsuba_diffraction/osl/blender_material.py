@@ -4,9 +4,10 @@ In Blender: open this file in the Text editor and run it. From a terminal:
 
     blender file.blend --python blender_material.py -- --object Disc
 
-or with Python and the package `bpy`, which adds to a file, or writes a new one by --output:
+or with Python and the package `bpy`, which adds to a copy of a file, scene_diffraction.blend unless
+--output names another, or with --output alone to a new file:
 
-    python blender_material.py --blend scene.blend --object Disc
+    python blender_material.py --blend scene.blend --object Disc --output out.blend
 
 The script switches Cycles and OSL on and adds a node group with labelled inputs, and a material
 that uses it. Run it again after a new export: materials that use the group change with it.
@@ -51,6 +52,7 @@ def add_material(
     orientation: str | os.PathLike[str] | None = None,
     stretch: str | os.PathLike[str] | None = None,
     weight: str | os.PathLike[str] | None = None,
+    shared: Path | None = None,
 ) -> Any:
     """Return a new material that shows the shader of an exported folder.
 
@@ -65,9 +67,10 @@ def add_material(
     orientation, stretch, weight : pictures of a hologram, as `mitsuba-diffraction hologram` writes
         them: cosine and sine of the patch's angle, factor on its lengths, and 1 where it lies; the
         rest is plain glossy metal.
+    shared : folder of textures that several exported folders name.
     """
     check_blender()
-    exported = read_folder(Path(folder))
+    exported = read_folder(Path(folder), shared)
     name = name or exported["shader"].stem.replace("_", " ")
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -114,8 +117,32 @@ def check_blender() -> None:
         )
 
 
-def read_folder(folder: Path) -> dict[str, Any]:
+def give_material(target: Any, material: Any, slot: str = "") -> None:
+    """Give an object a material in a slot; its other slots, and objects of its mesh, keep theirs.
+
+    slot : name of the slot's material, or number from 1; may be left out of an object with one.
+
+    Raises a MaterialError that lists the slots if it is none of them, or several.
+    """
+    names = [entry.name or "empty" for entry in target.material_slots]
+    listed = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1)) or "none"
+    if slot and slot not in (*names, *(str(number) for number in range(1, len(names) + 1))):
+        raise MaterialError(f"'{target.name}' has no slot '{slot}'; it has {listed}")
+    if not slot and len(names) > 1:
+        raise MaterialError(f"'{target.name}' has several slots: name one by --slot: {listed}")
+    if not names:
+        target.data.materials.append(None)
+    number = names.index(slot) if slot in names else int(slot or 1) - 1
+    chosen = target.material_slots[number]
+    if target.data.users > 1:
+        chosen.link = "OBJECT"
+    chosen.material = material
+
+
+def read_folder(folder: Path, shared: Path | None = None) -> dict[str, Any]:
     """Return the document of an exported folder, with absolute paths of its files.
+
+    shared : folder of the textures, if they lie elsewhere.
 
     Raises a MaterialError if the folder is not one, or names files elsewhere.
     """
@@ -133,7 +160,7 @@ def read_folder(folder: Path) -> dict[str, Any]:
         exported = json.loads(documents[0].read_text(encoding="utf-8"))
         exported["shader"] = _file(folder, exported["shader"], ".osl")
         exported["textures"] = {
-            key: _file(folder, name, ".exr") for key, name in exported["textures"].items()
+            key: _file(shared or folder, name, ".exr") for key, name in exported["textures"].items()
         }
         inputs = [(entry["identifier"], entry["label"]) for entry in exported["inputs"]]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
@@ -303,6 +330,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--folder", type=Path, help="exported folder; default: of this script")
     parser.add_argument("--name", default="", help="of the material; default: the shader's name")
     parser.add_argument("--object", help="mesh object that gets the material")
+    parser.add_argument("--slot", default="", help="its slot, by material or number from 1")
     parser.add_argument(
         "--tangent", choices=TANGENTS, default="uv", help="direction of the patch's x axis"
     )
@@ -314,7 +342,11 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
         parser.add_argument(f"--{key}", type=Path, help=f"picture of a hologram: {content}")
     parser.add_argument("--working-space", help="working space of the file; default: as it is")
     parser.add_argument("--blend", type=Path, help=".blend file to add to; default: the open one")
-    parser.add_argument("--output", type=Path, help=".blend file to write; default: --blend")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        help=".blend file to write; default: beside --blend, with _diffraction in its name",
+    )
     return parser.parse_args(words)
 
 
@@ -322,6 +354,7 @@ def run(words: Sequence[str]) -> None:
     """Add the material to the open file as the command line says."""
     arguments = _arguments(words)
     check_blender()
+    output = _output(arguments)
     if arguments.blend:
         _open(arguments.blend)
     if arguments.working_space:
@@ -337,14 +370,35 @@ def run(words: Sequence[str]) -> None:
         if target is None or target.type != "MESH":
             meshes = ", ".join(o.name for o in bpy.data.objects if o.type == "MESH") or "none"
             raise MaterialError(f"no mesh object '{arguments.object}'; the file has {meshes}")
-        target.data.materials.clear()
-        target.data.materials.append(material)
-        target.material_slots[0].material = material
+        give_material(target, material, arguments.slot)
     else:
         material.use_fake_user = True  # kept in the file while no object has it
-    if output := arguments.output or arguments.blend:
+    if output:
         _save(output)
-    print(f"added the material '{material.name}' of {folder}")
+    print(
+        f"added the material '{material.name}' of {folder}" + (f", in {output}" if output else "")
+    )
+
+
+def _output(arguments: argparse.Namespace) -> Path | None:
+    """Return the file to write; None leaves it to the user of Blender's window."""
+    if arguments.slot and not arguments.object:
+        raise MaterialError("--slot is of an object: name it by --object")
+    if arguments.output:
+        return Path(arguments.output)
+    if not arguments.blend:
+        if bpy.app.background and not bpy.data.filepath:
+            raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
+        return _beside(Path(bpy.data.filepath)) if bpy.app.background else None
+    return _beside(arguments.blend)
+
+
+def _beside(file: Path) -> Path:
+    """Return the name of a copy of a file."""
+    copy = file.with_name(f"{file.stem}_diffraction.blend")
+    if copy.exists():
+        raise MaterialError(f"'{copy}' is there already: name a file by --output, it or another")
+    return copy
 
 
 def _open(file: Path) -> None:

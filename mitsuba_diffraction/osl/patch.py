@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,27 +11,24 @@ from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ..optics.coat import coated_reflectance, cosine_within, face_transmittance
 from ..optics.fresnel import reflectance
 from ..plugin.description import Surface
+from ..shading.powers import PackedPowers, pack_powers
 from ..tables.directional import FINE, SHARE
-from ..tables.powers import order_0_power, powers_at
+from ..tables.powers import powers_at
 from ..tables.table import DiffractionTable
 
-#: Nodes of an interval of κ, Chebyshev's of the first kind on 0 to 1, in the channels of a pixel.
-NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(4) + 0.5) / 4)
-#: Phase (rad) of the highest over the deepest point that an interval of κ spans: its cosine is
-#: off by 0.003.
-_PHASE = 2.0
 #: Orders drawn in a sample, each of a wavelength.
 DRAWS = 2
 #: Bands of κ, each with a density to draw from, up to 3/4 of the largest as in `tables.sampling`.
-BANDS, BANDED = 4, 0.75
+#: Four would lower the noise by 3 %, and double the texture.
+BANDS, BANDED = 2, 0.75
 #: Part of the density that is the mean over all κ, so that no order with power has none.
 _EVEN = 0.1
-#: Orders 0 over κ.
-ORDER_0_NODES = 256
 #: Width of the window of a patch that sets no limit, µm.
 _UNLIMITED = 1e9
-#: Width of the texture of draws, a power of 2: coordinates of its pixels are exact.
-DRAWS_WIDTH = 1024
+#: Largest probability in the texture of draws, near the largest half.
+_LARGEST = 3e4
+#: Nodes of κ at which densities are the mean of an order's share, for each band.
+_NODES = 8
 
 
 class PatchTextures(NamedTuple):
@@ -40,20 +36,20 @@ class PatchTextures(NamedTuple):
 
     Attributes
     ----------
-    powers : (intervals · ny, nx, 4) float16, |a_j|² times `scale` at four nodes of κ.
-    draws : (height, DRAWS_WIDTH, 4) float32, cells of alias tables, those of a band from a row of
-        its own on: threshold, the other order, and the orders' probabilities.
-    intervals, scale : of `powers`.
-    rows : rows of `draws` of a band.
-    order_0 : (ORDER_0_NODES,) |a_0|² at even steps from κ = 0 to the largest.
+    powers : (intervals · rows, columns · texels, 4) terms of each order, see `PackedPowers`.
+    factors : (intervals · (cells + 1), texels + 1, 4) float32.
+    draws : (BANDS · rows, columns, 4) half or single, cells of alias tables: threshold, probability
+        of the order times `likelihood`, and the other order from the middle, along x and y.
+    packed : the powers before they are laid out.
+    scale, likelihood : of `powers` and of the probabilities.
     """
 
     powers: NDArray[np.float16]
-    draws: NDArray[np.float32]
-    intervals: int
+    factors: NDArray[np.float32]
+    draws: NDArray[np.floating]
+    packed: PackedPowers
     scale: float
-    rows: int
-    order_0: NDArray[np.float64]
+    likelihood: float
 
 
 class EnergyTexture(NamedTuple):
@@ -114,40 +110,64 @@ def mean_transmittance(
 
 
 def patch_textures(table: DiffractionTable) -> PatchTextures:
-    """Resample the powers of all orders but order 0 over κ, and tabulate densities of them."""
+    """Lay out the powers of all orders, and tabulate densities to draw orders from."""
+    packed = pack_powers(table)
+    rows, columns = table.grid.shape
+    # halves end at 65504
+    factor = min(1.0, 6e4 / max(float(np.abs(packed.orders).max()), 1e-30))
+    half = (packed.orders * factor if factor < 1.0 else packed.orders).astype(np.float16)
+    densities = _densities(table)
+    likelihood = _LARGEST / max(float(densities.max()), 1e-30)
+    # integers up to 2048 are exact in halves
+    kind = np.float16 if max(table.grid.last) <= 2048 else np.float32
+    draws = np.zeros((BANDS, rows * columns, 4), kind)
+    for cells, density in zip(draws, densities, strict=True):
+        threshold, other = _alias(density)
+        cells[:, 0], cells[:, 2] = threshold, other % columns - table.grid.last[0]
+        cells[:, 3] = other // columns - table.grid.last[1]
+        # with the thresholds as they are stored
+        kept = cells[:, 0].astype(np.float64)
+        chance = kept + np.bincount(other, 1.0 - kept, len(other))
+        cells[:, 1] = chance * (likelihood / len(other))
+    return PatchTextures(
+        half.reshape(-1, columns * packed.texels, 4),
+        packed.factors.reshape(-1, *packed.factors.shape[2:]),
+        draws.reshape(-1, columns, 4),
+        packed,
+        packed.scale * factor,
+        likelihood,
+    )
+
+
+def _densities(table: DiffractionTable) -> NDArray[np.float64]:
+    """Return the probability of each order (BANDS, orders) in bands of κ."""
     largest = table.expansion.kappa_max
-    depth = 2.0 * table.expansion.half_range
-    intervals = max(1, math.ceil(largest * depth / _PHASE))
-    kappas = largest * (np.arange(intervals)[:, None] + NODES) / intervals
-    powers = np.stack([powers_at(table, kappa) for kappa in kappas.ravel()])
-    scale = 3e4 / max(float(powers.max()), 1e-30)
-    pixels = (powers * scale).reshape(intervals, 4, *powers.shape[1:])
-    pixels = pixels.transpose(0, 2, 3, 1).reshape(-1, powers.shape[2], 4).astype(np.float16)
-    flat = powers.reshape(len(powers), -1).astype(np.float64)
-    shares = flat / np.maximum(flat.sum(axis=1, keepdims=True), 1e-30)
-    distance = np.abs(kappas.ravel() / largest - BANDED * (np.arange(BANDS) + 0.5)[:, None] / BANDS)
-    near = np.maximum(1.0 - distance / (BANDED * 1.5 / BANDS), 0.0)
-    cells = -(-flat.shape[1] // DRAWS_WIDTH) * DRAWS_WIDTH
-    bands = np.zeros((BANDS, cells, 4), np.float32)
-    for n, weights in enumerate(near / near.sum(axis=1, keepdims=True)):
-        density = (1.0 - _EVEN) * (weights @ shares) + _EVEN * shares.mean(axis=0)
-        bands[n, : flat.shape[1]] = _alias(density / max(density.sum(), 1e-30))
-    order_0 = order_0_power(table, np.linspace(0.0, largest, ORDER_0_NODES))
-    draws = bands.reshape(-1, DRAWS_WIDTH, 4)
-    return PatchTextures(pixels, draws, intervals, scale, cells // DRAWS_WIDTH, order_0)
+    bands = []
+    for band in range(BANDS):
+        kappas = BANDED * largest * (band + (np.arange(_NODES) + 0.5) / _NODES) / BANDS
+        powers = sum(powers_at(table, kappa).ravel().astype(np.float64) for kappa in kappas)
+        bands.append(powers / np.maximum(np.sum(powers), 1e-30))
+    shares = np.stack(bands)
+    last = powers_at(table, largest).ravel().astype(np.float64)
+    even = shares.mean(axis=0) + last / np.maximum(last.sum(), 1e-30)
+    mixed = (1.0 - _EVEN) * shares + 0.5 * _EVEN * even
+    mixed[mixed.sum(axis=1) == 0.0] = 1.0  # a mirror has no order to draw
+    return np.asarray(mixed / mixed.sum(axis=1, keepdims=True))
 
 
-def interpolated(textures: PatchTextures, largest: float, kappa: float) -> NDArray[np.float64]:
-    """Return the powers that the shader reads, (ny, nx); largest : κ of the table."""
-    place = np.clip(kappa / largest, 0.0, 1.0) * textures.intervals
-    interval = min(int(place), textures.intervals - 1)
-    rows = len(textures.powers) // textures.intervals
-    four = textures.powers[interval * rows : (interval + 1) * rows].astype(np.float64)
-    distance = place - interval - NODES
-    weights = [
-        np.prod(np.delete(distance, n)) / np.prod(NODES[n] - np.delete(NODES, n)) for n in range(4)
-    ]
-    return np.asarray(np.maximum(four @ weights, 0.0) / textures.scale)
+def interpolated(textures: PatchTextures, kappa: float) -> NDArray[np.float64]:
+    """Return the powers that the shader reads at κ, (rows, columns)."""
+    packed = textures.packed
+    place = np.clip(kappa / packed.expansion.kappa_max, 0.0, 1.0) * packed.expansion.intervals
+    interval = min(int(place), packed.expansion.intervals - 1)
+    offset = place - interval
+    cell = min(int(offset * packed.cells), packed.cells - 1)
+    t = offset * packed.cells - cell
+    ends = packed.factors[interval, cell : cell + 2, :-1].astype(np.float64)
+    factors = ((1.0 - t) * ends[0] + t * ends[1]).ravel()
+    fading = offset**2 if interval == 0 else 1.0
+    terms = textures.powers.reshape(packed.orders.shape)[interval].astype(np.float64)
+    return np.asarray(np.maximum(terms @ factors, 0.0) * (fading / textures.scale))
 
 
 def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, float]:
@@ -156,7 +176,7 @@ def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, f
     errors = []
     for kappa in largest * (np.arange(12) + 0.5) / 12:
         exact = powers_at(table, float(kappa)).astype(np.float64)
-        errors.append(np.abs(interpolated(textures, largest, float(kappa)) - exact).sum())
+        errors.append(np.abs(interpolated(textures, float(kappa)) - exact).sum())
     return {"mean": float(np.mean(errors)), "worst κ": float(np.max(errors))}
 
 
@@ -179,24 +199,23 @@ def patch_constants(
         "SPACING_X": table.spacing[0],
         "SPACING_Y": table.spacing[1],
         "KAPPA_MAX": table.expansion.kappa_max,
-        "INTERVALS": textures.intervals,
+        "INTERVALS": textures.packed.expansion.intervals,
+        "CELLS": textures.packed.cells,
+        "TEXELS": textures.packed.texels,
         "SCALE": textures.scale,
+        "LIKELIHOOD": textures.likelihood,
         "BANDS": BANDS,
         "BANDED": BANDED,
-        "DRAWS_WIDTH": DRAWS_WIDTH,
-        "DRAWS_ROWS": textures.rows,
         "FIRST_OCTAVE": statistic.first,
         "NODES_PER_OCTAVE": NODES_PER_OCTAVE,
         "SCAN_WIDTH": table.window_width if table.inverse_taper else limit,
         "INVERSE_TAPER": table.inverse_taper,
         "STATISTIC_NODES": len(statistic.nodes),
-        "ORDER_0_NODES": ORDER_0_NODES,
-        **{f"NODE_{n}": float(node) for n, node in enumerate(NODES)},
     }
 
 
-def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return an alias table (n, 4): threshold, other, probability of itself and of the other.
+def _alias(probabilities: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the threshold and the other of each cell of an alias table, (n,) each.
 
     A cell drawn evenly keeps itself below the threshold, else it is the other (Vose 1991).
     """
@@ -211,6 +230,4 @@ def _alias(probabilities: NDArray[np.float64]) -> NDArray[np.float32]:
         left[more] -= 1.0 - left[less]
         if left[more] < 1.0:
             small.append(large.pop())
-    return np.stack(
-        [threshold, other, probabilities, probabilities[other]], axis=1, dtype=np.float32
-    )
+    return threshold, other

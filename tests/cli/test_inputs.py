@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.systems import posix
+from tests.support.systems import linux, posix
 
 SCENE = """<scene version="3.0.0">
   <default name="width" value="8"/>
@@ -96,6 +96,16 @@ def test_a_pipe_for_a_frame_or_a_table_of_treatments_is_refused_at_once(run, her
     os.mkfifo("pipe.toml")
     ran = run("survey", heights, "--treatments", "pipe.toml")
     assert "pipe or a device" in ran.failed_in_one_line()
+
+
+@linux
+@pytest.mark.parametrize(
+    "command", ["info {}", "precompute {}", "render {}", "tonemap {} -o a.png"]
+)
+@pytest.mark.parametrize("file", ["/proc/self/environ", "/proc/kmsg"])
+def test_files_of_the_system_without_a_size_are_refused_at_once(run, here, alarm, command, file):
+    line = run(*command.format(file).split()).failed_in_one_line()
+    assert "without a size" in line or "cannot read" in line or "is empty" in line
 
 
 def test_a_long_value_in_a_scene_is_not_taken_for_a_file(run, here):

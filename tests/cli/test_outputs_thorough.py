@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from mitsuba_diffraction.cli.main import build_parser
 from tests.support.inputs import HEIGHTS, NAMED, RENDER, SMALL
 
 pytestmark = pytest.mark.thorough
 
 #: A command with each kind of input, and the suffixes of its outputs.
 COMMANDS = [
-    (RENDER, ".exr .png"), (f"{RENDER} --material ball=t.exr", ".exr .png"),
-    (f"{RENDER} --material ball=orders.nc", ".exr"),
+    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr .png"),
+    (f"{RENDER} --assign ball=orders.nc", ".exr"),
     ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
     (f"{RENDER} --plan recipe.toml", ".exr"), (f"{RENDER} --frames 1 --turn width", ""),
     ("plan scale.xml --paths 64", ".toml"), ("brdf-map recipe.toml --resolution 8", ".exr .png"),
@@ -36,15 +37,25 @@ COMMANDS = [
     ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
     ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
+    ("export-osl t.exr --name t --material Al", ""),
+    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500,500 --material Al", ".nc"),
 ]  # fmt: skip
+#: Commands that take long, and outputs of theirs.
+SLOW = [
+    ("compare scale.xml -m llvm_ad_rgb -s 2 -o folder", "folder/compare.json"),
+    ("tradeoff h.npy --pixel-size 0.1 --quick -o folder",
+     "folder/tradeoff.json folder/tradeoff.csv folder/tradeoff.png folder/depth.png"),
+    ("export-viewer scale.xml page.html -m scalar_rgb", "page.html"),
+    ("export-osl h.npy --name skin -o folder " + HEIGHTS, "folder/skin.osl"),
+]  # fmt: skip
+#: Commands without a file as their output.
+NONE = {"info", "presets", "view"}
 
 
 @pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])
 def test_no_output_of_any_name_replaces_an_input(run, original, world, command, suffixes):
     """Outputs called after each input, with every suffix, in several spellings; then defaults."""
-    words = [word for part in shlex.split(command) for word in part.replace("=", ",").split(",")]
-    first, *others = (word for word in words if (world / word).exists())
-    inputs = {name for word in (first, *others) for name in (word, *NAMED.get(word, ()))}
+    first, inputs = _inputs(world, command)
     before = {name: (original / name).read_bytes() for name in inputs}
 
     def check(*options: str) -> list[str]:
@@ -60,6 +71,8 @@ def test_no_output_of_any_name_replaces_an_input(run, original, world, command, 
     spellings = itertools.cycle(["{}", "../here/./{}"])
     for name, suffix in itertools.product(sorted(inputs), suffixes.split()):
         check("-o", next(spellings).format(f"{Path(name).stem}{suffix}"))
+    for name in sorted(inputs):
+        check("--json", next(spellings).format(name))
     # what the command makes by default are links to an input in the next run
     made = check()
     for name, link in zip(made, itertools.cycle([os.link, os.symlink]), strict=False):
@@ -69,3 +82,30 @@ def test_no_output_of_any_name_replaces_an_input(run, original, world, command, 
     for name in made:
         assert (world / name).samefile(world / first), name
     check()
+
+
+@pytest.mark.parametrize(("command", "outputs"), SLOW, ids=lambda text: text[:40])
+def test_slow_commands_refuse_before_the_work(run, original, world, command, outputs):
+    """Each input in the place of each output, as a link."""
+    links = itertools.cycle([os.link, os.symlink])
+    _, inputs = _inputs(world, command)
+    for name, output in itertools.product(sorted(inputs), outputs.split()):
+        (world / output).parent.mkdir(exist_ok=True)
+        next(links)(world / name, world / output)
+        assert "would overwrite" in run(*shlex.split(command)).failed_in_one_line(), (name, output)
+        assert (world / name).read_bytes() == (original / name).read_bytes()
+        (world / output).unlink()
+
+
+def test_every_command_is_tried():
+    parsers = next(a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
+    tried = {command.split()[0] for command, _ in COMMANDS + SLOW}
+    assert isinstance(parsers, dict)
+    assert tried == {*parsers} - NONE
+
+
+def _inputs(world: Path, command: str) -> tuple[str, set[str]]:
+    """Return the first file that a command reads, and all of them."""
+    words = [word for part in shlex.split(command) for word in part.replace("=", ",").split(",")]
+    read = [word for word in words if (world / word).exists()]
+    return read[0], {name for word in read for name in (word, *NAMED.get(word, ()))}

@@ -13,6 +13,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.osl.blender_material import MaterialError, read_folder
 from tests.support.orders import thin_grating
 
 
@@ -29,9 +30,22 @@ def test_the_archive_has_a_manifest_and_the_looks(folder: Path, tmp_path: Path) 
         names = set(archive.namelist())
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
     assert {"__init__.py", "blender_material.py", "looks/grating/grating.osl"} <= names
-    assert {f"looks/grating/{file.name}" for file in folder.glob("*.exr")} <= names
+    assert sum(name.startswith("textures/") for name in names) == len([*folder.glob("*.exr")])
     assert manifest["type"] == "add-on"
     assert manifest["id"].isidentifier()
+
+
+def test_looks_share_their_textures(folder: Path, tmp_path: Path) -> None:
+    md.osl.make_addon({"one": folder, "two": folder}, tmp_path / "looks.zip")
+    with zipfile.ZipFile(tmp_path / "looks.zip") as archive:
+        archive.extractall(tmp_path / "addon")
+    names = sorted(file.name for file in (tmp_path / "addon/textures").iterdir())
+    assert len(names) == len([*folder.glob("*.exr")])
+    for look in ("one", "two"):
+        read = read_folder(tmp_path / "addon/looks" / look, tmp_path / "addon/textures")
+        assert sorted(file.name for file in read["textures"].values()) == names
+    with pytest.raises(MaterialError):
+        read_folder(tmp_path / "addon/looks/one")
 
 
 def test_a_folder_without_an_export_is_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS
-from mitsuba_diffraction.orders import Band, OrderTable
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
@@ -33,7 +33,8 @@ def table_of(values, superstrate=1.0):
 
     last = OrderTable.mirror(PERIOD, superstrate=superstrate).last_band
     bands = tuple(Band(k, kind(k + 1), kind(k) if k else None) for k in range(last + 1))
-    return OrderTable(PERIOD, (380.0, 780.0), bands, superstrate)
+    response = CellResponse(bands)
+    return OrderTable((PERIOD, np.inf), (380.0, 780.0), response, superstrate)
 
 
 def exported(table, folder, **parameters):

@@ -106,7 +106,7 @@ def test_materials_are_added_to_a_file_in_its_working_space(tmp_path, grating):
     picture = ROOT / "scenes" / "textures" / "hologram_orientation.exr"
     done = run_in_blender(
         script, "--blend", file, "--name", "card", "--working-space", "Linear Rec.2020",
-        "--orientation", picture,
+        "--orientation", picture, "--output", file,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = result_of(_IN_FILE, tmp_path, file=str(file))
@@ -114,6 +114,46 @@ def test_materials_are_added_to_a_file_in_its_working_space(tmp_path, grating):
     assert found["spaces"] == {"card": ["Linear Rec.2020"], "grating": ["Linear Rec.2020"]}
     assert found["cube"] == "grating"
     assert found["linked"] == ["Rotation (°)", "Tangent"]
+
+
+_SCENE = """
+import bpy
+mesh = bpy.data.meshes["Cube"]
+mesh.materials.clear()
+for name in ("skin", "eyes"):
+    mesh.materials.append(bpy.data.materials.new(name))
+bpy.context.collection.objects.link(bpy.data.objects.new("Twin", mesh))
+bpy.ops.wm.save_as_mainfile(filepath=file)
+result = True
+"""
+
+_SLOTS = """
+import bpy
+bpy.ops.wm.open_mainfile(filepath=file)
+result = {name: [slot.material.name for slot in bpy.data.objects[name].material_slots]
+          for name in ("Cube", "Twin")}
+"""
+
+
+def test_a_slot_of_a_copy_gets_the_material_and_nothing_else_changes(tmp_path, grating):
+    file, copy = tmp_path / "snake.blend", tmp_path / "snake_diffraction.blend"
+    result_of(_SCENE, tmp_path, file=str(file))
+    before = file.read_bytes()
+    exported(grating, tmp_path / "exported", "grating")
+    script = tmp_path / "exported" / "blender_material.py"
+    done = run_in_blender(script, "--blend", file, "--object", "Cube")
+    assert done.returncode != 0
+    assert "1 skin, 2 eyes" in done.stderr
+    assert not copy.exists()
+    done = run_in_blender(script, "--blend", file, "--object", "Cube", "--slot", "eyes")
+    assert done.returncode == 0, done.stderr
+    assert str(copy) in done.stdout
+    assert file.read_bytes() == before
+    slots = result_of(_SLOTS, tmp_path, file=str(copy))
+    assert slots == {"Cube": ["skin", "grating"], "Twin": ["skin", "eyes"]}
+    again = run_in_blender(script, "--blend", file, "--object", "Cube", "--slot", "1")
+    assert again.returncode != 0
+    assert "is there already" in again.stderr
 
 
 @pytest.mark.parametrize("content", [None, b"no file of Blender"])
@@ -142,7 +182,9 @@ def test_blender_installs_the_addon_and_has_assets(tmp_path, grating):
 
 def test_unknown_object_is_one_line(tmp_path, grating):
     exported(grating, tmp_path, "grating")
-    done = run_in_blender(tmp_path / "blender_material.py", "--object", "Ring")
+    output = tmp_path / "out.blend"
+    done = run_in_blender(tmp_path / "blender_material.py", "--object", "Ring", "--output", output)
+    assert not output.exists()
     assert done.returncode != 0
     assert "no mesh object 'Ring'; the file has Cube" in done.stderr
     assert "Traceback" not in done.stderr

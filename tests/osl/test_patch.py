@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.osl.patch import (
-    DRAWS_WIDTH,
+    BANDS,
     energy_texture,
     interpolated,
     patch_textures,
@@ -48,19 +48,20 @@ TEXTURES = patch_textures(TABLE)
 def test_powers_are_those_of_the_table(share):
     kappa = share * TABLE.expansion.kappa_max
     exact = powers_at(TABLE, kappa)
-    read = interpolated(TEXTURES, TABLE.expansion.kappa_max, kappa)
-    # a cubic over a phase of 2 rad is off by 0.003 where two heights differ by the whole depth
-    assert np.abs(read - exact).sum() < 0.003
+    # terms are halves, of 11 digits; factors are off by 0.03²/8 between the ends of a cell
+    assert np.abs(interpolated(TEXTURES, kappa) - exact).sum() < 1.2e-4
 
 
 def test_draws_have_the_probabilities_that_weigh_them():
-    cells = TEXTURES.draws.reshape(-1, TEXTURES.rows * DRAWS_WIDTH, 4)
-    count = int(np.prod(TABLE.grid.shape))
-    for threshold, other, itself, alias in cells[:, :count].astype(float).transpose(0, 2, 1):
-        drawn = threshold / count + np.bincount(other.astype(int), (1 - threshold) / count, count)
-        # single precision
-        assert drawn == pytest.approx(itself, abs=2e-7)
-        assert np.array_equal(alias, itself[other.astype(int)])
+    rows, columns = TABLE.grid.shape
+    last_x, last_y = TABLE.grid.last
+    for cells in TEXTURES.draws.reshape(BANDS, rows * columns, 4).astype(float):
+        threshold, chance, x, y = cells.T
+        other = ((y + last_y) * columns + x + last_x).astype(int)
+        drawn = (threshold + np.bincount(other, 1.0 - threshold, len(other))) / len(other)
+        assert drawn.sum() == pytest.approx(1.0)
+        # halves have 11 digits, fewer below 6e-5 of what the largest is stored as
+        assert chance / TEXTURES.likelihood == pytest.approx(drawn, rel=5e-4, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -157,4 +158,4 @@ def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_varian
     assert values["Pigment"] == pytest.approx(colour, abs=0.01)
     coat = re.search(r"#define COAT (\S+)", exported.shader.read_text(encoding="utf-8"))
     assert float(coat[1]) == pytest.approx(1.25, abs=1e-3)
-    assert set(document["textures"]) == {"PowersFile", "DrawsFile"}
+    assert set(document["textures"]) == {"PowersFile", "FactorsFile", "DrawsFile"}

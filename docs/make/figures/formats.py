@@ -23,7 +23,7 @@ def tables() -> str:
     for title, rows in sections().items():
         cells = [(f"**{r['format']}**", f"`{r['suffixes']}`", *list(r.values())[2:]) for r in rows]
         parts += [f"## {title.capitalize()}", pages.table(tuple(rows[0]), cells)]
-    return re.sub(r"(--[a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
+    return re.sub(r"(--[a-z][a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from .pages import exit_code
 
 #: Rows from which a table is a file.
-LONG = 12
+LONG = 8
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
 # A heading, or the name of a generated part.
 _TITLE = re.compile(r"^(?:#+ |<!-- begin )(.*?)(?: -->)?$", re.M)
@@ -26,7 +26,7 @@ _TITLE = re.compile(r"^(?:#+ |<!-- begin )(.*?)(?: -->)?$", re.M)
 def write_page(path: Path, text: str) -> list[Path]:
     """Write a page whose tables of `LONG` rows and more are CSV files beside it.
 
-    Files `STEM-*.csv` of an earlier page are deleted.
+    Files `STEM-*.csv` that the page does not link are deleted.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def write_page(path: Path, text: str) -> list[Path]:
     """
     shown, tables = separated(text, path.stem)
     for old in path.parent.glob(f"{path.stem}-*.csv"):
-        if old.name not in tables:
+        if f"]({old.name})" not in shown:
             old.unlink()
     for name, content in (*tables.items(), (path.name, shown)):
         with atomic_path(path.parent / name) as temporary:

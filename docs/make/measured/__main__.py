@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from docs.make.figures.long_tables import write_page
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli import check_outputs, say_error
 from mitsuba_diffraction.errors import DiffractionError
@@ -45,10 +46,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         found = page.Comparisons(args.kaist, quick=args.quick)
         buffer = io.BytesIO()
         page.figure(found).savefig(buffer, format="png", dpi=100, metadata={"Software": None})
-        content = {picture: buffer.getvalue(), written: (page.write(found) + "\n").encode()}
-        for path, data in content.items():
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(data)
+        text = page.write(found) + "\n"
+        with atomic_path(picture) as temporary:
+            temporary.write_bytes(buffer.getvalue())
+        write_page(written, text)
     except DiffractionError as error:
         say_error(str(error))
         return 1

@@ -25,7 +25,6 @@ source         text of the shaders, by method and surface
 rewriting      files of shaders; removal of unused code, and prefixed names, for other programs
 context        OpenGL without a window: programs, textures, framebuffers
 timing         time per fragment
-viewer         a window on a scene with a panel (extra `view`)
 """
 
 from __future__ import annotations

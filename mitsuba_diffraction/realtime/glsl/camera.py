@@ -6,15 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from .lights import Lamp
 
 Array = NDArray[np.float64]
-
-_UPRIGHT = 0.05  # least cosine between the up directions of camera and scene
 
 
 @dataclass(frozen=True)
@@ -117,69 +113,3 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
         focus=number("focus_distance") or 1.0,
     )
     return camera, omissions
-
-
-@dataclass(frozen=True)
-class Orbit:
-    """Camera that turns around a point."""
-
-    to_world: Array  # (4, 4); the camera looks along z, with x to the left and y up
-    target: Array  # (3,) centre of the orbit, straight ahead
-    up: Array  # (3,) up direction of the scene
-
-    @classmethod
-    def start(cls, camera: Camera, middle: Array) -> Orbit:
-        """Start at a camera, with the centre straight ahead at the distance of `middle`."""
-        forward, eye = camera.to_world[:3, 2], camera.eye
-        distance = max(float((middle - eye) @ forward), 1e-3 * float(np.linalg.norm(middle - eye)))
-        above = camera.to_world[:3, 1]
-        axis = int(np.argmax(np.abs(above)))
-        up = np.zeros(3)
-        up[axis] = np.sign(above[axis])
-        return cls(camera.to_world, eye + distance * forward, up)
-
-    @property
-    def distance(self) -> float:
-        """Distance of the camera from the centre."""
-        return float(np.linalg.norm(self.target - self.to_world[:3, 3]))
-
-    def turned(self, right: float, up: float) -> Orbit:
-        """Turn around the centre by these angles (rad), but never over the top."""
-        side = -self.to_world[:3, 0]
-        rotation = rotation_about(self.up, -right) @ rotation_about(side, -up)
-        moved = self._rotated(rotation)
-        if moved[:3, 1] @ self.up < _UPRIGHT:
-            moved = self._rotated(rotation_about(self.up, -right))
-        return replace(self, to_world=moved)
-
-    def panned(self, right: float, up: float) -> Orbit:
-        """Move sideways, in multiples of the distance."""
-        step = self.distance * (up * self.to_world[:3, 1] - right * self.to_world[:3, 0])
-        moved = self.to_world.copy()
-        moved[:3, 3] += step
-        return replace(self, to_world=moved, target=self.target + step)
-
-    def zoomed(self, factor: float) -> Orbit:
-        """Move to `factor` times the distance."""
-        return replace(self, to_world=self._rotated(np.eye(3), factor))
-
-    def _rotated(self, rotation: Array, factor: float = 1.0) -> Array:
-        """Return the transform after a rotation about the centre, at `factor` the distance."""
-        moved = self.to_world.copy()
-        moved[:3, :3] = rotation @ moved[:3, :3]
-        moved[:3, 3] = self.target + factor * (rotation @ (moved[:3, 3] - self.target))
-        return moved
-
-
-def dragged(light: Lamp, orbit: Orbit, right: float, up: float) -> Lamp:
-    """Turn a light around the orbit's centre by angles in rad, as seen from the camera."""
-    rotation = rotation_about(orbit.to_world[:3, 1], right)
-    rotation = rotation_about(-orbit.to_world[:3, 0], -up) @ rotation
-    centre = orbit.target * light.place[3]
-    place = np.append(rotation @ (light.place[:3] - centre) + centre, light.place[3])
-    return replace(light, place=place)
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the rotation matrix (3, 3) about a unit vector, counter-clockwise."""
-    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(angle * axis).as_matrix())

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...errors import DiffractionError, check_choice
 from ...heights.field import HeightField
-from ...optics.geometry import sigma_of
 from ...plugin.description import Consumer, Feature
 from ...settings import TableSettings
 from ...tables.build.build import build_with
@@ -22,7 +21,7 @@ from .packing import area_factor
 from .scene import VERTEX, RealtimeScene
 from .shader_materials import GLSL, Diffracting
 from .source import METHODS, THESIS_METHODS
-from .texels import Packed, Uniform, as_half, listed, texels
+from .texels import Packed, as_half, listed, texels
 
 _REMEDY = "use method fast"
 #: Methods that draw less than `fast`.
@@ -191,28 +190,6 @@ def method_tables(method: str, surface: Diffracting) -> Packed:
     if method in THESIS_METHODS and described.heights is not None:
         return pack_method(thesis_method(method, described.heights(), described.patch))
     return surface.tables(method)
-
-
-def window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
-    """Return the uniforms of another coherence width of the light in µm; a scan's limit stays."""
-    sigma = sigma_0 = sigma_of(coherence_width)
-    table_sigma, table_ratio = tables.uniforms.get("sigma"), tables.uniforms.get("order_0_ratio")
-    if isinstance(table_sigma, float) and isinstance(table_ratio, float):
-        taper = tables.uniforms.get("inverse_taper", 0.0)
-        assert isinstance(taper, float)
-        if taper > 0.0:  # of a scan's windows, which stays: the look-up makes up for it
-            sigma = (min(sigma, (table_sigma**-2 + taper) ** -0.5) ** -2 - taper) ** -0.5
-        elif table_ratio > 1.0:
-            sigma = min(sigma, table_sigma)
-    factor = area_factor(sigma)
-    exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms.get("area_factor")
-    uniforms: dict[str, Uniform] = {
-        "sigma": sigma, "order_0_ratio": (sigma_0 / sigma) ** 2, "area_factor": factor
-    }  # fmt: skip
-    if isinstance(exponents, tuple) and isinstance(table_factor, float):
-        # exponents are proportional to σ², too
-        uniforms["exponents"] = tuple(float(e) * factor / table_factor for e in exponents)
-    return uniforms
 
 
 def vertex_array(context: Any, program: Any, buffer: Any) -> Any:

@@ -15,11 +15,10 @@ from ...optics.boundary import Model
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
+from ...shading.powers import pack_powers as pack_orders
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
-from ...tables.layout import BinRecord, cells_of, functions_at
-from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
 
@@ -27,10 +26,6 @@ Array = NDArray[np.float64]
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
-
-#: Phase over a cell of κ, within which functions are interpolated linearly; the error is its square
-#: over 8, 1e-4.
-_CELL = 0.03
 
 _LAM = np.arange(360.0, 830.5, 1.0)  # nm
 _RESPONSES = 2048  # nodes over k, about 0.4 nm apart
@@ -98,20 +93,12 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "method exact adds powers, but the table has coherence='patch', where amplitudes "
             "interfere; use method fast"
         )
-    series, _, scale, expansion = power_series(table)
-    record = BinRecord.of(1, expansion.terms, unit=4)
-    packed = as_half(record.pack(series[..., None, :]).reshape(-1, 4))
-    cells = cells_of(expansion, _CELL)
-    share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
-    kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share).ravel()
-    functions = texels(functions_at(expansion, kappa))
-    order_0 = np.zeros((len(kappa), 1, 4))
-    order_0[:, 0, 0] = order_0_power(table, kappa)
-    of_kappa = np.concatenate([functions.reshape(len(kappa), -1, 4), order_0], axis=1)
+    powers = pack_orders(table)
+    expansion = powers.expansion
     return Packed(
         textures=(
-            listed("orders", packed),
-            listed("functions", of_kappa.reshape(-1, 4).astype(np.float32)),
+            listed("orders", as_half(powers.orders.reshape(-1, 4))),
+            listed("functions", powers.factors.reshape(-1, 4)),
         ),
         uniforms={
             "last_order": (table.grid.last[0], table.grid.last[1]),
@@ -121,11 +108,11 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "inverse_taper": table.inverse_taper,
             "interval_length": expansion.length,
             "intervals": expansion.intervals,
-            "cells": cells,
-            "inverse_scale": 1.0 / scale,
+            "cells": powers.cells,
+            "inverse_scale": 1.0 / powers.scale,
             "area_factor": area_factor(table.sigma),
         },
-        definitions={"TEXELS": str(record.stored // 4), "ORDER_0": ""},
+        definitions={"TEXELS": str(powers.texels), "ORDER_0": ""},
     )
 
 

@@ -26,7 +26,6 @@ from .lights import Lamp
 from .methods import vertex_array
 from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
-from .source import display_definitions
 from .surroundings import flat_shapes, pack_flats, pack_obstacles
 from .texels import Packed, Uniform
 
@@ -157,14 +156,13 @@ class ProgressiveLight:
     """Picture that accumulates frames, created by `Renderer.progressive`.
 
     draw : `Renderer.draw_lights` of a method.
-    view : view of pictures for a screen.
     lights : lights to draw instead of the scene's emitters and surroundings.
     shadow_size : texels a side of a shadow map.
     bounces : whether light between surfaces is added to light from the emitters.
     """
 
     def __init__(
-        self, stage: Stage, draw: Callable[..., None], camera: Camera, view: str, *,
+        self, stage: Stage, draw: Callable[..., None], camera: Camera, *,
         lights: Sequence[Lamp] = (), shadow_size: int = SIZE, bounces: bool = False,
     ) -> None:  # fmt: skip
         self._stage, self._draw, self._camera = stage, draw, camera
@@ -172,7 +170,6 @@ class ProgressiveLight:
         bounces = bounces and not lights
         self._looks_up = (stage.looks_up or bounces) and not lights
         self._surroundings = stage.with_bounces() if bounces else stage.extras
-        self._surface: dict[str, float | None] = {}
         context = stage.context
         self._map = ShadowMap(stage.casters, shadow_size)
         self._frame = Target(context, *camera.size)
@@ -181,21 +178,16 @@ class ProgressiveLight:
         self._lights: Iterator[Lamp] = iter(())
         self.restart(camera)
         self._add = ShaderPass(context, "add.frag")
-        shared = ("library.glsl", "formulas")
-        self._mean = ShaderPass(context, "mean.frag", shared, display_definitions(view))
 
     @property
     def frames(self) -> int:
         """Number of frames in the picture."""
         return sum(self._counts)
 
-    def restart(self, camera: Camera | None = None, **surface: float | None) -> None:
-        """Start again, with another camera of the same size or other surfaces.
-
-        surface : `scale` and `coherence_width` of `Renderer.draw`.
-        """
+    def restart(self, camera: Camera | None = None) -> None:
+        """Start again, with another camera of the same size."""
         if camera is not None:
-            self._camera, self._surface = camera, surface
+            self._camera = camera
             self._visible = self._stage.casters.visible(camera)
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
@@ -250,17 +242,8 @@ class ProgressiveLight:
             surface["solid"] = solid
         self._draw(
             self._frame.frame, camera, [light], definitions, uniforms,
-            self._surroundings, each, textures, **self._surface,
+            self._surroundings, each, textures,
         )  # fmt: skip
-
-    def show(self, frame: Any, exposure: float) -> None:
-        """Draw the picture so far into a framebuffer of the same size, exposed, for a screen."""
-        frame.use()
-        first, second = (target.colour for target in self._sums)
-        weights = tuple(1.0 / max(count, 1) for count in self._counts)
-        self._mean.draw(
-            {"weights": weights, "exposure": exposure}, {"first": first, "second": second}
-        )
 
     @property
     def image(self) -> NDArray[np.float32]:
@@ -271,6 +254,6 @@ class ProgressiveLight:
         return np.asarray(total, np.float32)
 
     def release(self) -> None:
-        resources: list[Any] = [self._add, self._mean, self._frame, *self._sums, self._map]
+        resources: list[Any] = [self._add, self._frame, *self._sums, self._map]
         for resource in resources:
             resource.release()

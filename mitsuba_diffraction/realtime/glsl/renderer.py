@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import check_choice, warn
-from ...optics.display import VIEWS
-from ...tables.directional import FINE
+from ...errors import warn
 from .camera import Camera
 from .context import (
     Bindings,
@@ -23,13 +21,13 @@ from .context import (
     set_uniforms,
 )
 from .lights import Lamp
-from .methods import Prepared, window
-from .packing import pack_energy, pack_responses
+from .methods import Prepared
+from .packing import pack_responses
 from .progressive import ProgressiveLight, Stage
 from .scene import RealtimeScene, load, read_scene
 from .shader_materials import pack_conservation, pack_emission, pack_surface
 from .shadows import SIZE
-from .source import LIGHTS, display_definitions
+from .source import LIGHTS
 from .texels import Uniform
 
 Image = NDArray[np.float32]
@@ -52,14 +50,9 @@ class Renderer:
     scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
     context : a moderngl context; by default one without a window, through EGL.
-    view : view of pictures for a screen, one of `optics.display.VIEWS`.
     """
 
-    def __init__(
-        self, scene: Any, *, sensor: int = 0, context: Any = None, view: str = "natural"
-    ) -> None:
-        check_choice("view", view, VIEWS)
-        self.view = view
+    def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
         self._warn([o for o in self.scene.omissions if o not in self.scene.of_light])
@@ -147,34 +140,23 @@ class Renderer:
         frame: Any,
         method: str,
         camera: Camera | None = None,
-        *,
-        exposure: float | None = None,
-        scale: float | None = None,
-        coherence_width: float | None = None,
     ) -> None:
-        """Draw into a framebuffer.
+        """Draw into a framebuffer: linear sRGB and the coverage of each pixel.
 
         Parameters
         ----------
         frame : framebuffer of moderngl with a depth buffer.
         method : one of `source.METHODS`.
         camera : by default the scene's camera.
-        exposure : factor on the light, for a screen by `view`; None leaves the picture linear.
-        scale : height scale of all patches instead of the scene's; see `energy_for`.
-        coherence_width : coherence width of all patches instead of the scene's, µm; not for `fast`
-            and `pq`, whose tables include it.
         """
         definitions = {"LIGHTS_LIT": str(len(self.lights))}
         if np.any(self.sky != 0.0):
             definitions["SKY"] = ""
-        if exposure is not None:
-            definitions |= display_definitions(self.view)
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
         self.draw_lights(
             method, frame, camera or self.camera, self.lights, definitions,
-            {"sky": np.asarray(self.sky, np.float32), "exposure": exposure or 1.0},
-            scale=scale, coherence_width=coherence_width,
+            {"sky": np.asarray(self.sky, np.float32)},
         )  # fmt: skip
 
     def progressive(
@@ -205,7 +187,7 @@ class Renderer:
         resized = camera.resized(*(size or camera.size))
         draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self.stage(), draw, resized, self.view, lights=lights, shadow_size=shadow_size,
+            self.stage(), draw, resized, lights=lights, shadow_size=shadow_size,
             bounces=bounces,
         )  # fmt: skip
 
@@ -226,15 +208,12 @@ class Renderer:
         extras: Sequence[Sequence[Bindings]] = (),
         each: Sequence[dict[str, Uniform]] = (),
         textures: Mapping[str, Any] | None = None,
-        *,
-        scale: float | None = None,
-        coherence_width: float | None = None,
     ) -> None:
         """Draw some lights, or looked-up surroundings, into a framebuffer.
 
         Parameters
         ----------
-        method, frame, camera, scale, coherence_width : as in `draw`.
+        method, frame, camera : as in `draw`.
         lights : lights without extent.
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
         extras, each : further bindings, and uniforms, of each surface.
@@ -271,24 +250,9 @@ class Renderer:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if (diffraction := surface.material.diffraction) is not None:
-                own = diffraction.described.height_scale.number
-                factor = own if scale is None else scale
-                set_uniforms(program, {"height_scale": factor})
-                if coherence_width is not None:
-                    set_uniforms(program, window(prepared.tables[n], coherence_width))
+                scale = diffraction.described.height_scale.number
+                set_uniforms(program, {"height_scale": scale})
             array.render()
-
-    def energy_for(self, scale: float) -> None:
-        """Take what conserves energy at another height scale: a second or so, where it is new."""
-        for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
-            if {"energy", "beneath"}.isdisjoint(own.textures):
-                continue
-            ones = pack_energy([FINE.ones])
-            assert surface.material.diffraction is not None
-            packed = ones | surface.material.diffraction.conservation([scale])
-            for texture in packed.textures:
-                if texture.name in own.textures:
-                    own.textures[texture.name].write(texture.data.tobytes())
 
     def release(self) -> None:
         """Free the graphics card's memory."""

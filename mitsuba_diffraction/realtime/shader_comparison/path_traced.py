@@ -16,7 +16,6 @@ from ..glsl.maps import uploaded
 from .measures import Visibility
 
 _RAYS = 4  # rays along either side of a pixel in `visibility`
-_STEP = 8  # samples per pixel of one pass
 
 
 def direct_light(scene: Any, camera: Camera) -> Any:
@@ -152,34 +151,3 @@ def _lit(scene: Any, si: Any, lights: Sequence[Lamp]) -> NDArray[np.bool_]:
         clear &= ~above | ~scene.ray_test(ray, si.is_valid() & above)
         any_above |= above
     return np.array(si.is_valid() & clear & any_above, bool)
-
-
-class PathTracing:
-    """Path-traced direct light of a scene under some lights (`with_lights`), pass by pass.
-
-    spp : samples per pixel in all passes.
-    """
-
-    def __init__(self, scene: Any, camera: Camera, lights: Sequence[Lamp], spp: int = 64) -> None:
-        self._scene = with_lights(scene, camera, lights)
-        self.spp, self.done = spp, 0
-        self._sum: NDArray[np.float64] = np.zeros((camera.size[1], camera.size[0], 3))
-
-    @property
-    def finished(self) -> bool:
-        """Whether all passes are rendered."""
-        return self.done >= self.spp
-
-    def advance(self) -> None:
-        """Render one pass."""
-        import mitsuba as mi
-
-        spp = min(_STEP, self.spp - self.done)
-        image = mi.render(self._scene, spp=spp, seed=self.done)
-        self._sum += spp * np.array(image, np.float64)[..., :3]
-        self.done += spp
-
-    @property
-    def image(self) -> NDArray[np.float32]:
-        """Mean of the passes so far, (height, width, 3), linear sRGB."""
-        return (self._sum / max(self.done, 1)).astype(np.float32)

@@ -8,34 +8,12 @@ from pathlib import Path
 import pytest
 
 from mitsuba_diffraction.cli import main
-
-SCENE = """<scene version="3.0.0">
-    <sensor type="perspective"/>
-    <shape type="rectangle">
-        {bsdf}
-    </shape>
-    <emitter type="directional"><vector name="direction" value="0.2, 0, -1"/></emitter>
-</scene>"""
-SKIN = """<bsdf type="diffraction">
-    <string name="heightfield" value="grating.toml"/>
-    <float name="coherence_width" value="4"/>
-    <boolean name="energy_conserving" value="false"/>
-</bsdf>"""
-GRATING = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.06\nperiods = 3\n'
-
-
-@pytest.fixture(autouse=True)
-def _few_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trace little light between surfaces, of which a plate alone has none."""
-    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 8)
+from tests.support.plate import SCENE, plate_file
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    (tmp_path / "grating.toml").write_text(GRATING)
-    file = tmp_path / "plate.xml"
-    file.write_text(SCENE.format(bsdf=SKIN))
-    return file
+    return plate_file(tmp_path)
 
 
 def test_a_page_is_written_and_its_loss_is_named(

@@ -19,8 +19,8 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.realtime.glsl.context import Bindings, compile_program, compiler_words
-from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method, window
+from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
+from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_beneath,
@@ -124,7 +124,7 @@ def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable)
 
 def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
     table = DiffractionTable.build(SMALL_SCAN)
-    assert table.order_0_ratio > 100.0
+    assert table.order_0_ratio > 40.0  # of areas: the light is coherent over 65 µm
     at = places(600)
     # many in the lobe of the light, 0.3° wide
     at[::2, :2] = np.random.default_rng(3).normal(0.0, 0.006, (300, 2))
@@ -138,9 +138,6 @@ def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
         found = probed(gl, method, packed | PERFECT, at)
         for part in (slice(0, None, 2), slice(1, None, 2)):
             assert difference(found[part], expected[part]) < bound, method
-    wider = window(Bindings(gl, pack_powers(table)), 130.0)
-    assert wider["sigma"] == pytest.approx(table.sigma)
-    assert wider["order_0_ratio"] == pytest.approx((130.0 / table.window_width) ** 2)
 
 
 def test_exact_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:

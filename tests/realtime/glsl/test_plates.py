@@ -31,22 +31,18 @@ def test_what_lies_beneath_gets_the_light_that_the_table_leaves(
     skin = {"type": "diffraction", "table": str(table_file), "int_ior": 2.5, "orientation": 25.0}
     plate = mi.load_dict({**skin, "nested": white})
     wo = np.array([-0.6, 0.64, 0.48])
-    drawn = pigment_of(gl, plate, wo, 1.25)
     parameters = mi.traverse(plate)
     parameters["height_scale"] = 1.25
     parameters.update()
+    drawn = pigment_of(gl, plate, wo)
     np.testing.assert_allclose(drawn, beneath(plate, wo), rtol=4e-4)  # half floats
     flat = np.prod([1.0 - reflectance(cos, 2.5 / 1.000277) for cos in (wo[2], VIEW[2])])
     assert np.abs(drawn / (wo[2] / np.pi * flat) - 1.0).min() > 4e-3
 
 
-def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
-    """What a plate's shader adds for a white pigment beneath, over the light's irradiance.
-
-    scale : height scale, set when the plate's own has been packed.
-    """
+def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a plate's shader adds for a white pigment beneath, over the light's irradiance."""
     made = Renderer(mi.load_dict(under_a_sun(plate, wo)), context=gl)
-    made.energy_for(scale)
     (surface,), (buffer,) = made.scene.surfaces, made.buffers
     vertices, pictures = surface.vertices.copy(), []
     for pigment in (1.0, 0.0):

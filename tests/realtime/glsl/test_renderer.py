@@ -20,7 +20,6 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     visibility,
     with_lights,
 )
-from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 
 pytestmark = pytest.mark.thorough
 
@@ -145,39 +144,6 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
             # where light is concentrated, 2048 samples of it still scatter by 2 %
             bias = drawn[one, :3].sum() / reference[one].sum()
             assert bias == pytest.approx(1.0, abs=0.06)
-
-
-def test_another_height_scale_has_its_own_energy(
-    gl: Any, some_variant: str, table_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plate = mi.load_dict({"type": "diffraction", "table": str(table_file)})
-    # the real ones take seconds; light is multiplied by them twice, for both directions
-    shape = (FINE.polar + 1, FINE.azimuthal)
-    scales = {1.0: 1.0, 1.1: 1.0, 1.4: 0.5}
-    monkeypatch.setattr(
-        type(plate.energy),
-        "scale",
-        lambda self, scale: DirectionalTable(
-            np.array([360.0, 830.0]), np.full((2, *shape), scales[scale], np.float32)
-        ),
-    )
-    scene = {
-        "type": "scene",
-        "sensor": sensor(24, 16),
-        "plate": {"type": "rectangle", "bsdf": plate},
-        "sun": {"type": "directional", "direction": [0.0, -1.0, -0.8]},
-    }
-    made = Renderer(mi.load_dict(scene), context=gl)
-    frame = made.target(24, 16)
-    pictures = []
-    for scale in (1.1, 1.4):
-        made.energy_for(scale)
-        made.draw(frame.frame, "fast")
-        pictures.append(np.frombuffer(frame.frame.read(components=3, dtype="f4"), np.float32))
-    assert pictures[0].max() > 0.0
-    np.testing.assert_allclose(pictures[0], 4.0 * pictures[1], rtol=1e-5)
-    for thing in (frame, made):
-        thing.release()
 
 
 def test_all_that_is_not_shown_is_named_in_warnings(

@@ -26,7 +26,6 @@ uniform vec3 emission;            // radiance, on the side that the normal point
 uniform mat3 pigment_in_light;    // from a pigment's colour to its colour under this light
 uniform float light_density;      // `lights.Light.density`
 uniform bool solid;               // closed surface, seen from outside: rays inwards are blocked
-uniform float exposure;           // factor, for a display
 
 out vec4 fragment;
 
@@ -240,9 +239,6 @@ void main()
 #endif
     radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
 #endif
-#endif
-#ifdef DISPLAYED
-    radiance = displayed(radiance * exposure);
 #endif
     fragment = vec4(radiance, 1.0);
 }
