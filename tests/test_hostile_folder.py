@@ -35,7 +35,7 @@ DONE = [
     ["spectrum", *_TABLE, *_METAL, "--light", "30", "--detector", "0", "--step", "100", "-o",
      "out/spectrum.csv"],
     ["evaluate", *_TABLE, "--coherence-width", "12", "--periodic", "exact", *_METAL, "--step", "40",
-     "--angle-step", "0.5", "--windows", "0", "-o", "out/bands.png"],
+     "--angle-step", "0.5", "--positions", "0", "-o", "out/bands.png"],
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
      "100", "--no-compiled", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],

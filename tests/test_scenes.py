@@ -67,7 +67,7 @@ def test_its_table_has_solved_orders(name: str) -> None:
 
 
 def test_heights_for_a_scene_of_solved_orders_have_a_way() -> None:
-    with pytest.raises(DiffractionError, match="--material ID=FILE"):
+    with pytest.raises(DiffractionError, match="--assign ID=FILE"):
         check_parameters(SCENES / "cd.xml", {"patch": "scan.png"})
 
 

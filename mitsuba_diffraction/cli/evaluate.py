@@ -60,7 +60,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         coherence="ensemble for spectral, patch for the thesis' own methods",
     )
     options.add_option(
-        group, "--windows N", "window positions whose own periods are fitted, for the spread; 0 "
+        group, "--positions N", "window positions whose own periods are fitted, for the spread; 0 "
         "leaves them out", whole_number(0), 32, {"dest": "positions"},
     )  # fmt: skip
     group = parser.add_argument_group("the surface; methods other than spectral have R = 1")

@@ -1,4 +1,4 @@
-"""`mitsuba-diffraction orders`: efficiencies of a table's orders as a CSV."""
+"""`mitsuba-diffraction orders`: efficiencies and Jones matrices of a table's orders."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "of s and of p light; a thin sheet also has the transmitted shares. "
         "'solve --import' reads the file back.",
         ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
-        ("-o --output OUT", "the CSV; default: TABLE's name with .csv in the current folder",
-         options.path_ending_in(".csv")),
+        ("-o --output OUT", "the CSV, or NetCDF (.nc); default: TABLE's name with .csv in the "
+         "current folder", options.path_ending_in(".csv", ".nc")),
     )  # fmt: skip
     group = parser.add_argument_group(
         "the light", "Values, or FIRST:LAST:STEP, several joined by commas."
@@ -41,9 +41,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
             5.0,
         ),
     )
-    options.add_option(
-        group, "--polarised", "shares of s and of p light; default: both are the share of "
-        "unpolarised light", bool,
+    options.add_options(
+        group.add_mutually_exclusive_group(),
+        ("--polarised", "shares of s and of p light; default: both are the share of unpolarised "
+         "light", bool),
+        ("--jones", "Jones matrices about s and p, of a table of 'solve --polarised', for ray "
+         "tracers; J_ss is real", bool),
     )  # fmt: skip
     options.add_json(parser, "the lines")
 
@@ -61,10 +64,13 @@ def run(args: argparse.Namespace) -> Figures:
     low, high = table.wavelengths
     steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)
     wavelengths = args.wavelength or np.linspace(low, high, steps + 1)
-    listing = list_orders(table, wavelengths, args.theta, args.phi, polarised=args.polarised)
+    listing = list_orders(
+        table, wavelengths, args.theta, args.phi, polarised=args.polarised, jones=args.jones
+    )
     listing.save(output)
     rows = listing.rows
     light = "s and p" if args.polarised else "unpolarised light"
+    light = "Jones matrices" if args.jones else light
     print(
         f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
         f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"

@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> Figures:
             recipe, comment = recipe_of(table, str(args.scene))
             recipe.save(file, comment)
         names = " ".join(map(str, files))
-        surfaces = "".join(f" --material {name}={text}" for name, text in args.materials)
+        surfaces = "".join(f" --assign {name}={text}" for name, text in args.materials)
         print(f"{names}: for mitsuba-diffraction render {args.scene}{surfaces} --plan {names}")
     return report
 

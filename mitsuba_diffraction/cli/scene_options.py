@@ -49,7 +49,7 @@ SCENE = (
     ("--preset [ID=]NAME[,NAME=VALUE...]", "instead of --patch: a named look, e.g. cd or "
      "snake,height_scale=0.7, which 'mitsuba-diffraction presets' lists; of a scene, the look of "
      f"the BSDF or shape of this id; default of ID: {SURFACE}", [str], None, {"dest": "presets"}),
-    ("--material ID=FILE[,NAME=VALUE...]", "put a surface on the BSDF or shape of this id, e.g. "
+    ("--assign ID=FILE[,NAME=VALUE...]", "put a surface on the BSDF or shape of this id, e.g. "
      "mat-Skin=scale.exr,int_ior=1.56; the scene's BSDF there lies beneath it, unless `material` "
      "names a conductor; may be given several times", [definition], None, {"dest": "materials"}),
     MODE,
@@ -60,7 +60,7 @@ SCENE = (
 
 
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
-    """Return the values of -D, --material and --preset, as `load_scene` takes them.
+    """Return the values of -D, --assign and --preset, as `load_scene` takes them.
 
     A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
     """
@@ -75,7 +75,7 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     ids = [name for name, _ in surfaces]
     for name in ids:
         if ids.count(name) > 1:
-            args.parser.error(f"argument --material, --preset: {name!r} is given more than once")
+            args.parser.error(f"argument --assign, --preset: {name!r} is given more than once")
     return parameters | {MATERIAL + name: value for name, value in surfaces}
 
 
@@ -126,7 +126,7 @@ def put_on_stage(args: argparse.Namespace) -> None:
         if args.patch is not None:
             args.parser.error(
                 f"argument --patch: is for a mesh ({', '.join(MESHES)}); for '{args.scene}' use "
-                "--material ID=FILE"
+                "--assign ID=FILE"
             )
         return
     if (args.patch is None) == (not args.presets):

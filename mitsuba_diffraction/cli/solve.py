@@ -63,7 +63,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--depth H", "µm, of a generator", number_between(0, 100)),
         ("--duty F", "ridge, lamellar", number_between(0, 1)),
         ("--direction", "towards +x, blazed", ("descending", "ascending")),
-        ("--material M", "conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, or none "
+        ("--material M", "conductor that Mitsuba knows, index such as 1.5 or 0.65+5.6i, a file of "
+         "refractiveindex.info (.csv, .yml), a glass of a catalogue (schott.agf:N-BK7), or none "
          "(reflects all); default: Al"),
         ("--superstrate N", "index of the clear medium above the grooves, e.g. 1.58 under "
          "polycarbonate; default: 1", number_between(1, 5)),
@@ -107,7 +108,13 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> Figures:
-    """Solve, write the table, and return the figures."""
+    """Solve, write the table, and return the figures.
+
+    A table that misses its tolerance is written, and the exit code is 1.
+    """
+    from ..orders.file import load_orders
+    from ..orders.solve.accuracy import missed_tolerance
+
     source = Path(args.source)
     output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
@@ -129,6 +136,11 @@ def run(args: argparse.Namespace) -> Figures:
             output.parent.mkdir(parents=True, exist_ok=True)
         table = solve_recipe(recipe, args)
     table.save(output)
+    measured, table = table.digest(), load_orders(output)
+    if table.digest() != measured:
+        raise DiffractionError(f"'{output}' is not what was solved; is the disk damaged?")
+    if missed_tolerance(table.header):
+        args.code = 1
     print(f"{args.source} -> {output}")
     for label, text in _report(table, output):
         print(f"  {label:<11} {text}")
@@ -190,10 +202,11 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     with executor_for(args) as (executor, processes), Bar(args, " stations") as bar:
 
         def announce(estimate: Estimate) -> None:
+            size = f" for a table of {estimate.size / 1e6:.2g} MB" if estimate.size else ""
             say(
                 f"{estimate.stage}: {estimate.solutions} solutions at {estimate.stations} "
-                f"stations, about {_time(estimate.seconds / processes)}; results are kept in "
-                f"'{folder}'{limits}"
+                f"stations, about {_time(estimate.seconds / processes)}{size}; results are kept "
+                f"in '{folder}'{limits}"
             )
 
         table = solve_orders(

@@ -8,7 +8,7 @@ import re
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..scene.load import set_variant
@@ -18,6 +18,9 @@ from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, elapsed, output_name, save_figure
+
+if TYPE_CHECKING:
+    from ..analysis.spectra import Spectra
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -131,12 +134,15 @@ def run(args: argparse.Namespace) -> Figures:
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         measurement = Measurement(args, geometry, lam, bar)
-        measured = {
-            name: [spectra for file in members for spectra in measurement.of_file(file)]
-            for name, members in groups.items()
-        }
+        measured = _measured(measurement, groups)
+    if any(len(groups[name]) > len(kept) for name, (kept, _) in measured.items()):
+        args.code = 1
+    groups = {name: kept for name, (kept, _) in measured.items()}
+    files = [file for members in groups.values() for file in members]
     measurement.say_notes()
-    everything = files_of_spectra.on_common_wavelengths(measured)
+    everything = files_of_spectra.on_common_wavelengths(
+        {name: parts for name, (_, parts) in measured.items()}
+    )
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} nm on, where every table begins")
@@ -175,6 +181,31 @@ def run(args: argparse.Namespace) -> Figures:
             "detectors": shown.geometry.detectors,
             "acceptance": args.acceptance, "relative": args.relative,
             "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
+
+
+def _measured(
+    measurement: Measurement, groups: dict[str, list[Path]]
+) -> dict[str, tuple[list[Path], list[Spectra]]]:
+    """Measure the spectra of each group; return the files that could be measured, and spectra.
+
+    A file among several that cannot be is said and left out.
+
+    Raises a DiffractionError if no file of a group can be measured.
+    """
+    measured = {}
+    for name, members in groups.items():
+        kept: list[Path] = []
+        spectra: list[Spectra] = []
+        for file in members:
+            try:
+                spectra += measurement.of_file(file)
+                kept.append(file)
+            except DiffractionError as error:
+                if file is members[-1] and not kept:
+                    raise
+                say(f"left out: {error}")
+        measured[name] = kept, spectra
+    return measured
 
 
 def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]:

@@ -11,34 +11,52 @@ from .console import say
 #: Options whose values are a range FIRST:LAST, and were two numbers or "FIRST,LAST".
 _RANGES = ("--wavelength-range", "--angles")
 _COMMA = re.compile(r"([-+\d.eE]+),([-+\d.eE]+)$")
+# Commands that put surfaces on the ids of a scene.
+_SCENES = ("render", "plan", "view", "compare", "export-viewer")
+#: Names of options by their earlier names, with the commands that they are renamed in.
+NAMES = {
+    "--look": ("--finish", ("render",)),
+    "--view": ("--tonemap", ("render", "tonemap", *_SCENES)),
+    "--windows": ("--positions", ("evaluate",)),
+    "--turn": ("--rotate", ("tangents",)),
+    "--material": ("--assign", _SCENES),
+}
 
 
 def current(argv: Sequence[str]) -> list[str]:
     """Return a command line in current spellings; print a line for each that is replaced."""
     words: list[str] = []
     rest = list(argv)
+    command = next((word for word in rest if not word.startswith("-")), "")
     while rest:
         word = rest.pop(0)
         name, equals, value = word.partition("=")
-        if name not in _RANGES:
+        if name in _RANGES:
+            words += _range(name, value if equals else None, rest)
+        elif name in NAMES and command in NAMES[name][1]:
+            words.append(f"{NAMES[name][0]}{equals}{value}")
+            say(f"{name} is now {NAMES[name][0]}")
+        else:
             words.append(word)
-            continue
-        if not equals and rest:
-            value = rest.pop(0)
-        old = f"{name} {value}"
-        if pair := _COMMA.match(value):
-            value = f"{pair[1]}:{pair[2]}"
-        elif _is_number(value) and rest and _is_number(rest[0]):
-            last = rest.pop(0)
-            old, value = f"{old} {last}", f"{value}:{last}"
-        elif not equals and not value:
-            words.append(name)  # the parser says what is missing
-            continue
-        # one word: the value may begin with a minus
-        words.append(f"{name}={value}")
-        if old != f"{name} {value}":
-            say(f"'{old}' is now '{name} {value}'")
     return words
+
+
+def _range(name: str, value: str | None, rest: list[str]) -> list[str]:
+    """Return the words of a range; takes its values from the words that follow."""
+    given = value is not None
+    if value is None:
+        if not rest:
+            return [name]  # the parser says what is missing
+        value = rest.pop(0)
+    old = f"{name} {value}"
+    if pair := _COMMA.match(value):
+        value = f"{pair[1]}:{pair[2]}"
+    elif not given and _is_number(value) and rest and _is_number(rest[0]):
+        last = rest.pop(0)
+        old, value = f"{old} {last}", f"{value}:{last}"
+    if old != f"{name} {value}":
+        say(f"'{old}' is now '{name} {value}'")
+    return [f"{name}={value}"]  # one word: the value may begin with a minus
 
 
 def _is_number(text: str) -> bool:

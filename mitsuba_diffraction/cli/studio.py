@@ -16,7 +16,7 @@ from ..scene.pictures import check_panorama
 from ..scene.stage import STUDIO
 from .options import number_between
 
-#: Materials of --look: parameters of the BSDF, that which --base sets, and its default.
+#: Materials of --finish: parameters of the BSDF, that which --base sets, and its default.
 LOOKS: dict[str, tuple[dict[str, str], str, str]] = {
     "metal": ({}, "material", "Al"),
     "coated": ({"coat_ior": "1.5"}, "material", "Al"),
@@ -41,7 +41,7 @@ STUDIO_OPTIONS = (
     ("--env FILE", "panorama (HDR, EXR) that lights the scene instead of lamps"),
     ("--sun AZ,EL", "sun at this azimuth and elevation in degrees, azimuth 0 to the right and 90 "
      "away from the camera; with a clear sky, or beside --env", _angles),
-    ("--look", "material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
+    ("--finish", "material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
      "default: metal, or skin with a --base that is a colour", tuple(LOOKS)),
     ("--base COLOUR|FILE|METAL", "pigment of a skin: 'r,g,b', '#804020', sienna, a picture (by the "
      "mesh's texture coordinates) or the mesh's .glb, for its base colour; or name of the metal, "
@@ -92,18 +92,18 @@ def take_studio(args: argparse.Namespace) -> None:
 
 
 def _material(args: argparse.Namespace) -> dict[str, str]:
-    """Return the parameters of --look and --base."""
-    if args.look is None and args.base is None:
+    """Return the parameters of --finish and --base."""
+    if args.finish is None and args.base is None:
         return {}
     if args.patch is None:
-        args.parser.error("--look and --base are for a mesh with --patch; a preset has its "
+        args.parser.error("--finish and --base are for a mesh with --patch; a preset has its "
                           "material: --preset cd,pigment=sienna")  # fmt: skip
-    look = args.look or ("metal" if _is_metal(args.base) else "skin")
+    look = args.finish or ("metal" if _is_metal(args.base) else "skin")
     values, name, default = LOOKS[look]
     if name == "material" and args.base is not None and not _is_metal(args.base):
         raise DiffractionError(
-            f"--base {quoted(args.base)} is not a metal, which --look {look} needs, e.g. gold or "
-            "Cr; a colour or a picture is for --look skin"
+            f"--base {quoted(args.base)} is not a metal, which --finish {look} needs, e.g. gold or "
+            "Cr; a colour or a picture is for --finish skin"
         )
     return {**values, name: args.base or default}
 

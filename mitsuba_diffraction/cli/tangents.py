@@ -29,7 +29,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
         ("--along", "smooth: the field that turns least; x, y, z: that axis, laid onto the "
          "surface; body: from one end of the body to the other", _GUIDES, "smooth"),
-        ("--turn DEGREES", "angle from the field to the patch's x axis, counter-clockwise seen "
+        ("--rotate DEGREES", "angle from the field to the patch's x axis, counter-clockwise seen "
          "from outside, e.g. -90 to lay its y axis along the field",
          number_between(-360, 360), 0.0),
         ("--smoothing S", "distance within which the field may leave an axis or the body's "
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> Figures:
         positions, normals, uv, faces = load_mesh(args.mesh)
         bar(0, 0, "solving for the field")
         field = direction_field(positions, normals, faces, args.along, smoothing=args.smoothing)
-        directions = turned(field.directions, normals, args.turn)
+        directions = turned(field.directions, normals, args.rotate)
         mesh = oriented_mesh(positions, normals, faces, directions, uv)
         bar(0, 0, "writing")
         write_ply(args.output, mesh, f"{args.mesh.name}, patch along {args.along}")

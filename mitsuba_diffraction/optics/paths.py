@@ -21,7 +21,7 @@ from .blend import Real
 from .boundary import Direction, Heights, Jones
 from .coat import cosine_within, crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
-from .mirror import horizon_correction, mirror, mirror_cosine
+from .mirror import correction_within, horizon_correction, mirror, mirror_cosine, outside_square
 from .stack import Stacked
 
 
@@ -50,6 +50,15 @@ class Side:
     def beyond_face(self) -> bool:
         """Whether directions lie beyond the flat face of a sheet or a coat."""
         return self.index != self.at_structure
+
+    @property
+    def critical_sine(self) -> float:
+        """Sine of the critical angle, beyond which light stays on its side; 1 without one."""
+        return 1.0 / self.index
+
+    def outside(self, cosine: Real) -> Real:
+        """Return the squared cosine above the surface, below 0 beyond the critical angle."""
+        return np.asarray(outside_square(cosine, self.index))
 
     def normal(self, cosine: Real) -> Real:
         """Return q of directions by their cosine to the normal."""
@@ -156,42 +165,49 @@ class Path:
         pair = boundary.geometry(wi, wo)
         return pair, model.jones(pair, self.index, heights)
 
-    def flat_transmittance(self, cos_i: Real, cos_o: Real) -> Real:
-        """Return G of order 0 that is let through: the flat surface's at both directions."""
-        n = self._real
-        outer = [
-            cosine
-            if self.thin or not side.number  # else measured in the dielectric
-            else np.sqrt(np.maximum(1.0 - n**2 * (1.0 - cosine**2), 0.0))
-            for cosine, side in ((cos_i, self.came), (cos_o, self.left))
-        ]
-        came, left = (through.flat_transmittances(cosine, n, self.thin) for cosine in outer)
-        return 0.5 * (np.sqrt(came[0] * left[0]) + np.sqrt(came[1] * left[1]))
-
     def mirrored(
         self, cos_i: Real, cos_o: Real, cos_turn: Real | float, k: float, sigma_0: float
     ) -> tuple[Real, Real]:
-        """Return G of order 0 that is reflected, and of the flat face of a sheet or a coat.
+        """Return G of order 0, and of the flat face of a sheet or a coat.
 
         k : 2π/λ in the medium above, rad/µm.
-        sigma_0 : σ₀ times the optical index of the medium that directions are measured in, µm.
+        sigma_0 : of the lobe's window, µm.
         """
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
-        visible = horizon_correction(sigma_0 * cos_i**2, sigma_0 * cos_o**2, k)
+        into, out = self.came.outside(cos_i), self.left.outside(cos_o)
+        leaves = (into > 0.0) & (out > 0.0)
+        above_i, above_o = np.sqrt(np.maximum(into, 0.0)), np.sqrt(np.maximum(out, 0.0))
+        if self.let_through:
+            visible = leaves * horizon_correction(sigma_0 * above_i**2, sigma_0 * above_o**2, k)
+        else:
+            visible = correction_within(cos_i, cos_o, self.left.index, sigma_0, k)
         none = np.zeros_like(visible)
-        if self.index is None:
-            return visible, none
-        wi, wo = directions(cos_i, cos_o, cos_turn)
-        pair, n = boundary.geometry(wi, wo), np.asarray(self.came.at_structure)
-        cosine = mirror_cosine(pair.cos_half, cos_i, cos_o, np.asarray(k * sigma_0))
+        wi, wo = directions(above_i, above_o, cos_turn)
+        half = boundary.geometry(wi, wo).cos_half
+        cosine = mirror_cosine(half, above_i, above_o, np.asarray(k * sigma_0))
+        if self.let_through:
+            return visible * self._passed(cosine), none
         if not self.thin:
-            return visible * reflectance(cosine, self.index), none
+            return visible * np.where(leaves, self._flat(cosine), 1.0), none
+        n = np.asarray(self.came.at_structure)
         face = visible * reflectance(cosine, n)
         inside = boundary.geometry(refracted(wi, n), refracted(wo, n))
         ends = (crossing(direction[2], n) for direction in (wi, wo))
+        assert self.index is not None
         facet = mirror(inside, cosine_within(cosine, n), self.index)
         share = visible * boundary.power(transmitted(facet, inside, self.index, *ends))
         return share, face
+
+    def _flat(self, cosine: Real) -> Real | float:
+        """Return the flat surface's reflectance by the cosine above it, the same from below."""
+        if self.index is None:
+            return 1.0
+        return reflectance(cosine, self.left.index if self.left.below else self.index)
+
+    def _passed(self, cosine: Real) -> Real:
+        """Return the flat surface's transmittance by the cosine above it."""
+        passed = through.flat_transmittances(cosine, self._real, self.thin)
+        return np.asarray(0.5 * sum(passed))
 
     @property
     def _real(self) -> float:
@@ -229,8 +245,5 @@ class Returned(Path):
             shares.append(0.5 * sum(t * (1.0 - t) / (2.0 - t) for t in passed))
         return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)
 
-    def mirrored(
-        self, cos_i: Real, cos_o: Real, cos_turn: Real | float, k: float, sigma_0: float
-    ) -> tuple[Real, Real]:
-        share = self.common(cos_i, cos_o, cos_turn)
-        return share, np.zeros_like(share)
+    def _flat(self, cosine: Real) -> Real:
+        return self.common(cosine, cosine, 0.0)

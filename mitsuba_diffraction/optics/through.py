@@ -10,12 +10,12 @@ transmittance as κh → 0. f/n² is the same for reversed light.
 
 As w → 0 the power of all orders but order 0 vanishes. In the lobe of order 0 N/w² has no bound,
 although the heights do not decide how a flat interface transmits a lobe of some width. Order 0
-therefore has the flat transmittances of both directions:
+therefore has what the mirror's lobe of `mirror` leaves, of both directions above the surface:
 
-    f_0 = n² · 4πσ²/λ² · N_0 |a_0(κ)|² exp(−σ²q²),
+    f_0 = n² · 4πσ²/λ² · N_0 |a_0(κ)|² C(X_i) C(X_o) exp(−σ²q²),
 
-with N_0 of `order_0`, the geometric mean over both directions. In the middle of the lobe it equals
-4 cosθi n cosθt N/w²; elsewhere it is finite.
+with N_0 of `order_0`, the flat surface's transmittance at θm: N_0 and the reflectance there add up
+to 1. In the middle of the lobe it equals 4 cosθi n cosθt N/w²; elsewhere it is finite.
 
 - Small slope: first-order perturbation (Rice 1951; Voronovich 1985), from the fields that light
   along ωi and reversed light along ωo make at the flat interface, as in `boundary.small_slope`.
@@ -115,21 +115,20 @@ MODELS: dict[str, Formula] = {
 }
 
 
-def order_0(geometry: Geometry, came: Powers, left: Powers) -> Jones:
-    """Return the matrix of order 0, whose mean power is N_0.
+def order_0(geometry: Geometry, passed: Powers) -> Jones:
+    """Return the matrix of order 0, whose mean power is that of both transmittances.
 
-    The entries are products of √√T of either direction and polarisation, turned from one plane of
-    incidence to the other. The matrix is symmetric, and √T in the refracted direction.
+    It is diag(√T_s, √T_p) between two turns, each by half of the angle from one plane of incidence
+    to the other.
 
-    came, left : `flat_transmittances` of ωi and of ωo.
+    passed : `flat_transmittances` at θm (`mirror`).
     """
-    xp = of(*came, *left)
-    # at the critical angle and beyond, the root's derivative would be infinite
-    (s_in, p_in), (s_out, p_out) = (
-        [xp.sqrt(xp.sqrt(xp.maximum(t, 1e-14))) for t in end] for end in (came, left)
-    )
-    dot, cross = geometry.dot, geometry.cross
-    return s_out * s_in * dot, -(s_out * p_in * cross), p_out * s_in * cross, p_out * p_in * dot
+    xp = of(*passed)
+    # beyond the critical angle the root's derivative would be infinite
+    s, p = (xp.sqrt(xp.maximum(t, 1e-14)) for t in passed)
+    both, more = 0.5 * (s + p), 0.5 * (s - p)
+    turned = both * geometry.dot
+    return turned + more, -(both * geometry.cross), both * geometry.cross, turned - more
 
 
 def flat_transmittances(cosine: Number, n: Number, thin: bool) -> Powers:

@@ -22,7 +22,7 @@ solve          solvers: from a profile to a table
 
 from __future__ import annotations
 
-from .efficiency import efficiency, groove_efficiency, mueller, polarised_efficiency
+from .efficiency import efficiency, groove_efficiency, jones, mueller, polarised_efficiency
 from .file import load_orders, save_orders
 from .table import Band, CellResponse, ListedResponse, OrderTable
 
@@ -33,5 +33,6 @@ OrderTable.efficiency = efficiency
 OrderTable.polarised_efficiency = polarised_efficiency
 OrderTable.groove_efficiency = groove_efficiency
 OrderTable.mueller = mueller
+OrderTable.jones = jones
 OrderTable.load = staticmethod(load_orders)
 OrderTable.save = save_orders

@@ -14,7 +14,7 @@ from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
-from .polarised import nearest_pure
+from .polarised import nearest_jones, nearest_pure, s_and_p
 from .table import ALONG, LINEAR, UNPOLARISED, ListedResponse, OrderTable
 
 #: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
@@ -186,14 +186,54 @@ def mueller(
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    if not table.polarised:
+    return nearest_pure(*_matrices(_Light(table, x, y, wavelength, order, order_y)))
+
+
+def jones(
+    table: OrderTable,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength: ArrayLike,
+    order: ArrayLike,
+    order_y: ArrayLike = 0,
+) -> NDArray[np.complex128]:
+    """Return the Jones matrices of an order about s and p, (…, 2, 2), as ray tracers take them.
+
+    E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
+    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d (`polarised.s_and_p`). Tables
+    lack the common phase of an order, which depends on where the grooves lie: J_ss is real, or
+    J_pp where there is no J_ss. Arguments as for `efficiency`.
+
+    Raises a DiffractionError if the table has no Mueller matrices.
+    """
+    light = _Light(table, x, y, wavelength, order, order_y)
+    of_grooves = nearest_jones(*_matrices(light))
+    x, y, lam, m_x, m_y = np.broadcast_arrays(
+        *(np.asarray(part, np.float64) for part in (x, y, wavelength, order, order_y))
+    )
+    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
+    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
+    leaving = tuple(part + shift for part, shift in zip((x, y), shifts, strict=True))
+    towards, away = (
+        np.stack([a, b, side * np.sqrt(np.maximum(1.0 - a * a - b * b, 0.0))], axis=-1)
+        for (a, b), side in (((x, y), -1.0), (leaving, 1.0))
+    )
+    found = s_and_p(of_grooves, towards, away)
+    size = np.abs(found[..., 0, 0])
+    reference = np.where(size > 1e-9, found[..., 0, 0], found[..., 1, 1])
+    phase = np.exp(-1j * np.angle(reference))
+    return np.asarray(found * phase[..., None, None])
+
+
+def _matrices(light: _Light) -> tuple[Array, Array]:
+    """Return the interpolated Mueller matrices (…, 4, 4) of an order, and its efficiency."""
+    if not light.table.polarised:
         raise DiffractionError(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    elements = _elements(_Light(table, x, y, wavelength, order, order_y))
-    matrices = elements.reshape(*elements.shape[:-1], 4, 4)
-    return nearest_pure(matrices, efficiency(table, x, y, wavelength, order, order_y))
+    elements = _elements(light)
+    return elements.reshape(*elements.shape[:-1], 4, 4), efficiency(*light[:6])
 
 
 class _Placed(NamedTuple):

@@ -1,4 +1,7 @@
-"""Efficiencies of a table's orders as the lines of a CSV, which `read_orders` reads back."""
+"""Efficiencies and Jones matrices of a table's orders as lines of a CSV, or as NetCDF.
+
+`read_orders` reads efficiencies back.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.io import netcdf_file
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import MIN_ANGLE
-from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
+from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
 from .table import ListedResponse, OrderTable, orders_between
 
+#: Columns of Jones matrices: real and imaginary part, named by leaving and incident polarisation.
+JONES = tuple(f"J_{pair}_{part}" for pair in ("ss", "sp", "ps", "pp") for part in ("re", "im"))
 #: Lines at most: what `efficiencies` reads.
 _MOST_LINES = 2_000_000
 #: Squared cosine of an order below which it is not listed: rounding.
@@ -29,8 +35,8 @@ class Listing(NamedTuple):
     Attributes
     ----------
     columns : names of the numbers: wavelength, θ, φ, order (of a crossed grating two), then shares
-        of s and of p light.
-    rows : (n, 6), or (n, 8) of a thin sheet, (n, 7) of a crossed grating.
+        of s and of p light, or the elements of Jones matrices, `JONES`.
+    rows : (n, columns), a line for each order that propagates.
     """
 
     columns: tuple[str, ...]
@@ -44,16 +50,39 @@ class Listing(NamedTuple):
         return f"orders ({low}) to ({high})" if len(ends) > 1 else f"orders {low} to {high}"
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a CSV; numbers have 7 digits.
+        """Write a CSV, whose numbers have 7 digits, or NetCDF (.nc), as `lists` has them.
 
-        Raises a DiffractionError if the file cannot be written; no half-written file is left.
+        Raises a DiffractionError if the file cannot be written, or NetCDF is asked for of a crossed
+        grating; no half-written file is left.
         """
+        if Path(path).suffix == ".nc":
+            self._save_netcdf(Path(path))
+            return
         numbers = ["%d" if name.startswith("order") else "%.7g" for name in self.columns[3:]]
         with atomic_path(Path(path)) as temporary:
             np.savetxt(
                 temporary, self.rows, ["%.9g", "%.9g", "%.9g", *numbers], ",",
                 header=",".join(self.columns), comments="", encoding="utf-8",
             )  # fmt: skip
+
+    def _save_netcdf(self, path: Path) -> None:
+        """Write the numbers over wavelength, theta, phi and order; NaN where none propagates."""
+        if PAIR[0] in self.columns:
+            raise DiffractionError(f"{path}: orders of a crossed grating are written as CSV (.csv)")
+        axes, places = zip(
+            *(np.unique(column, return_inverse=True) for column in self.rows.T[:4]), strict=True
+        )
+        with atomic_path(path) as temporary, netcdf_file(str(temporary), "w") as file:
+            for name, unit, along in zip(
+                AXES, ("nm", "degrees", "degrees", "1"), axes, strict=True
+            ):
+                file.createDimension(name, len(along))
+                variable = file.createVariable(name, "d", (name,))
+                variable[:], variable.units = along, unit
+            for name, column in zip(self.columns[4:], self.rows.T[4:], strict=True):
+                values = np.full([len(along) for along in axes], np.nan)
+                values[places] = column
+                file.createVariable(name, "d", AXES)[:] = values
 
 
 def list_orders(
@@ -64,6 +93,7 @@ def list_orders(
     *,
     polarised: bool = False,
     from_below: bool = False,
+    jones: bool = False,
 ) -> Listing:
     """List the efficiencies of all propagating orders, with the conventions of `lists`.
 
@@ -79,6 +109,7 @@ def list_orders(
     polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
         unpolarised light.
     from_below : whether the light comes from below a thin sheet, or from within a block.
+    jones : Jones matrices (`efficiency.jones`) in place of efficiencies, J_ps from s to p light.
     """
     lights = [np.unique(np.asarray(values, np.float64)) for values in (wavelengths, theta, phi)]
     low, high = table.wavelengths
@@ -103,6 +134,12 @@ def list_orders(
     leaves = square + (table.block or 1.0) ** 2 - 1.0 > _EDGE
     parts = (lam, polar, azimuth, m_x, m_y, x, y)
     lam, polar, azimuth, m_x, m_y, x, y = (part[leaves] for part in parts)
+    numbers = [m_x, m_y] if table.crossed else [m_x]
+    axes = (*CSV_AXES[:3], *(PAIR if table.crossed else CSV_AXES[3:]))
+    if jones:
+        elements = table.jones(x, y, lam, m_x, m_y).reshape(-1, 4)
+        shares = [part for column in elements.T for part in (column.real, column.imag)]
+        return Listing((*axes, *JONES), np.column_stack([lam, polar, azimuth, *numbers, *shares]))
     lookup = table.polarised_efficiency if polarised else table.efficiency
     kinds = REFLECTED + (TRANSMITTED if table.sides == 2 else ())
     below = {"from_below": True} if from_below else {}
@@ -112,9 +149,7 @@ def list_orders(
     ]
     if not polarised:
         shares = [np.repeat(values[:, None], 2, axis=1) for values in shares]
-    numbers = [m_x, m_y] if table.crossed else [m_x]
-    columns = (*CSV_AXES[:3], *(PAIR if table.crossed else CSV_AXES[3:]), *kinds)
-    return Listing(columns, np.column_stack([lam, polar, azimuth, *numbers, *shares]))
+    return Listing((*axes, *kinds), np.column_stack([lam, polar, azimuth, *numbers, *shares]))
 
 
 def orders_of(table: OrderTable, shortest: float) -> NDArray[np.int64]:

@@ -36,13 +36,15 @@ from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
 from .cells import Array as Real
-from .table import LARGEST_SUM, MOST_BANDS, WAVELENGTHS
+from .table import LARGEST_SUM, WAVELENGTHS
 
 AXES = ("wavelength", "theta", "phi", "order")
 REFLECTED, TRANSMITTED = ("R_s", "R_p"), ("T_s", "T_p")
 CSV_AXES = ("wavelength_nm", "theta_deg", "phi_deg", "order")
 #: Columns of a crossed grating, instead of the last one.
 PAIR = ("order_x", "order_y")
+#: Largest |order| in a list: of a period of 100 µm at 200 nm.
+MOST_ORDER = 1000
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
 _LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
@@ -279,8 +281,8 @@ def _check_axes(axes: Sequence[Real], shown: str) -> None:
 
 
 def _check_orders(orders: Real, shown: str) -> None:
-    whole = (orders == np.round(orders)) & (np.abs(orders) <= 2 * MOST_BANDS)
-    _check_all("order", orders, whole, f"a whole number of at most {2 * MOST_BANDS}", shown)
+    whole = (orders == np.round(orders)) & (np.abs(orders) <= MOST_ORDER)
+    _check_all("order", orders, whole, f"a whole number of at most {MOST_ORDER}", shown)
 
 
 def check_light(wavelengths: Real, theta: Real, phi: Real, shown: str) -> None:

@@ -13,6 +13,8 @@ mends it, so that no matrix gains light or polarisation.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,8 @@ from .table import CellResponse, OrderTable
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
 _MIN_AMPLITUDE = 1e-12
+#: Sine of the angle from the normal below which a direction has no s of its own.
+_NORMAL = 1e-9
 
 
 def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
@@ -45,9 +49,20 @@ def smooth_elements(table: OrderTable, k: int, values: Array) -> Array:
 def nearest_pure(matrices: Array, efficiency: Array) -> Array:
     """Return about the nearest Mueller matrices (…, 4, 4) of Jones matrices, of an efficiency (…).
 
+    An error that `matrices` have out of the set of pure ones is squared.
+    """
+    vector = nearest_jones(matrices, efficiency).reshape(-1, 4)
+    pairs = vector[:, :, None] * vector[:, None, :].conj()
+    return np.asarray((pairs.reshape(-1, 16) @ _MATRIX).real.reshape(matrices.shape))
+
+
+def nearest_jones(matrices: Array, efficiency: Array) -> NDArray[np.complex128]:
+    """Return Jones matrices (…, 2, 2) about e and f of Mueller matrices (…, 4, 4); any phase.
+
     The Jones matrix is the largest eigenvector of the coherency matrix (Cloude 1986, Optik 75, 26),
-    by one step of the power method from its largest column: an error that `matrices` have out of
-    the set of pure ones is squared.
+    by one step of the power method from its largest column.
+
+    efficiency : (…), ½ Σ|J|² of the result.
     """
     flat = matrices.reshape(-1, 16)
     coherency = (flat @ _COHERENCY).reshape(-1, 4, 4)
@@ -56,9 +71,34 @@ def nearest_pure(matrices: Array, efficiency: Array) -> Array:
     vector = np.einsum("nab,nb->na", coherency, coherency[lanes, :, largest])
     power = 0.5 * np.sum(np.abs(vector) ** 2, axis=1)
     scale = np.sqrt(np.maximum(efficiency.ravel(), 0.0) / np.maximum(power, _MIN_AMPLITUDE**2))
-    vector *= scale[:, None]
-    pairs = vector[:, :, None] * vector[:, None, :].conj()
-    return np.asarray((pairs.reshape(-1, 16) @ _MATRIX).real.reshape(matrices.shape))
+    return np.asarray((vector * scale[:, None]).reshape(*matrices.shape[:-2], 2, 2))
+
+
+def s_and_p(jones: NDArray[np.complex128], incident: Array, leaving: Array) -> Any:
+    """Return Jones matrices about s and p of those about e and f.
+
+    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d; along the normal s is that
+    of the other direction.
+
+    incident, leaving : directions of propagation (…, 3).
+    """
+
+    def turned(direction: Array, other: Array) -> Array:
+        """Return the matrix that takes components along e and f to those along s and p."""
+        x, y = (np.where(_level(direction), other[..., k], direction[..., k]) for k in (0, 1))
+        s = np.stack([-y, x, 0.0 * x], axis=-1) / np.maximum(np.hypot(x, y), 1e-300)[..., None]
+        along = np.array([0.0, 1.0, 0.0]) - direction[..., 1:2] * direction
+        along /= np.linalg.norm(along, axis=-1, keepdims=True)
+        cosine = (s * along).sum(axis=-1)
+        sine = (s * np.cross(direction, along)).sum(axis=-1)
+        return np.stack([np.stack([cosine, sine], -1), np.stack([-sine, cosine], -1)], -2)
+
+    back = turned(incident, leaving).swapaxes(-1, -2)
+    return turned(leaving, incident) @ jones @ back
+
+
+def _level(direction: Array) -> Any:
+    return np.hypot(direction[..., 0], direction[..., 1]) < _NORMAL
 
 
 def _coherency() -> NDArray[np.complex128]:

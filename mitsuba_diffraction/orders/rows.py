@@ -24,6 +24,8 @@ from .table import Band, CellResponse, ListedResponse, OrderTable
 #: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
 #: critical angles of orders lie along w.
 CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
+#: Nodes along an axis above which a table, as of gold, has more cells there, and cells over nodes.
+COMMON, SHARES = Counts(36, 24, 8), (1.25, 1.25, 2.0)
 #: Share of the light that a totally reflecting face sends back: trapped light would never end.
 _TRAPPED = 1.0 - 1e-4
 #: Least transmittance in probabilities, so that no order that leaves has none.
@@ -140,6 +142,11 @@ def leaving_transmittance(squared_sine: Array, index: float) -> Array:
 def cells_of(table: OrderTable) -> Counts:
     """Return the numbers of the renderer's cells, which fit into memory."""
     counts, size = (CELLS, 16) if table.superstrate == 1.0 else (CELLS_UNDER_COAT, 32)
+    most = (max(along) for along in zip(*(band.counts for band in table.bands), strict=True))
+    counts = Counts(*(
+        max(count, math.ceil(share * nodes)) if nodes > common else count
+        for count, nodes, common, share in zip(counts, most, COMMON, SHARES, strict=True)
+    ))  # fmt: skip
     if table.superstrate == 1.0 and constant(table):
         counts = Counts(1, 1, 1)
     records = sum(of.ports * (of.ports + 1) for of in kinds_of(table))

@@ -228,6 +228,7 @@ class OrderTable:
     polarised_efficiency: ClassVar[Callable[..., Array]]  #: `efficiency.polarised_efficiency`
     groove_efficiency: ClassVar[Callable[..., Array]]  #: `efficiency.groove_efficiency`
     mueller: ClassVar[Callable[..., Array]]  #: matrices of an order: `efficiency.mueller`
+    jones: ClassVar[Callable[..., Any]]  #: Jones matrices of an order: `efficiency.jones`
     load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
 

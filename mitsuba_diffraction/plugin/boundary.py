@@ -32,12 +32,11 @@ from ..optics.boundary import (
 from ..optics.coat import (
     FaceCoefficients,
     coated_power,
-    cosine_within,
     crossing,
     transmitted,
 )
 from ..optics.fresnel import reflectance
-from ..optics.mirror import horizon_correction, mirror, mirror_cosine
+from ..optics.mirror import mirror
 from .arithmetic import clip, index_of, maximum
 from .directions import CoatedPair, Pair, TablePoint
 from .materials import Material, Perfect
@@ -128,18 +127,12 @@ class Boundary:
 
         sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `factor`.
         """
-        outer, width = pair.outer, sigma_0 * pair.outer.medium
-        into, out = (dr.square(cosine) * width for cosine in (outer.cos_i, outer.cos_o))
-        visible = mi.UnpolarizedSpectrum([horizon_correction(into, out, k) for k in wavenumbers])
+        visible = mi.UnpolarizedSpectrum([pair.visible(sigma_0, k) for k in wavenumbers])
         if isinstance(self.material, Perfect):
             return mi.depolarizer(visible)
-        cosines = [
-            mirror_cosine(outer.cos_half, outer.cos_i, outer.cos_o, k * width)
-            for k in self.material.wavenumbers(wavenumbers)
-        ]
+        waves = self.material.wavenumbers(wavenumbers)
+        cosines = [pair.mirror_cosine(k * sigma_0) for k in waves]
         light = LightPath.of(pair, mode)
-        if isinstance(pair, CoatedPair):
-            cosines = [cosine_within(cosine, pair.n) for cosine in cosines]
         channels = _side_by_side(indices, cosines)
         if not (mi.is_polarized or light.passed):
             powers = [reflectance(cosine, index) for index, cosine in channels]

@@ -22,7 +22,7 @@ height_unit : string [from the file]
 channel : string or integer [the heights]
     Channel of an instrument file, by name or index; of an EXR image, by name.
 crop : float or string [none]
-    Size of the central region to keep, µm: one number, or "width, height".
+    Region to keep, µm: "width" or "width, height", central; or "width, height, x, y".
 fill : string [none]
     Points without data: `none` refuses them, `nearest` copies the nearest height, `harmonic` spans
     a membrane over the gap.

@@ -52,7 +52,7 @@ XML and the same in Python:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -61,13 +61,23 @@ import mitsuba as mi
 
 from ..optics import through
 from ..optics.boundary import Geometry, Jones, geometry, power
+from ..optics.coat import Powers as TransmittedPowers
 from ..optics.coat import transmittances
 from ..optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
 from . import parameters as read
 from .arithmetic import plain
 from .base import asked_sides
 from .boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
-from .directions import CoatedPair, Pair, PairBelow, PairThrough, Sides, Site, TablePoint
+from .directions import (
+    CoatedPair,
+    Pair,
+    PairBelow,
+    PairThrough,
+    PairWithin,
+    Sides,
+    Site,
+    TablePoint,
+)
 from .energy import EnergyModel, dielectric_of
 from .materials import Dielectric, Inside
 from .properties import flag
@@ -202,13 +212,13 @@ class DiffractionDielectric(DiffractingSurface):
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, si = self.material.eta, site.si
         if self.thin:
-            outer = PairBelow(si, wo, site.frame, lit, mi.Float(1.0))
+            outer = PairBelow(si, wo, site.frame, lit)
             pair = CoatedPair(outer, n)
             power = self.power.power(pair, site.scale, si)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
             value += self.face(ctx, site, outer, self.mirror, lit)
             return value, self.power.density(outer, site.scale * n, si)
-        inner = PairBelow(si, wo, site.frame, lit, n)
+        inner = PairWithin(si, wo, site.frame, lit, n)
         power = self.power.power(inner.place, site.scale, si)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
@@ -217,19 +227,25 @@ class DiffractionDielectric(DiffractingSurface):
 
     def _returned(self, site: Site, pair: Pair) -> Spectrum:
         """f cosθo of light that the flat side of a sheet sends back through the structure."""
-        n = self.material.eta
-        ends, returned = [], []
-        for cosine in (pair.cos_i, pair.cos_o):
-            ends.append(dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine)
-            passed = transmittances(cosine, n)
-            # T² R / (1 − R²) of each polarisation
-            returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
-        point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
+        n, ends = self.material.eta, (pair.cos_i, pair.cos_o)
+        deep = [dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine for cosine in ends]
+        point = TablePoint(pair.uv, dr.sqrt(dr.fma(deep[0], deep[0], dr.square(deep[1]))))
         power = self.power.power(point, site.scale, site.si)
-        ends_factor = dr.safe_sqrt(returned[0] * returned[1])
-        factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
-        others, zeroth = (mi.depolarizer(each * factor) for each in power[:2])
+        both = dr.safe_sqrt(_returned(ends[0], n) * _returned(ends[1], n))
+        flat = self._of_mirror(site, pair, lambda cosine: _returned(cosine, n))
+        level = self.area_factor * pair.frame.area * pair.cos_o
+        others = mi.depolarizer(power.others * (level * both))
+        zeroth = mi.depolarizer(power.zeroth * (level * mi.UnpolarizedSpectrum(flat)))
         return interfering(others, zeroth, power.cosine)
+
+    def _of_mirror(
+        self, site: Site, pair: Pair | PairThrough, power: Callable[[Float], Float]
+    ) -> list[Float]:
+        """Return C(X_i) C(X_o) times a power at cosθm, for each channel."""
+        width = self.table.sigma_0 * pair.frame.stretch
+        return [
+            pair.visible(width, k) * power(pair.mirror_cosine(k * width)) for k in site.wavenumbers
+        ]
 
     # ------------------------------------------------------------------ transmission
 
@@ -246,7 +262,7 @@ class DiffractionDielectric(DiffractingSurface):
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
-        flat = self._factor(ctx, si, crossing, [self._order_0(crossing, pair)])
+        flat = self._order_0(ctx, site, crossing, pair)
         rest, mirror = mi.Spectrum(power.others * per_w) * others, mi.Spectrum(power.zeroth) * flat
         value = interfering(rest, mirror, power.cosine)
         outside = mi.Float(self.area_factor * crossing.frame.area)
@@ -272,12 +288,21 @@ class DiffractionDielectric(DiffractingSurface):
             return matrices
         return [out_of_sheet(jones, n, above.z, -below.z) for jones in matrices]
 
-    def _order_0(self, crossing: PairThrough, pair: Geometry) -> Jones:
-        """Return the matrix of order 0."""
-        n, above = crossing.n, crossing.above.z
-        outer = -crossing.below.z if self.thin else dr.safe_sqrt(outside_square(pair, n))
-        ends = (flat_transmittances(cosine, n, self.thin) for cosine in (above, outer))
-        return order_0(pair, *ends)
+    def _order_0(self, ctx: Context, site: Site, crossing: PairThrough, pair: Geometry) -> Spectrum:
+        """Return N_0 C(X_i) C(X_o) of order 0, or its Mueller matrix, for each channel."""
+        n, thin, width = crossing.n, self.thin, self.table.sigma_0 * crossing.frame.stretch
+
+        def passed(cosine: Float) -> TransmittedPowers:
+            return flat_transmittances(cosine, n, thin)
+
+        if not mi.is_polarized:
+            powers = self._of_mirror(site, crossing, lambda cosine: 0.5 * sum(passed(cosine)))
+            return dr.select(crossing.leaves, mi.UnpolarizedSpectrum(powers), 0.0)
+        cosines = [crossing.mirror_cosine(k * width) for k in site.wavenumbers]
+        matrices = [order_0(pair, passed(cosine)) for cosine in cosines]
+        visible = mi.UnpolarizedSpectrum([crossing.visible(width, k) for k in site.wavenumbers])
+        flat = self._factor(ctx, site.si, crossing, matrices) * mi.Spectrum(visible)
+        return dr.select(crossing.leaves, flat, 0.0)
 
     def _factor(
         self, ctx: Context, si: Interaction, crossing: PairThrough, matrices: list[Jones]
@@ -327,6 +352,11 @@ class DiffractionDielectric(DiffractingSurface):
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
         return {**super().shown(), "thin": "true" if self.thin else "false"}
+
+
+def _returned(cosine: Float, n: Float) -> Float:
+    """Return T² R/(1 − R²) of the flat side of a sheet, the mean of both polarisations."""
+    return 0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in transmittances(cosine, n))
 
 
 mi.register_bsdf("diffraction_dielectric", DiffractionDielectric)

@@ -8,7 +8,13 @@ from functools import cached_property
 import drjit as dr
 import mitsuba as mi
 
-from ..optics.coat import refracted
+from ..optics.coat import cosine_within, refracted
+from ..optics.mirror import (
+    correction_within,
+    horizon_correction,
+    mirror_cosine,
+    outside_square,
+)
 from .types import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
 
 SHADOWINGS = ("none", "vcavity")
@@ -101,11 +107,9 @@ class Pair:
     w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
     above : whether light stays above the surface; else both directions are mirrored from below.
-    medium : optical index of the medium that `outer` is in, over that above the surface.
     """
 
     above = True
-    medium: Float = 1.0
 
     def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
         self.wi, self.wo, self.frame, self.asked = si.wi, wo, frame, active
@@ -131,6 +135,15 @@ class Pair:
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)
+
+    def visible(self, sigma_0: Float, k: Float) -> Float:
+        """Return C(X_i) C(X_o) of order 0 (`optics.mirror`)."""
+        into, out = (dr.square(cosine) * sigma_0 for cosine in (self.cos_i, self.cos_o))
+        return horizon_correction(into, out, k)
+
+    def mirror_cosine(self, sharpness: Float) -> Float:
+        """Return cosθm of order 0 by kσ₀ (`optics.mirror`)."""
+        return mirror_cosine(self.cos_half, self.cos_i, self.cos_o, sharpness)
 
 
 @dataclass(frozen=True)
@@ -166,22 +179,39 @@ class CoatedPair(Pair):
         """The pair outside."""
         return self._outer
 
+    def visible(self, sigma_0: Float, k: Float) -> Float:
+        """See `Pair.visible`: of the pair outside."""
+        return self._outer.visible(sigma_0, k)
+
+    def mirror_cosine(self, sharpness: Float) -> Float:
+        """See `Pair.mirror_cosine`: of the pair outside, refracted."""
+        return cosine_within(self._outer.mirror_cosine(sharpness), self.n)
+
 
 class PairBelow(Pair):
-    """Two directions below the surface, turned over: as if above a surface of negative heights.
-
-    n : optical index of the medium that both are in.
-    """
+    """Two directions below the surface, turned over: as if above a surface of negative heights."""
 
     above = False
 
-    def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask, n: Float):
+    def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
         side = mi.Vector3f(1.0, 1.0, -1.0)
         turned = mi.SurfaceInteraction3f(si)
         turned.wi = si.wi * side
         super().__init__(turned, wo * side, frame, active)
-        self.medium = n
-        self.uv, self.w = -n * self.uv, n * self.w
+        self.uv = -self.uv
+
+
+class PairWithin(PairBelow):
+    """Two directions below the surface, within the dielectric.
+
+    n : its index over that of the medium above.
+    """
+
+    def __init__(
+        self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask, n: Float
+    ) -> None:
+        super().__init__(si, wo, frame, active)
+        self.n, self.uv, self.w = n, n * self.uv, n * self.w
 
     @property
     def place(self) -> TablePoint:
@@ -193,6 +223,25 @@ class PairBelow(Pair):
         """Whether tables hold these frequencies."""
         return dr.squared_norm(self.uv) < _FARTHEST**2
 
+    def visible(self, sigma_0: Float, k: Float) -> Float:
+        """See `Pair.visible`: within the cone of the critical angle, or between it and horizon."""
+        return correction_within(self.cos_i, self.cos_o, self.n, sigma_0, k)
+
+    def mirror_cosine(self, sharpness: Float) -> Float:
+        """See `Pair.mirror_cosine`: of the directions above; beyond the critical angle within."""
+        wi, wo = (outside(w, self.n) for w in (self.wi, self.wo))
+        half = dr.safe_sqrt(0.25 * dr.squared_norm(wi + wo))
+        cosine = cosine_within(mirror_cosine(half, wi.z, wo.z, sharpness), self.n)
+        leaves = (wi.z > 0.0) & (wo.z > 0.0)
+        critical = dr.safe_sqrt(1.0 - dr.rcp(dr.square(self.n)))
+        return dr.select(leaves, cosine, dr.minimum(self.cos_half, critical))
+
+
+def outside(direction: Vector3f, n: Float) -> Vector3f:
+    """Return a direction within a dielectric as it is above; level beyond the critical angle."""
+    square = outside_square(mi.Frame3f.cos_theta(direction), n)
+    return mi.Vector3f(n * direction.x, n * direction.y, dr.safe_sqrt(square))
+
 
 class PairThrough:
     """A pair of directions, one above and the other below the surface, in any order.
@@ -202,6 +251,7 @@ class PairThrough:
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
     uv, w, cos_i, cos_o, frame, asked : what `PowerModel.density` asks of a pair.
+    leaves : whether the direction below is within the critical angle.
     """
 
     def __init__(
@@ -235,6 +285,19 @@ class PairThrough:
         self.cos_i = sides.cosine(dr.abs(si.wi.z), n, down, thin)
         self.cos_o = dr.select(active, dr.abs(wo.z), 1.0)
         self.uv, self.w = -frame.to_table(sides.into * si.wi + sides.out * wo), self.place.w
+        turned = self.below * mi.Vector3f(1.0, 1.0, -1.0)
+        self._beyond = turned if thin else outside(turned, n)
+        self.leaves = self._beyond.z > 0.0
+
+    def visible(self, sigma_0: Float, k: Float) -> Float:
+        """See `Pair.visible`: of both directions above the surface."""
+        into, out = (dr.square(w.z) * sigma_0 for w in (self.above, self._beyond))
+        return horizon_correction(into, out, k)
+
+    def mirror_cosine(self, sharpness: Float) -> Float:
+        """See `Pair.mirror_cosine`: of both directions above the surface."""
+        half = dr.safe_sqrt(0.25 * dr.squared_norm(self.above + self._beyond))
+        return mirror_cosine(half, self.above.z, self._beyond.z, sharpness)
 
 
 @dataclass(frozen=True)

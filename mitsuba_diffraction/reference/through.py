@@ -59,42 +59,37 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
 
 
-def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:
-    """Jones matrices of order 0, (..., 2, 2), whose mean power is N_0.
+def order_0(wi: ArrayLike, wo: ArrayLike, passed: ArrayLike) -> Complex:
+    """Jones matrices of order 0, (..., 2, 2), whose mean power is that of both transmittances.
 
-    The entries are products of √√T of either direction and polarisation, turned from one plane of
-    incidence to the other. The matrix is symmetric, and √T in the refracted direction.
+    They are diag(√T_s, √T_p) between two turns, each by half of the angle from one plane of
+    incidence to the other.
 
-    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric or,
-        if `thin`, beyond the flat other side of a sheet.
+    wi, wo : (..., 3) unit vectors above and below the surface.
+    passed : (2, ...) `flat_transmittances` at the angle of the mirror's lobe.
     """
     s_in, s_out = polarisation_axes(wi, wo)
-    cosines = np.asarray(wi, np.float64)[..., 2], -np.asarray(wo, np.float64)[..., 2]
-    came, left = (
-        flat_transmittances(cosine, index, thin, side) ** 0.25
-        for side, cosine in enumerate(cosines)
-    )
     dot = np.sum(s_in * s_out, axis=-1)
     cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
-    rows = [
-        [left[0] * came[0] * dot, -left[0] * came[1] * cross],
-        [left[1] * came[0] * cross, left[1] * came[1] * dot],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2).astype(np.complex128)
+    half = 0.5 * np.arctan2(cross, dot)
+    turn = np.stack([np.cos(half), -np.sin(half), np.sin(half), np.cos(half)], axis=-1)
+    turn = turn.reshape(*half.shape, 2, 2)
+    s, p = np.sqrt(np.asarray(passed, np.float64))
+    zero = np.zeros_like(s)
+    level = np.stack([s, zero, zero, p], axis=-1).reshape(*s.shape, 2, 2)
+    return np.asarray(turn @ level @ turn, np.complex128)
 
 
-def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) -> Real:
+def flat_transmittances(cosine: ArrayLike, index: float, thin: bool) -> Real:
     """Transmittances of s and p light by the flat surface, (2, ...).
 
     Parameters
     ----------
-    cosine : of the direction to the normal, where it is measured: in the dielectric if below.
+    cosine : of the direction above the surface, or beyond the flat other side of a sheet.
     index : of the dielectric relative to the medium above it.
     thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
-    side : 0 above the surface, 1 below.
     """
-    relative = 1.0 / index if side and not thin else index
-    back = np.minimum(np.abs(np.stack(amplitudes(cosine, relative))) ** 2, 1.0)
+    back = np.minimum(np.abs(np.stack(amplitudes(cosine, index))) ** 2, 1.0)
     return np.asarray((1.0 - back) / (1.0 + back) if thin else 1.0 - back)
 
 

@@ -11,11 +11,12 @@ from ..optics import through as formulas
 from ..optics.blend import ScaleRoughness
 from ..optics.geometry import wavenumber
 from ..settings import checked
-from . import boundary, through
+from . import boundary, mirror, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
 from .boundary import mixed
 from .coat import refracted
 from .integral import field_powers
+from .model import Light
 
 
 def btdf(
@@ -77,5 +78,17 @@ def btdf(
     zeroth = np.minimum(zeroth, power)
     cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
     orders = cosines * boundary.unpolarised(jones) * (power - zeroth)
-    flat = boundary.unpolarised(through.order_0(above, below, eta, thin=thin)) * zeroth
+    # a mirror's lobe of both directions above the surface transmits what it does not reflect
+    outside, leaves = below * [1, 1, -1], np.ones(len(below), bool)
+    if not thin:
+        tangential = eta * below[:, :2]
+        square = 1.0 - np.sum(tangential**2, axis=1)
+        leaves = square > 0.0
+        outside = np.column_stack([tangential, np.sqrt(np.maximum(square, 0.0))])
+    light = Light(above, outside, lam)
+    passed = through.flat_transmittances(
+        mirror.mirror_cosine(light, sigmas.zeroth), float(eta), thin
+    )
+    flat = boundary.unpolarised(through.order_0(above, below, passed)) * zeroth
+    flat *= leaves * mirror.horizon_correction(light, sigmas.zeroth)
     return np.where(lit, (orders + flat) / ((lam * 1e-3) ** 2 * np.pi * sigma**2), 0.0)

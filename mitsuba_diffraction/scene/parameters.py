@@ -47,7 +47,7 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
         close = difflib.get_close_matches(name, known, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
         if name == "patch":
-            hint = "; put heights on the id of a BSDF or shape: --material ID=FILE,material=Al"
+            hint = "; put heights on the id of a BSDF or shape: --assign ID=FILE,material=Al"
         raise DiffractionError(
             f"'{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
         )

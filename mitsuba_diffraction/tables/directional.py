@@ -168,15 +168,21 @@ class Quadrature(NamedTuple):
     weights: Real
 
 
-@lru_cache(maxsize=4)
-def quadrature(rings: int, widest: int) -> Quadrature:
-    """Place directions on rings, with `widest` azimuths on the widest."""
+@lru_cache(maxsize=8)
+def quadrature(rings: int, widest: int, sine: float = 1.0) -> Quadrature:
+    """Place directions on rings, with `widest` azimuths on the widest.
+
+    sine : of an angle that has so many rings on either side.
+    """
     position, share = np.polynomial.legendre.leggauss(rings)
-    angles = 0.25 * np.pi * (position + 1.0)
+    ends = sorted({0.0, math.asin(sine), 0.5 * math.pi})
+    halves = 0.5 * np.diff(ends)[:, None]
+    angles = (np.array(ends[:-1])[:, None] + halves * (position + 1.0)).ravel()
+    share = (share * halves).ravel()
     steps = np.maximum(8, np.rint(widest * np.sin(angles)).astype(int))
     theta, count = np.repeat(angles, steps), np.repeat(steps, steps)
     turn = np.concatenate([np.arange(n) + 0.381966 * ring for ring, n in enumerate(steps)])
     azimuth = np.mod(turn * 2.0 * np.pi / count + np.pi, 2.0 * np.pi) - np.pi
-    weights = np.repeat(share * 0.25 * np.pi, steps) * np.sin(theta) * 2.0 * np.pi / count
+    weights = np.repeat(share, steps) * np.sin(theta) * 2.0 * np.pi / count
     x, y = np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth)
     return Quadrature(x, y, np.cos(theta), theta, azimuth, weights)

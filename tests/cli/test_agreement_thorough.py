@@ -98,7 +98,7 @@ def test_every_command_and_python_give_one_reflectance(run, scan, material):
     assert math.pi * float(row) == pytest.approx(expected, rel=3e-3)
 
     ran = run(
-        "evaluate", scan, *HOW, *option, "--theta", LIGHT, "--phi", 0, "--windows", 0,
+        "evaluate", scan, *HOW, *option, "--theta", LIGHT, "--phi", 0, "--positions", 0,
         "--wavelength-range", "500:600", "--step", 10, "--angle-step", 1,
         f"--angles={DETECTOR - 20:.9f}:{DETECTOR + 20:.9f}", "-o", "e.png",
     )  # fmt: skip
@@ -111,7 +111,7 @@ def test_every_command_and_python_give_one_reflectance(run, scan, material):
 
     values = "".join(f",{name}={value}" for name, value in material.items())
     ran = run(
-        "render", "scene.xml", "-m", "llvm_ad_mono", "-o", "r.exr", "--material",
+        "render", "scene.xml", "-m", "llvm_ad_mono", "-o", "r.exr", "--assign",
         f"skin={scan},pixel_size={PIXEL},coherence_width={WIDTH},wavelength={WAVELENGTH}{values}",
     )  # fmt: skip
     assert ran.code == 0, ran.err

@@ -16,7 +16,7 @@ from tests.support.directions import polar, rough_patch
 
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
-    "--windows", "2",
+    "--positions", "2",
 ]  # fmt: skip
 # Two periods of the grating of `heights` are known to repeat only if the command says so.
 EXACT = ["--periodic", "exact"]

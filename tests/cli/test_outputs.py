@@ -30,7 +30,7 @@ def _contents(folder: Path) -> dict[str, tuple[int, bytes]]:
     [
         f"{RENDER} -o scale.png", f"{RENDER} -o scale.exr", f"{RENDER} -o sky.exr",
         f"{RENDER} -o ../here/sky.exr", f"{RENDER} --frames 2 --turn width -o frames",
-        f"{RENDER} --material ball=t.exr -o t.exr",
+        f"{RENDER} --assign ball=t.exr -o t.exr",
         f"{RENDER} --preset ball=cd,pigment=sky.exr -o sky.exr",
         "brdf-map recipe.toml -o h.exr", "evaluate recipe.toml -o h.png",
         "spectrum recipe.toml -o pigment.csv --pigment pigment.csv",

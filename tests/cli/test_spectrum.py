@@ -92,6 +92,20 @@ def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here
         assert str(source) in line
 
 
+def test_a_broken_scan_of_a_group_is_said_and_left_out(run, scans, here):
+    (scans / "scan2.npy").write_bytes(b"\x93NUMPY, cut short")
+    ran = run("spectrum", "--group", f"some={scans}", *PIXEL, *QUICK, "-o", "some.csv")
+    assert ran.code == 1
+    assert "left out: " in ran.err
+    assert "some (2 scans)" in ran.out
+    assert (here / "some.csv").exists()
+    for n in range(2):
+        (scans / f"scan{n}.npy").unlink()
+    ran = run("spectrum", "--group", f"some={scans}", *PIXEL, *QUICK, "-o", "none.csv")
+    assert "scan2.npy" in ran.failed_in_one_line()
+    assert not (here / "none.csv").exists()
+
+
 def test_groups_have_columns_errors_colours_and_variables_each(run, scans, here, monkeypatch):
     for name in ("LAMPS", "DETECTORS"):
         monkeypatch.setattr(angular_variables, name, getattr(angular_variables, name)[::4])

@@ -32,3 +32,26 @@ def test_a_current_command_line_is_kept_without_a_word(line, capsys):
     words = current(line.split())
     assert [part for word in words for part in word.split("=")] == line.replace("=", " ").split()
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("render a.obj --look=skin", "--finish=skin"),
+        ("tonemap a.exr --view standard", "--tonemap"),
+        ("evaluate a.npy --windows 2", "--positions"),
+        ("tangents a.ply --turn 90", "--rotate"),
+        ("render a.xml --material ball=t.exr", "--assign"),
+    ],
+)
+def test_an_old_name_is_the_current_one_where_it_was_renamed(old, new, capsys):
+    assert new in current(old.split())
+    assert capsys.readouterr().err.count("is now") == 1
+
+
+@pytest.mark.parametrize(
+    "line", ["precompute a.npy --windows 5", "brdf-map a.exr --material gold", "render --turn sun"]
+)
+def test_the_same_name_elsewhere_is_kept(line, capsys):
+    assert current(line.split()) == line.split()
+    assert capsys.readouterr().err == ""

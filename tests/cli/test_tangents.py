@@ -95,7 +95,7 @@ def test_singular_points_are_named(run, ball):
 def test_a_turn_is_counter_clockwise_from_outside(run, ball):
     """Along z, turned by a right angle, the patch's x axis points west: −φ, as z × n is east."""
     out = ball.with_name("field.ply")
-    assert run("tangents", ball, "-o", out, "--along", "z", "--turn", "90").code == 0
+    assert run("tangents", ball, "-o", out, "--along", "z", "--rotate", "90").code == 0
     positions, _, uv, faces = load_mesh(out)
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]
     uv_sides = uv[faces[:, 1:]] - uv[faces[:, :1]]
@@ -179,7 +179,7 @@ def test_files_that_do_not_fit_are_one_line(run, bare, arguments, said):
 
 @pytest.mark.parametrize(
     "options",
-    [[], ["-o", "a.obj"], ["-o", "a.ply", "--along", "w"], ["-o", "a.ply", "--turn", "x"]],
+    [[], ["-o", "a.obj"], ["-o", "a.ply", "--along", "w"], ["-o", "a.ply", "--rotate", "x"]],
 )
 def test_unusable_options_are_usage_errors(run, bare, options):
     assert run("tangents", bare, *options).code == 2

@@ -34,7 +34,7 @@ def light():
 def test_the_png_shows_the_view_and_the_exr_stays(run, light, view):
     write("a.exr", RGB=light)
     before = Path("a.exr").read_bytes()
-    assert run("tonemap", "a.exr", "--view", view, "--exposure", "-1").code == 0
+    assert run("tonemap", "a.exr", "--tonemap", view, "--exposure", "-1").code == 0
     # Mitsuba dithers between the two neighbours
     assert np.abs(png("a.png")[0] - 255 * shown(light / 2, view)).max() < 1.01
     assert Path("a.exr").read_bytes() == before

@@ -37,7 +37,7 @@ _SCENE = """<scene version="3.0.0"><default name="resx" value="6"/>
 _SMALL = {
     "brdf-map": ["--resolution", "8", "--samples", "1"],
     "sweep": ["--resolution", "8", "--no-compiled"],
-    "evaluate": ["--windows", "0"],
+    "evaluate": ["--positions", "0"],
     "render": ["-m", "scalar_rgb", "-s", "1"],
     "compare": ["-m", "scalar_rgb"],
     "export-viewer": ["-m", "scalar_rgb"],

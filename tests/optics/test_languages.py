@@ -141,9 +141,9 @@ def test_light_that_goes_through_is_that_of_the_reference(part, numbers):
         expected = through_judge.small_slope(WI, down, n)
     else:
         cosines = wi[2], -wo[2]
-        passed = [through.flat_transmittances(cosine, n, True) for cosine in cosines]
-        jones = through.order_0(pair, *passed)
-        expected = through_judge.order_0(WI, down, n, thin=True)
+        jones = through.order_0(pair, through.flat_transmittances(wi[2], n, True))
+        passed = through_judge.flat_transmittances(WI[:, 2], n, thin=True)
+        expected = through_judge.order_0(WI, down, passed)
         if part == "sheet":
             jones = through.out_of_sheet(jones, n, *cosines)
             expected = through_judge.out_of_sheet(expected, WI, down, n)

@@ -46,7 +46,7 @@ def test_the_fits_are_those_of_the_fixed_points():
     x, c, h = judge.solution()
     far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 and h = 0 at the other end
     fitted = horizon_correction(x**2, far, one)
-    assert np.abs(fitted / c - 1.0).max() < 0.003
+    assert np.abs(fitted / c - 1.0).max() < 0.001
     there = x < 10.0  # X = 20 cosθ
     shift = 0.5 - mirror_cosine(0.5, x[there] / 20.0, far[there], np.float64(400.0))
     assert np.abs(20.0 * shift - h[there]).max() < 0.01

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.boundary import Heights
+from mitsuba_diffraction.optics.mirror import horizon_correction
 from mitsuba_diffraction.optics.paths import ABOVE, Path, Returned, Side
 from mitsuba_diffraction.reference import coat, fresnel
 
@@ -44,9 +45,28 @@ def test_light_takes_a_path_in_either_direction(below):
 
 def test_light_of_a_flat_sheet_adds_up_to_1():
     """Order 0 in the refracted direction: structure and flat side reflect, and both transmit."""
-    passed = Path(1.5, "small_slope", ABOVE, BEYOND_SHEET).flat_transmittance(COS_I, COS_I)
-    back = Returned(None, "small_slope", sheet=1.5).common(COS_I, COS_I, -1.0)
+    # a lobe so narrow that none of it lies beyond the horizon
+    light = COS_I, COS_I, -1.0, 10.0, 1e3
+    passed, _ = Path(1.5, "small_slope", ABOVE, BEYOND_SHEET).mirrored(*light)
+    back, _ = Returned(None, "small_slope", sheet=1.5).mirrored(*light)
     assert passed + back + fresnel.reflectance(COS_I, 1.5) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("below", [INSIDE, BEYOND_SHEET])
+def test_a_lobe_is_divided_between_both_sides(below):
+    """What the flat surface reflects and transmits adds up pair by pair, from above and below."""
+    k, sigma_0, turn = 10.0, 1.0, np.cos(TURN)
+    within = [np.sqrt(1.0 - (1.0 - c**2) / below.index**2) for c in (COS_I, COS_O)]
+    reflected, _ = Path(1.5, "small_slope").mirrored(COS_I, COS_O, turn, k, sigma_0)
+    passed, _ = Path(1.5, "small_slope", ABOVE, below).mirrored(COS_I, within[1], turn, k, sigma_0)
+    if below.beyond_face:
+        back = Returned(None, "small_slope", sheet=1.5)
+        passed = passed + back.mirrored(COS_I, COS_O, turn, k, sigma_0)[0]
+    else:
+        back = Path(1.0 / 1.5, "small_slope", below, below)
+        assert back.mirrored(*within, turn, k, sigma_0)[0] == pytest.approx(reflected)
+    whole = horizon_correction(sigma_0 * COS_I**2, sigma_0 * COS_O**2, k)
+    assert reflected + passed == pytest.approx(whole)
 
 
 def test_the_flat_side_of_a_sheet_reflects_what_fresnel_says():

@@ -31,7 +31,16 @@ _NARROW = ["--wavelength-range", "590:610"]
 SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
-    "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
+    "evaluate": [
+        "--step",
+        "50",
+        "--angle-step",
+        "2",
+        "--positions",
+        "2",
+        "--coherence-width",
+        "10",
+    ],
     "solve": ["--period", "0.6", "--resolution", "80", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-viewer": ["--method", "exact"],

@@ -127,7 +127,7 @@ def row(scene: Scene, output: Path, folder: Path, flags: Sequence[str]) -> tuple
     recipe.write_text(scene.recipe, encoding="utf-8")
     material = f"{scene.surface}={recipe},{scene.parameters}"
     options = [word for flag in flags for word in ("-D", flag)]
-    model = _render(scene, folder / "model.exr", [*options, "--material", material])
+    model = _render(scene, folder / "model.exr", [*options, "--assign", material])
     solved = _render(scene, folder / "solved.exr", options)
     difference = delta_e(natural(solved.pixels), natural(model.pixels), exposure=1.0, least=0.0)
     _show(model, solved, difference, output / f"{scene.name}.jpg")

@@ -9,6 +9,7 @@ settings    settings of a solution, and estimates of its stages
 accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
 grating_index  refractive index over wavelength, by name or number
+dispersion  indices of files: refractiveindex.info, Zemax's glasses
 structure   films on a profile, slices beneath it, and the substrate
 films       their reader and checks
 stations    sets of directions with one system matrix
@@ -16,7 +17,8 @@ integral    solver: boundary integral method
 chandezon   solver: coordinates that follow slopes
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
-nodes       choice of the numbers of nodes
+nodes       stations at nodes, and along lines across a band
+node_counts numbers of nodes, by series along lines
 block       stations of a block's face near grazing
 sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,11 +42,6 @@ class InterpolationError(NamedTuple):
     largest: float
     place: str
 
-    def within(self, tolerance: float) -> bool:
-        """Whether mean error and 95 % quantile are within a tolerance and `WORST` times it."""
-        mean = max(self.mean, self.polarised or 0.0)
-        return mean <= tolerance and self.most <= WORST * tolerance
-
     def facts(self) -> dict[str, Any]:
         """Return the entries of a header."""
         polarised = {} if self.polarised is None else {"error_polarised": self.polarised}
@@ -57,6 +53,15 @@ class InterpolationError(NamedTuple):
             "error_place": self.place,
             **polarised,
         }
+
+
+def missed_tolerance(header: Mapping[str, Any]) -> bool:
+    """Whether a table misses its tolerance, by the measured errors in its header."""
+    if "tolerance" not in header or "error_mean" not in header:
+        return False
+    mean = max(header["error_mean"], header.get("error_polarised", 0.0))
+    tolerance = header["tolerance"]
+    return bool(mean > tolerance or header["error_worst"] > WORST * tolerance)
 
 
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> InterpolationError:

@@ -83,7 +83,7 @@ class Chandezon:
         widest = angles[np.argmax(np.diff(x))]
         lengthened = np.cos(widest) / np.cos(widest - middle)
         self._lengths = [film.thickness * float(lengthened) for film in films]
-        self._curve = curve = _smooth(x, z) if profile.corners == 0 else _with_edges(x, z)
+        self._curve = curve = _curve_of(profile)
         #: J and B of the samples.
         self._across = curve.slope_x * np.cos(middle) + curve.slope_z * np.sin(middle)
         self._along = curve.slope_z * np.cos(middle) - curve.slope_x * np.sin(middle)
@@ -205,6 +205,17 @@ def refused(profile: Profile) -> str:
     if profile.corners == 0:
         return "" if (np.diff(x) > 0).all() else "has a vertical or overhanging side"
     return f"has edges and over {_MOST_SIDES} sides" if len(profile.x) > _MOST_SIDES else ""
+
+
+def stretched_period(profile: Profile) -> float:
+    """Return the period times the largest |r'|, µm: over λ, harmonics of waves along a facet."""
+    curve = _curve_of(profile)
+    return float(np.hypot(curve.slope_x, curve.slope_z).max() * profile.period)
+
+
+def _curve_of(profile: Profile) -> _Curve:
+    x, z = profile.closed
+    return _smooth(x, z) if profile.corners == 0 else _with_edges(x, z)
 
 
 class _Curve(NamedTuple):

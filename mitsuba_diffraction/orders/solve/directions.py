@@ -23,7 +23,14 @@ from .accuracy import powers
 from .jobs import LEAST_COSINES, Jobs, Problem
 from .nodes import places_at
 from .resolution import resolved
-from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of
+from .settings import (
+    MOST_EXCESS,
+    Estimate,
+    Settings,
+    announce_comparison,
+    announce_stage,
+    header_of,
+)
 from .stations import Complex, Real
 
 #: Lights of which the resolution is chosen, and solutions at most.
@@ -67,7 +74,8 @@ def solve_directions(
     waves, theta, phi = (part.ravel() for part in np.meshgrid(lam, polar, azimuth, indexing="ij"))
     sine, turn = np.sin(np.radians(theta)), np.radians(phi)
     least = LEAST_COSINES.get(problem.method, 0.0)
-    steps = np.arange(-400, 401)[:, None] * waves / (1e3 * grating.optical_period)
+    most = int(2e3 * grating.optical_period / low) + 1
+    steps = np.arange(-most, most + 1)[:, None] * waves / (1e3 * grating.optical_period)
     c = np.sqrt(1.0 - np.minimum((sine * np.sin(turn)) ** 2, 1.0))
     square = 1.0 - ((steps - sine * np.cos(turn)) / c) ** 2
     if (near := (square > 0.0) & (square < least**2)).any():
@@ -86,7 +94,9 @@ def solve_directions(
         cell_of.append(cell)
         places.append(of_side)
     every = [place for of_side in places for place in of_side]
-    chosen = resolved(problem, work, every[:: max(len(every) // _COMPARED, 1)], how.tolerance / 2)
+    compared = every[:: max(len(every) // _COMPARED, 1)]
+    announce_comparison(announce, problem, work, compared)
+    chosen = resolved(problem, work, compared, how.tolerance / 2)
     announce_stage(announce, "solving", chosen.problem, work, every)
     solved = work.amplitudes(chosen.problem, every, "solving orders")
     first = int(min((cell.channel - cell.channels + 1).min() for cell in cell_of))

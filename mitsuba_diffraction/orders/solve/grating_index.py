@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import DiffractionError
 from ...optics.materials import PERFECT, material_named
 from ...plugin.conductors import tabulated_index
+from .dispersion import is_file, read_index
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +46,15 @@ def material_of(
 
     Parameters
     ----------
-    material : name such as "Al", number such as 1.5 or 0.6+5.6j, or their text.
+    material : name such as "Al", number such as 1.5 or 0.6+5.6j, their text, or a file of an index
+        (`dispersion`).
     wavelengths : shortest and longest, nm, for which the index must be known.
     """
     if isinstance(material, TabulatedIndex):
         return material
+    if is_file(material):
+        assert isinstance(material, str)
+        return TabulatedIndex(material, *read_index(material, wavelengths))
     number = material_named(material)
     if number == PERFECT:
         return TabulatedIndex("perfect conductor", np.array([0.0]), None)

@@ -43,7 +43,7 @@ LEAST_COSINES = {"integral": 0.03}
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
-MOST_RESOLUTION = {"integral": 1000, "coupled": 200, "chandezon": 250}
+MOST_RESOLUTION = {"integral": 1000, "coupled": 400, "chandezon": 400}
 # Threads that libraries of linear algebra start in each process, which would compete for the cores
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -245,7 +245,7 @@ class Jobs:
         return sum(self._seconds.values())
 
     def seconds(self, problem: Problem, place: Place) -> float:
-        """Return the seconds that a place takes."""
+        """Return the processor seconds that a place takes."""
         if self.executor is None:
             return timed(problem, place)
         return float(self.executor.submit(timed, problem, place).result())
@@ -266,11 +266,9 @@ class Jobs:
 
 
 def timed(problem: Problem, place: Place) -> float:
-    """Return the seconds that a place takes, without the start of the solver."""
+    """Return the processor seconds that a place takes, without the start of the solver."""
     solver_of(problem)
-    start = time.perf_counter()
-    solve_place(problem, place)
-    return time.perf_counter() - start
+    return solve_place(problem, place).seconds
 
 
 @contextmanager

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,23 +13,28 @@ from numpy.typing import ArrayLike
 from ...errors import DiffractionError, check_choice, quoted, warn
 from .. import cells
 from ..cells import Counts
-from ..polarised import ODD, mueller_of
-from ..table import MOST_NODES, Band, CellResponse, OrderTable, check_outline
-from .accuracy import WORST, diffuse_light, measured_error, powers
+from ..polarised import mueller_of
+from ..table import (
+    ALONG,
+    MOST_NODES,
+    MUELLER,
+    UNPOLARISED,
+    Band,
+    CellResponse,
+    OrderTable,
+    check_outline,
+)
+from .accuracy import WORST, measured_error, missed_tolerance, powers
 from .block import to_node
 from .directions import Directions, solve_directions
 from .films import Layers, Substance, structure_of
 from .grating_index import TabulatedIndex, material_of
 from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
+from .node_counts import node_counts
 from .nodes import (
-    MAX_NODES,
-    MIN_NODES,
-    Line,
     Place,
     at_nodes,
-    count_for,
     kinds_of,
-    lines,
     places_of,
 )
 from .profiles import Profile
@@ -44,7 +48,7 @@ from .resolution import (
 )
 from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of, silent
 from .sheet import check_clear
-from .stations import Complex, Grating, Real, reversed_light
+from .stations import Complex, Grating, Real
 
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
 REFINEMENTS, _FINER = 2, 1.4
@@ -177,11 +181,12 @@ def _solve_cells(
     if grating.block:
         counts = dict.fromkeys(bands, BLOCK_COUNTS)
     else:
-        counts = _counts(coarse, work, bands, how, tell)
+        counts = node_counts(coarse, work, bands, how, tell)
     header = header_of(chosen, how) | dict(facts)
     superstrate, thin, block = _media(grating)
+    elements = MUELLER if how.polarised else UNPOLARISED if block else ALONG
     for refinement in range(REFINEMENTS + 1):
-        problem, solved = _solved_at_nodes(problem, counts, work, tell)
+        problem, solved = _solved_at_nodes(problem, counts, work, tell, elements)
         header |= {
             "solver": solver_of(problem).name,
             "reciprocity_error": _reciprocity(problem, work, bands),
@@ -194,14 +199,15 @@ def _solve_cells(
             CellResponse(made, even=bool(block)), superstrate, header, thin, block,
         )  # fmt: skip
         error = measured_error(table, problem, work)
-        if error.within(how.tolerance) or refinement == REFINEMENTS:
+        header |= error.facts()
+        if not (missed := missed_tolerance(header)) or refinement == REFINEMENTS:
             break
         finer = _refined_counts(counts, error.bands, grating.block)
         if table.nbytes * np.prod(finer[0]) / np.prod(counts[0]) > MOST_BYTES:
             break
         counts = finer
-    header |= error.facts() | {"processor_seconds": round(work.processor_seconds, 1)}
-    if not error.within(how.tolerance):
+    header |= {"processor_seconds": round(work.processor_seconds, 1)}
+    if missed:
         warn(
             f"the table misses {error.mean:.2%} of the light in its orders on average (tolerance "
             f"{how.tolerance:.2%}) and {error.most:.2%} in 5 % of directions (tolerance "
@@ -215,12 +221,18 @@ def _solved_at_nodes(
     counts: Mapping[int, Counts],
     jobs: Jobs,
     announce: Callable[[Estimate], None],
+    elements: int,
 ) -> tuple[Problem, dict[Place, Complex]]:
     """Solve all nodes, at a higher resolution if solutions have light from nothing."""
     along = _nodes(problem.grating)
     places = [place for band in counts for place in places_of(band, counts[band], along)]
+    ports = {
+        k: sum((problem.grating.sides * (k + 1 - kind)) ** 2 for kind in kinds_of(k))
+        for k in counts
+    }
+    size = 4.0 * elements * sum(math.prod(count) * ports[k] for k, count in counts.items())
     for _ in range(_RAISED):
-        announce_stage(announce, "solving", problem, jobs, places)
+        announce_stage(announce, "solving", problem, jobs, places, size)
         solved = jobs.amplitudes(problem, places, "solving orders")
         excess = max(float(powers(values).sum(axis=2).max()) for values in solved.values())
         if excess <= MOST_EXCESS:
@@ -250,81 +262,6 @@ def _refined_counts(counts: Mapping[int, Counts], missed: Real, block: bool) -> 
         else of_band
         for k, of_band in counts.items()
     }
-
-
-def _counts(
-    problem: Problem,
-    jobs: Jobs,
-    bands: Iterable[int],
-    how: Settings,
-    announce: Callable[[Estimate], None],
-) -> dict[int, Counts]:
-    """Choose the numbers of nodes of each band by series along lines across it."""
-    most = Counts(*MAX_NODES[:2], 1 if problem.grating.is_perfect else MAX_NODES[2])
-    drawn = {band: list(lines(band, most)) for band in bands}
-    places = [place for of_band in drawn.values() for line in of_band for place in line.places]
-    announce_stage(announce, "choosing nodes", problem, jobs, places)
-    solved = jobs.amplitudes(problem, places, "choosing nodes")
-    values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
-    # three variables share the tolerance; rarely seen bands may miss more
-    shares, sides = _band_shares(problem.grating, len(drawn)), problem.grating.sides
-    return {
-        band: _count(
-            of_band, most, solved, values_of, how.tolerance / np.sqrt(3 * len(drawn) * share), sides
-        )
-        for (band, of_band), share in zip(drawn.items(), shares, strict=True)
-    }
-
-
-def _band_shares(grating: Grating, bands: int) -> Real:
-    """Return the share of diffuse white light in each band, at least 1/(16 bands).
-
-    If a band of share p misses 1/√(n p) of a tolerance, all n bands together miss the tolerance at
-    most (Cauchy and Schwarz).
-    """
-    x, y, lam = diffuse_light(4096, grating.wavelengths)
-    band = cells.to_cell(x, y, lam, grating.optical_period).band
-    counted = np.bincount(np.minimum(band, bands - 1), minlength=bands) / len(band)
-    return np.maximum(counted, 1.0 / (16 * bands))
-
-
-def _count(
-    drawn: Sequence[Line],
-    most: Counts,
-    solved: Mapping[Place, Complex],
-    values_of: Callable[[Place, Complex], Real],
-    error: float,
-    sides: int,
-) -> Counts:
-    """Return the numbers of nodes that all lines of a band need, for values (w, j, q, n)."""
-    needed = [1 if size == 1 else least for size, least in zip(most, MIN_NODES, strict=True)]
-    for line in drawn:
-        if most[line.axis] == 1:
-            continue
-        values = [values_of(place, solved[place]) for place in line.places]
-        if line.axis == 0:
-            values += [
-                values_of(place, reversed_light(solved[place], sides))
-                for place in reversed(line.places)
-            ]
-        # order 0 is no colour, and is left out
-        along = np.concatenate(values)
-        if (channels := along.shape[1] // sides) > 1:
-            along *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
-        needed[line.axis] = max(needed[line.axis], count_for(along, MIN_NODES[line.axis], error))
-    return Counts(*needed)
-
-
-def _unpolarised(place: Place, amplitudes: Complex) -> Real:
-    """Return unpolarised efficiencies (w, j, q, 1)."""
-    return powers(amplitudes).mean(axis=-1, keepdims=True)
-
-
-def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
-    """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
-    y = grating.station(*place).along[:, None, None, None, None]
-    elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
-    return elements.reshape(*elements.shape[:3], 16)
 
 
 def _band(

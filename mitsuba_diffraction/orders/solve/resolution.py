@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import DiffractionError
+from .chandezon import stretched_period
 from .films import material_text
 from .jobs import MOST_RESOLUTION, Jobs, Problem
 from .nodes import Place, kinds_of
 from .stations import Real, reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
-_STEP, _MOST = 1.35, 12
+STEP, _MOST = 1.35, 12
 #: Light from nothing that a solution may have where resolutions are compared, or a tenth of the
 #: tolerance if that is more: the table scales it away, which changes colours by as much.
 _EXCESS = 5e-4
@@ -48,7 +49,7 @@ def chosen_resolution(
     coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")
     for number in range(_MOST):
-        if number and np.ceil(coarse.resolution * _STEP) > MOST_RESOLUTION[problem.method]:
+        if number and np.ceil(coarse.resolution * STEP) > MOST_RESOLUTION[problem.method]:
             break
         fine, finer, error = _refined(coarse, values, jobs, places)
         excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
@@ -103,7 +104,7 @@ def _refined(
 
 def finer_problem(problem: Problem) -> Problem:
     """Return the problem at the next resolution."""
-    return replace(problem, resolution=int(np.ceil(problem.resolution * _STEP)))
+    return replace(problem, resolution=int(np.ceil(problem.resolution * STEP)))
 
 
 def places_to_test(bands: Sequence[int]) -> list[Place]:
@@ -145,7 +146,12 @@ def coarsest(problem: Problem) -> int:
     dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
     waves = float((1e3 * dense / lam).max())  # per µm
     if problem.method in ("coupled", "chandezon"):
-        return int(np.ceil(profile.period * grating.superstrate * 1e3 / low)) + _HARMONICS
+        per_period = grating.superstrate * 1e3 / low
+        least = int(np.ceil(profile.period * per_period)) + _HARMONICS
+        if problem.method == "coupled":
+            return least
+        # waves along the steepest facet, as coordinates stretch it
+        return max(least, int(np.ceil(stretched_period(profile) * per_period)))
     sides = 2.0 if profile.corners else 1.0
     points = _POINTS_PER_WAVELENGTH * sides * profile.length * waves
     # the sums over orders of half as many terms must reach the waves in the material

@@ -3,31 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from ...heights.lengths import count_between, number_between
 from .films import material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, solver_of
 from .nodes import Place
-from .resolution import Chosen
+from .resolution import STEP, Chosen, coarsest
 
 #: Wavelengths of a table, nm: the visible.
 WAVELENGTHS = (380.0, 780.0)
 #: Mean error of interpolation between nodes, of the light in all orders but 0.
 TOLERANCE = 0.01
+#: Stations that are timed before a stage.
+_TIMED = 5
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
 
 
 class Estimate(NamedTuple):
-    """Work of the next stage: number of stations and solutions (station, wavelength); seconds."""
+    """Work of the next stage.
+
+    Attributes
+    ----------
+    stations, solutions : numbers of stations, and of stations times wavelengths.
+    seconds : of a processor.
+    size : bytes of the table that the stage makes, or 0.
+    """
 
     stage: str
     stations: int
     solutions: int
     seconds: float
+    size: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,14 +85,30 @@ def announce_stage(
     problem: Problem,
     jobs: Jobs,
     places: Sequence[Place],
+    size: float = 0.0,
 ) -> None:
-    """Time the stage's middle station and announce the stage."""
+    """Time some of the stage's stations and announce the stage; size : of its table, bytes."""
     if announce is silent:
         return
-    middle = places[len(places) // 2]
-    seconds = jobs.seconds(problem, middle) / len(middle.w)
+    some = places[len(places) // (2 * _TIMED) :: max(len(places) // _TIMED, 1)]
+    seconds = sum(jobs.seconds(problem, place) for place in some)
     solutions = sum(len(place.w) for place in places)
-    announce(Estimate(stage, len(places), solutions, seconds * solutions))
+    seconds *= solutions / sum(len(place.w) for place in some)
+    announce(Estimate(stage, len(places), solutions, seconds, size))
+
+
+def announce_comparison(
+    announce: Callable[[Estimate], None], problem: Problem, jobs: Jobs, places: Sequence[Place]
+) -> None:
+    """Time a solution at the first resolution, and announce the comparison with the next one."""
+    if announce is silent:
+        return
+    first = replace(problem, resolution=problem.resolution or coarsest(problem))
+    seconds = jobs.seconds(first, places[0]) / len(places[0].w)
+    solutions = sum(len(place.w) for place in places)
+    # a solution costs as its matrices: the cube of the resolution
+    both = seconds * solutions * (1.0 + STEP**3)
+    announce(Estimate("choosing the resolution", len(places), 2 * solutions, both))
 
 
 def silent(estimate: Estimate) -> None:

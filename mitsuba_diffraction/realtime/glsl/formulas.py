@@ -37,7 +37,7 @@ from ...shading.programs import Program
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "ORDERS": {
         order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
-        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
+        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4, horizon_correction: 3,
     },
     "FACE": {face_transmittance: 2, order_direction: 4},
     "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},

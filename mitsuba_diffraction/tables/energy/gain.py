@@ -74,11 +74,8 @@ class PathGain:
         """Return G of order 0, and the share that a flat face over the structure adds.
 
         turn : azimuths between both directions, rad.
-        sigma_0 : of the lobe's window, µm, times the index of the medium that light goes to.
+        sigma_0 : of the lobe's window, µm.
         """
-        if self.path.let_through:
-            gain = self.path.flat_transmittance(cos_i, cos_o)
-            return gain, np.zeros_like(gain)
         return self.path.mirrored(cos_i, cos_o, np.cos(turn), self.wavenumber, sigma_0)
 
     @cached_property

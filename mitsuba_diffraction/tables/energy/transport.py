@@ -26,7 +26,7 @@ import scipy
 from ...optics.geometry import wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
 from ...optics.paths import Path
-from ..directional import Array, DirectionGrid, LinearMap, Real, quadrature
+from ..directional import Array, DirectionGrid, LinearMap, Quadrature, Real, quadrature
 from ..order_mixture import NARROW, order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
@@ -79,7 +79,7 @@ class ScatteredOrders:
         least = LEAST_WEAK if self.mixture.beats is None else LEAST_WEAK**2
         self.has_weak = bool(total > least)
         self.strong = len(self.mixture.frequency)
-        self.nodes = quadrature(rings, steps)
+        self.nodes, self._directions = quadrature(rings, steps), (rings, steps)
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
         nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
@@ -89,6 +89,10 @@ class ScatteredOrders:
         self._powers = powers * np.interp(self._kappas, nodes, left)
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step / shortest
+
+    def nodes_within(self, critical_sine: float) -> Quadrature:
+        """Return directions on both sides of a critical angle."""
+        return quadrature(*self._directions, critical_sine)
 
     def order_0(self, kappa: Real) -> Real:
         """Return the power of order 0 at κ over the height scale and `densest`."""
@@ -123,7 +127,6 @@ class Transport:
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
-        self._optical_0 = orders.sigma_0 * path.left.index
         self._parts: list[Callable[[Array], Array]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
             half, nodes = grid.half, orders.nodes
@@ -150,23 +153,23 @@ class Transport:
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
         """Return the map from weights on a grid to the light of order 0."""
         if self._width_0 > _WIDE:
-            nodes = self._orders.nodes
-            every = self._order_0_everywhere(theta)
+            nodes = self._orders.nodes_within(self._path.left.critical_sine)
+            every = self._order_0_everywhere(theta, nodes)
             to_nodes = grid.interpolation(nodes.theta, phi[:, None] + nodes.azimuth)
             return lambda s: np.asarray(every @ to_nodes(s).T, np.float32)
         shares = self._order_0_shares(theta, grid)
         mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
         return lambda s: np.asarray(shares @ mirrored(s), np.float32)
 
-    def _order_0_everywhere(self, theta: Real) -> Real:
+    def _order_0_everywhere(self, theta: Real, nodes: Quadrature) -> Real:
         """Return shares (t, n) of order 0 that go to the quadrature's directions."""
         cos_i, sine = self._start(theta[:, None])
-        nodes, path = self._orders.nodes, self._path
+        path = self._path
         squared = ((nodes.x + sine) ** 2 + nodes.y**2) / self._width_0**2
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
         cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
-        gain, face = self._gain.order_0(cos_in, cos_out, nodes.azimuth, self._optical_0)
+        gain, face = self._gain.order_0(cos_in, cos_out, nodes.azimuth, self._orders.sigma_0)
         return np.asarray(lobe * (gain * power + face), np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
@@ -176,23 +179,26 @@ class Transport:
         cosθo, since d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon.
         """
         cos_i, sine, width, path = *self._start(theta[:, None]), self._width_0, self._path
-        low = np.clip(sine - LOBE_END * width, 0.0, 1.0)
-        high = np.minimum(sine + LOBE_END * width, 1.0)
+        # light within the critical angle goes into that cone, and light beyond stays outside
+        edge = path.left.critical_sine
+        ends = np.where(sine > edge, edge, 0.0), np.where(sine > edge, 1.0, edge)
+        low = np.clip(sine - LOBE_END * width, *ends)
+        high = np.clip(sine + LOBE_END * width, *ends)
         first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
         place = (np.arange(LOBE_NODES) + 0.5) / LOBE_NODES
-        # denser towards the horizon. Beyond the critical angle the step is 0, and so are the shares
-        cut = high == 1.0
-        cos_o = np.maximum(first + (last - first) * np.where(cut, place**2, place), 1e-9)
-        step = (last - first) * np.where(cut, 2.0 * place, 1.0) / LOBE_NODES
+        # denser towards both ends, where C may have a root's slope; where a lobe has no directions
+        # on this side the step is 0, and so are the shares
+        cos_o = np.maximum(first + (last - first) * place**2 * (3.0 - 2.0 * place), 1e-9)
+        step = (last - first) * 6.0 * place * (1.0 - place) / LOBE_NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
         cos_in = np.broadcast_to(cos_i, cos_o.shape)
-        gain, face = self._gain.order_0(cos_in, cos_o, np.pi, self._optical_0)
+        gain, face = self._gain.order_0(cos_in, cos_o, np.pi, self._orders.sigma_0)
         parts *= gain * power + face
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
-        return to_rows.summed(parts).matrix.toarray()
+        return to_rows.summed(np.asarray(parts, np.float32)).matrix.toarray()
 
     def _weak_shares(self, theta: Real, phi: Real) -> Array:
         """Return shares (t, p, n) of the quadrature's directions, at azimuths turned by phi."""
@@ -202,7 +208,7 @@ class Transport:
         densities = [(mixture.density, gain)]
         if mixture.beats is not None:
             start, end = (np.broadcast_to(each, gain.shape) for each in (cos_i, nodes.cosine))
-            zeroth, _ = self._gain.order_0(start, end, nodes.azimuth, self._optical_0)
+            zeroth, _ = self._gain.order_0(start, end, nodes.azimuth, self._orders.sigma_0)
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
         position = np.minimum(
             self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001

@@ -41,7 +41,9 @@ LIGHT = ("--animate", "light=0:0.4")
 @pytest.fixture
 def render(run, scene):
     """`render(*options)`: frames of the scene, quickly."""
-    return lambda *options: run("render", scene, "-m", "scalar_rgb", "--view", "standard", *options)
+    return lambda *options: run(
+        "render", scene, "-m", "scalar_rgb", "--tonemap", "standard", *options
+    )
 
 
 def brightness(path):
@@ -97,7 +99,7 @@ def test_frames_that_are_there_are_kept(render):
          "was the scene's and is 1"),
         (["-D", "around=7"], "their -D around: of frame_0000.png it was None and is 7"),
         (["--exposure", "1"], "their exposure"),
-        (["--view", "natural"], "their view"),
+        (["--tonemap", "natural"], "their view"),
         (["--exr"], "their EXR: of frame_0000.png it is missing"),
         (["--preview"], "their preview"),
     ],

@@ -34,7 +34,7 @@ def test_a_png_alone_can_be_asked_for(run, scene):
 
 def test_the_png_is_srgb_and_exposure_is_in_stops(run, scene):
     assert run("render", scene, *QUICK, "-s", "1", "-o", "a.exr", "--exposure", "0.5",
-               "--view", "standard").code == 0  # fmt: skip
+               "--tonemap", "standard").code == 0  # fmt: skip
     linear = np.minimum(pixels("a.exr") * 2**0.5, 1)
     # IEC 61966-2-1
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

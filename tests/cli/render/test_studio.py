@@ -70,8 +70,8 @@ def test_a_sky_over_a_label_comes_with_a_floor():
         (["--base", "gold"], {"material": "gold"}),
         (["--base", "sienna"], {"material": "keratin", "pigment": "sienna"}),
         (["--base", "skin.png"], {"material": "keratin", "pigment": "skin.png"}),
-        (["--look", "skin", "--base", "gold"], {"material": "keratin", "pigment": "gold"}),
-        (["--look", "coated"], {"material": "Al", "coat_ior": "1.5"}),
+        (["--finish", "skin", "--base", "gold"], {"material": "keratin", "pigment": "gold"}),
+        (["--finish", "coated"], {"material": "Al", "coat_ior": "1.5"}),
         (["--height-scale", "0.5", "--clamp", "20"], {"height_scale": "0.5", "render:clamp": "20"}),
     ],
 )
@@ -104,7 +104,7 @@ def test_parameters_of_the_surface_change_a_preset(parameters):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--look", "metal", "--base", "sienna"], "--base 'sienna' is not a metal"),
+        (["--finish", "metal", "--base", "sienna"], "--base 'sienna' is not a metal"),
         (["--env", "none.hdr"], "'none.hdr' does not exist"),
         (["--env", "none.exr"], "'none.exr' is not a panorama"),
         (["--env", "probe.hdr"], "twice as wide as high"),
@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_an_error(parameters, options, said):
 
 
 @pytest.mark.parametrize(
-    "options", [["--preset", "cd", "--look", "skin"], ["--preset", "cd", "--sun", "12"],
+    "options", [["--preset", "cd", "--finish", "skin"], ["--preset", "cd", "--sun", "12"],
                 ["--preset", "cd", "--patch", "scale.npy"]],
 )  # fmt: skip
 def test_contradictions_are_usage_errors(parameters, options):

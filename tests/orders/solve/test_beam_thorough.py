@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.jobs import problem_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import polygon
+from mitsuba_diffraction.orders.solve.profiles import polygon, sinusoidal
+from mitsuba_diffraction.orders.solve.resolution import coarsest
 from mitsuba_diffraction.orders.solve.settings import Settings
+from mitsuba_diffraction.orders.solve.stations import Grating
 
 pytestmark = pytest.mark.thorough
 
@@ -28,3 +32,34 @@ def test_an_echelle_sends_its_light_back_into_the_order_of_its_blaze():
     assert efficiency[0] > 0.6
     # its next resolution
     assert table.header["solver_error"] < 1e-3
+
+
+def test_the_first_resolution_of_an_echelle_carries_the_waves_along_its_facets():
+    """R4, 31.6 lines/mm: no light from nothing, and Littrow's order is the brightest."""
+    period, tangent, lam = 31.646, 4.0, (550.0, 550.0)
+    width = period / (1.0 + tangent**2)
+    echelle = polygon([(0, 0), (width, width * tangent)], period)
+    grating = Grating(echelle, material_of("Al", lam), 1.0, lam)
+    settings = Settings(wavelengths=lam, resolution=coarsest(problem_of(grating, "auto", 0)))
+    sine = float(np.sin(np.arctan(tangent)))
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table = solve_orders(
+            echelle, "Al", theta=-np.degrees(np.arctan(tangent)), settings=settings
+        )
+    # with fewer harmonics than waves along a facet, efficiencies sum to 1e11 and more
+    assert table.header["solver_error"] < 0.02
+    orders = table.response.orders[:, 0]
+    shares = table.efficiency(sine, 0.0, lam[0], orders)
+    assert shares.sum() < 1.0
+    assert abs(orders[shares.argmax()] + 2.0 * sine * period / 0.55) <= 1.0
+
+
+@pytest.mark.parametrize(("period", "waves"), [(50.0, 61), (100.0, 1)])
+def test_one_direction_of_a_long_period_is_a_small_table(period, waves):
+    """Aluminium, 0.1 µm deep: its reflectance in all orders, in a megabyte at most."""
+    settings = Settings(wavelengths=(550.0, 550.0), tolerance=0.02)
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table = solve_orders(sinusoidal(period, 0.1), "Al", theta=20.0, settings=settings)
+    assert waves * table.nbytes < 1e6
+    shares = table.efficiency(-np.sin(np.radians(20.0)), 0.0, 550.0, table.response.orders[:, 0])
+    assert shares.sum() == pytest.approx(0.915, abs=0.01)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.io import netcdf_file
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
+from mitsuba_diffraction.orders.lists import read_efficiencies
 from mitsuba_diffraction.reference.boundary import small_slope
 from tests.support.orders import shallow_grating, thin_grating
 
@@ -88,3 +90,42 @@ def test_light_that_has_no_efficiencies_is_refused(light, message):
     table = thin_grating(0.8, counts=(2, 2, 1), wavelengths=(500.0, 640.0))
     with pytest.raises(DiffractionError, match=message):
         list_orders(table, *light)
+
+
+def test_jones_matrices_of_order_0_are_fresnel_s():
+    """Amplitudes of a flat metal about s and p (Born and Wolf, section 1.5.2), at any azimuth."""
+    index = 0.97 + 6.4j
+    table = shallow_grating(index)
+    theta, phi = np.radians([20.0, 50.0, 70.0]), np.radians([0.0, 35.0, 130.0])
+    x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
+    jones = table.jones(x, y, 550.0, 0)
+    within = np.sqrt(index**2 - np.sin(theta) ** 2)
+    r_s = (np.cos(theta) - within) / (np.cos(theta) + within)
+    r_p = (index**2 * np.cos(theta) - within) / (index**2 * np.cos(theta) + within)
+    np.testing.assert_allclose(jones[:, 0, 0], np.abs(r_s), rtol=2e-3)
+    np.testing.assert_allclose(jones[:, 1, 1] / jones[:, 0, 0], r_p / r_s, rtol=3e-3)
+    assert np.abs(jones[:, [0, 1], [1, 0]]).max() < 2e-3
+
+
+def test_jones_matrices_have_the_efficiencies_of_s_and_p_and_come_back_from_netcdf(tmp_path):
+    table = shallow_grating(0.97 + 6.4j, 0.1)
+    light = ([520.0, 560.0], [0.0, 40.0], [0.0, 60.0])
+    listing = list_orders(table, *light, jones=True)
+    shares = list_orders(table, *light, polarised=True).rows[:, 4:]
+    power = (listing.rows[:, 4:] ** 2).reshape(-1, 2, 2, 2).sum(axis=(1, 3))
+    np.testing.assert_allclose(power, shares, atol=2e-4)
+    listing.save(tmp_path / "jones.nc")
+    with netcdf_file(tmp_path / "jones.nc", mmap=False) as file:
+        axes = [file.variables[name][:] for name in ("wavelength", "theta", "phi", "order")]
+        values = file.variables["J_pp_im"][:]
+    places = tuple(np.searchsorted(a, c) for a, c in zip(axes, listing.rows.T[:4], strict=True))
+    np.testing.assert_array_equal(values[places], listing.rows[:, listing.columns.index("J_pp_im")])
+    with pytest.raises(DiffractionError, match="polarised"):
+        list_orders(thin_grating(0.6, counts=(2, 2, 1)), 550.0, 0.0, jones=True)
+
+
+def test_efficiencies_in_netcdf_are_read_as_a_list(tmp_path):
+    listing = list_orders(thin_grating(0.6, counts=(2, 2, 1)), [500.0, 550.0], [0.0, 40.0])
+    listing.save(tmp_path / "list.nc")
+    grid = read_efficiencies(tmp_path / "list.nc")
+    assert np.nansum(grid.values) == pytest.approx(listing.rows[:, 4:].sum())

@@ -10,7 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders import cells
-from mitsuba_diffraction.orders.solve import orders
+from mitsuba_diffraction.orders.solve import node_counts, orders
 from mitsuba_diffraction.orders.solve.accuracy import measured_error
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
@@ -56,8 +56,27 @@ def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
 def test_few_nodes_are_chosen_for_smooth_efficiencies():
     at = cells.nodes(24)[:, None, None, None]
     smooth, rough = 1 + 0.1 * at**2, 1 + 0.1 / (1 + 900 * (at - 0.4) ** 2)
-    assert count_for(smooth, 2, 1e-6) == 3
-    assert count_for(rough, 2, 1e-3) > 12
+    assert count_for(smooth, 2, 1e-6).nodes == 3
+    needed = count_for(rough, 2, 1e-3)
+    assert needed.nodes > 12
+    assert needed.missed > count_for(rough, 2, 1e-1).missed * 1e-3
+
+
+def test_a_tolerance_that_lines_say_is_out_of_reach_is_refused_before_the_solution(monkeypatch):
+    monkeypatch.setattr(node_counts, "MAX_NODES", (4, 3, 2))
+    exact = replace(SETTINGS, tolerance=1e-4)
+    stages = []
+    with pytest.raises(DiffractionError, match=r"tolerance of 0.01% will not be reached"):
+        solve_orders(PROFILE, "Al", settings=exact, announce=lambda e: stages.append(e.stage))
+    assert stages == ["choosing nodes"]
+
+
+def test_the_size_of_a_table_is_announced_before_it_is_solved():
+    estimates = []
+    made = solve_orders(PROFILE, "Al", settings=SETTINGS, announce=estimates.append)
+    solving = [e for e in estimates if e.stage == "solving"]
+    assert solving[-1].size == made.nbytes
+    assert solving[0].seconds > 0
 
 
 def test_the_error_compares_with_new_solutions(table):
@@ -112,7 +131,7 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
 
 def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
-    monkeypatch.setattr(orders, "_count", lambda *_: orders.Counts(2, 2, 1))
+    monkeypatch.setattr(node_counts, "_count", lambda *_: (orders.Counts(2, 2, 1), 0.0))
     exact = replace(SETTINGS, tolerance=1e-3)
     with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
         coarse = solve_orders(PROFILE, "none", settings=exact)

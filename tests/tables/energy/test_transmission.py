@@ -70,20 +70,15 @@ def test_a_flat_surface_sends_on_all_light_whatever_its_index(index, thin):
     assert np.abs(kept - 1.0).max() < 5e-3
 
 
-@pytest.mark.parametrize(
-    ("index", "thin"),
-    [
-        pytest.param(1.01, False, marks=pytest.mark.xfail(strict=True, reason="sums reach 1.0075")),
-        (1.01, True), (1.5, False), (1.5, True),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("index", [1.01, 1.5])
 def test_a_narrow_window_makes_no_light(index, thin):
     """Order 0 has what the flat surface transmits: 1/w², as large as one likes, is not in it."""
     raw, kept = sums(flat(), index, 4.0, thin)
-    assert raw.max() < 1.002
-    # lobes are 6° wide: from 59° on part of them is below the horizon, or beyond the critical angle
-    assert kept.max() < 1.005
-    assert np.abs(kept[:, :, :2] - 1.0).max() < 2e-2
+    # lobes are 6° wide: from 59° on part of them is below the horizon, or beyond the critical
+    # angle, and C is that of a straight edge
+    assert np.abs(raw - 1.0).max() < 1.2e-2
+    assert np.abs(kept - 1.0).max() < 4e-3
 
 
 @pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
