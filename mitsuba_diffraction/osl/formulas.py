@@ -26,7 +26,6 @@ from ..shading.dialects import OSL
 from ..shading.pair_power import Coat, pair_power
 from ..shading.programs import Program
 
-
 #: Complex number of OSL, an index n + ik.
 _COMPLEX = """struct md_number { float re; float im; };
 md_number md_of(float re, float im) { md_number n; n.re = re; n.im = im; return n; }
