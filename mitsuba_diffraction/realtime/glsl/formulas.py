@@ -32,7 +32,6 @@ from ...optics.orders import (
 from ...shading.dialects import GLSL
 from ...shading.pair_power import Coat, coated_mirror, relative_power
 from ...shading.programs import Program
-from .rewriting import declared_names
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
@@ -45,6 +44,8 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
 }  # fmt: skip
+#: Macros of the shaders that a variable of a formula could be called.
+_MACROS = frozenset({"PI", "PAGE", "TEXELS"})
 _KINDS = {"1": "float", "2": "complex"}
 
 
@@ -60,7 +61,7 @@ def formulas(definitions: Mapping[str, str]) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
-    program = Program(GLSL, declared_names())
+    program = Program(GLSL, _MACROS)
     program.add(encoded_colour, "vector")
     if "DISPLAYED" in names:
         shown = shown_colour if "NATURAL" in names else encoded_colour
