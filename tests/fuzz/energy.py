@@ -21,8 +21,8 @@ from tests.support.lanes import interaction, lanes, spectra, vectors
 _DIRECTIONS, _VALUES = 3, 256
 #: Samples of a direction, and of those that may send on too much.
 _SAMPLES = 1 << 13, 1 << 17
-#: Angle (degrees) beyond which half of the directions are; share by which R + T may exceed 1, and the
-#: standard errors of its mean that are added.
+#: Angle (degrees) beyond which half of the directions are; share by which R + T may exceed 1, and
+#: the standard errors of its mean that are added.
 _GRAZING, _EXCESS, _ERRORS = 85.0, 0.005, 5.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
