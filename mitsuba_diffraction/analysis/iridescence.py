@@ -14,13 +14,13 @@ characterization of iridescent colours in biological studies, Interface Focus 9,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, median
+from scipy.ndimage import gaussian_filter, map_coordinates, median
 
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
@@ -39,12 +39,12 @@ HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
 #: Saturation below which a colour counts as grey.
 GREY = 0.1
 
-#: Unordered surfaces of which `chance_iridescence` is the mean.
+#: Unordered surfaces of which `light_and_chance` takes the mean.
 CHANCES = 3
 
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
-SHORTEST, LONGEST, STEP = 380.0, 780.0, 5.0
+SHORTEST, LONGEST, STEP = 380.0, 780.0, 10.0
 # Side of a direction's cell, in sines: at most the narrowest lobe's standard deviation, a scan's.
 _CELL = 0.008
 # Luminance, relative to the brightest direction, below which a direction has no colour.
@@ -119,62 +119,113 @@ class DiffractedLight:
 
 
 #: Factor of a material on the power of an order, and w = κ/k: functions of the sines (n, 2) of
-#: directions and a wavelength, nm; see `material_factor`.
+#: directions and a wavelength, nm; see `MaterialFactor.at`.
 Factor = Callable[[Reals, float], tuple[Reals, Reals]]
 
+# Polar angles, and azimuths from the light's, at which a material's factor is tabulated, degrees.
+_POLAR, _AZIMUTHS = np.linspace(0.0, 90.0, 91), np.linspace(0.0, 180.0, 37)
 
-def material_factor(bsdf: Any, light: LightDirection) -> Factor:
-    """Return the factor of a surface's material, layers and coat on the power of its orders.
 
-    bsdf : `diffraction` of the current variant, spectral and vectorised. Its pigment does not
-        diffract and is left out; so is the scale by which energy is conserved.
+@dataclass(frozen=True)
+class MaterialFactor:
+    """Factor of a material, layers and coat on the power of orders, for light of one polar angle.
+
+    It belongs to the material alone: scans of one survey share it.
+
+    Attributes
+    ----------
+    wavelengths : (n,), nm, those of the index.
+    factor : (n, polar, azimuths) on the power.
+    excess : (n, polar, azimuths), w less the sum of both cosines, which a coat changes.
     """
-    import drjit as dr
-    import mitsuba as mi
 
-    from ..plugin.memory import upload
-    from .maps.hemisphere import flat_interaction
+    wavelengths: Reals
+    factor: Reals
+    excess: Reals
 
-    towards = mi.Vector3f(light.direction.tolist())
+    @classmethod
+    def of(cls, bsdf: Any, theta: float) -> MaterialFactor:
+        """Tabulate the factor of a BSDF for light `theta` degrees from the normal.
 
-    def factor(sines: Reals, wavelength: float) -> tuple[Reals, Reals]:
-        x, y = (upload(mi.Float, column.astype(np.float32)) for column in sines.T)
-        si = flat_interaction(towards, len(sines))
-        channel = mi.Float(wavelength)
-        dr.make_opaque(channel)  # one kernel for all wavelengths
-        si.wavelengths = mi.UnpolarizedSpectrum(channel)
-        wo = mi.Vector3f(x, y, dr.safe_sqrt(1.0 - dr.square(x) - dr.square(y)))
-        site = bsdf.site_at(si, mi.Mask(True))
-        value, w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
-        return np.array(value[0], np.float64), np.broadcast_to(np.array(w), len(sines))
+        bsdf : `diffraction` of the current variant, spectral and vectorised. Its pigment does not
+            diffract and is left out; so is the scale by which energy is conserved.
+        """
+        import drjit as dr
+        import mitsuba as mi
 
-    return factor
+        from ..plugin.memory import upload
+        from .maps.hemisphere import flat_interaction
+
+        light = LightDirection(theta, 0.0)
+        polar, azimuth = (np.radians(a) for a in np.meshgrid(_POLAR, _AZIMUTHS, indexing="ij"))
+        cosine = np.maximum(np.cos(polar), 1e-4)
+        sine = np.sqrt(1.0 - cosine**2)
+        columns = sine * np.cos(azimuth), sine * np.sin(azimuth), cosine
+        x, y, z = (upload(mi.Float, c.ravel().astype(np.float32)) for c in columns)
+        wo = mi.Vector3f(x, y, z)
+        si = flat_interaction(mi.Vector3f(light.direction.tolist()), cosine.size)
+        factors, excesses = [], []
+        wavelengths = np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP)
+        for wavelength in wavelengths:
+            channel = mi.Float(float(wavelength))
+            dr.make_opaque(channel)  # one kernel for all wavelengths
+            si.wavelengths = mi.UnpolarizedSpectrum(channel)
+            site = bsdf.site_at(si, mi.Mask(True))
+            value, w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
+            shape = np.ones(cosine.size)
+            factors.append((np.array(value[0], np.float64) * shape).reshape(cosine.shape))
+            w = (np.array(w, np.float64) * shape).reshape(cosine.shape)
+            excesses.append(w - cosine - light.direction[2])
+        return cls(wavelengths, np.stack(factors), np.stack(excesses))
+
+    def at(self, light: LightDirection) -> Factor:
+        """Return the factor for light from a direction, whose polar angle is the table's."""
+
+        def factor(sines: Reals, wavelength: float) -> tuple[Reals, Reals]:
+            n = int(np.argmin(np.abs(self.wavelengths - wavelength)))
+            radius = np.minimum(np.hypot(*sines.T), 1.0)
+            turn = np.arctan2(sines[:, 1], sines[:, 0]) - math.radians(light.phi)
+            turn = np.abs((turn + math.pi) % (2.0 * math.pi) - math.pi)
+            place = (
+                np.degrees(np.arcsin(radius)) / _POLAR[1],
+                np.degrees(turn) / _AZIMUTHS[1],
+            )
+            value, excess = (
+                map_coordinates(field[n], place, order=1, mode="nearest")
+                for field in (self.factor, self.excess)
+            )
+            return value, light.direction[2] + np.sqrt(1.0 - radius**2) + excess
+
+        return factor
 
 
-def chance_iridescence(
+def light_and_chance(
     table: DiffractionTable, light: LightDirection, factor: Factor | None = None
-) -> float:
-    """Return the index of an unordered surface of the same size and roughness, by chance alone.
+) -> tuple[DiffractedLight, float]:
+    """Return the diffracted light, and the part of its index that chance explains.
 
-    The mean over `CHANCES` surfaces. Each order has the median power of all orders at its
-    frequency, times a random factor as of speckle, exponentially distributed.
+    Chance is an unordered surface of the same size and roughness, the mean over `CHANCES`: each
+    order has the median power of all orders at its frequency, times a random factor as of speckle,
+    exponentially distributed. The index is a root mean square over the light, so that chance has a
+    part in it by its share of the luminance: a grating's lobes are above the median and have none.
+
+    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
     """
     last = table.grid.last
     shape = (2 * last[1] + 1, 2 * last[0] + 1)
-    indices = []
-    for seed in range(CHANCES):
-        speckle = np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
-        parts = diffracted_light(table, light, speckle=speckle, factor=factor)
-        indices.append(parts.iridescence())
-    return float(np.mean(indices))
+    speckles = [
+        np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
+        for seed in range(CHANCES)
+    ]
+    own, *unordered = _by_direction(table, light, factor, speckles)
+    chance = float(np.mean([each.iridescence() for each in unordered]))
+    total = float(own.xyz[..., 1].sum())
+    share = float(np.mean([each.xyz[..., 1].sum() for each in unordered])) / max(total, 1e-300)
+    return own, chance * math.sqrt(min(share, 1.0))
 
 
 def diffracted_light(
-    table: DiffractionTable,
-    light: LightDirection,
-    *,
-    speckle: Reals | None = None,
-    factor: Factor | None = None,
+    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
 ) -> DiffractedLight:
     """Collect the orders of a table by direction, in daylight (D65).
 
@@ -184,11 +235,22 @@ def diffracted_light(
     Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
-    speckle : factor (2 ny + 1, 2 nx + 1) of each order on the median power of all orders at its
-        frequency, which replaces its own.
-    factor : of the surface's material (`material_factor`); R = 1 without.
+    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
 
     Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
+    """
+    return _by_direction(table, light, factor)[0]
+
+
+def _by_direction(
+    table: DiffractionTable,
+    light: LightDirection,
+    factor: Factor | None,
+    speckles: Sequence[Reals] = (),
+) -> list[DiffractedLight]:
+    """Collect the orders, and once more for each field of factors that replaces their powers.
+
+    speckles : factors (2 ny + 1, 2 nx + 1) on the median power of all orders at a frequency.
     """
     if table.wavelength_range[0] > SHORTEST:
         raise DiffractionError(
@@ -208,8 +270,8 @@ def diffracted_light(
     mirror = frequency < (1.0 + 1e-6) * 2.0 * math.pi / width
     rings = np.round(frequency / min(table.spacing)).astype(int)
     count = 2 * math.ceil(1.15 / _CELL)
-    xyz = np.zeros((count, count, 3))
-    central = np.zeros(3)
+    xyz = np.zeros((1 + len(speckles), count, count, 3))
+    central = np.zeros((1 + len(speckles), 3))
     for wavelength in np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP):
         k = float(wavenumber(wavelength))
         x, y = qx / k - light.direction[0], qy / k - light.direction[1]
@@ -218,28 +280,30 @@ def diffracted_light(
         sines = np.stack([x[columns], y[rows]], axis=-1)
         cosine = np.sqrt(z2[rows, columns])
         w, reflected = light.direction[2] + cosine, np.ones(1)
+        r_0, w_0 = np.ones(1), np.array([2.0 * light.direction[2]])
         if factor is not None:
             reflected, w = factor(sines, float(wavelength))
+            r_0, w_0 = factor(light.mirror[None, :2], float(wavelength))
         factors = expansion.weights(k * w) / scale
         interval = expansion.interval(k * w)
         power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
-        power = np.maximum(power, 0.0)
-        if speckle is not None:
+        powers = [np.maximum(power, 0.0)]
+        if speckles:
             ring = rings[rows, columns]
-            medians = median(power, ring, np.arange(rings.max() + 1))
-            power = np.nan_to_num(medians)[ring] * speckle[rows, columns]
-        power *= _obliquity(sines, cosine, light) * reflected
+            medians = median(powers[0], ring, np.arange(rings.max() + 1))
+            unordered = np.nan_to_num(medians)[ring]
+            powers += [unordered * speckle[rows, columns] for speckle in speckles]
+        reflected = reflected * _obliquity(sines, cosine, light)
         near = mirror[rows, columns]
         weights = response(wavelength) * STEP
-        central += weights * power[near].sum()
-        r, w_0 = np.ones(1), np.array([2.0 * light.direction[2]])
-        if factor is not None:
-            r, w_0 = factor(light.mirror[None, :2], float(wavelength))
-        central += weights * float(r[0] * order_0_power(table.averaged, k * w_0)[0])
+        order_0 = float(r_0[0] * order_0_power(table.averaged, k * w_0)[0])
         lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
-        xyz += _spread(sines[~near], power[~near], lobe, count)[..., None] * weights
-    diffracted = float(xyz[..., 1].sum())
-    return DiffractedLight(xyz, diffracted / max(diffracted + central[1], 1e-300))
+        sent = np.stack(powers) * reflected
+        central += weights * (sent[:, near].sum(axis=1) + order_0)[:, None]
+        xyz += _spread(sines[~near], sent[:, ~near], lobe, count)[..., None] * weights
+    diffracted = xyz[..., 1].sum(axis=(1, 2))
+    shares = diffracted / np.maximum(diffracted + central[:, 1], 1e-300)
+    return [DiffractedLight(*both) for both in zip(xyz, shares.tolist(), strict=True)]
 
 
 def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
@@ -254,21 +318,23 @@ def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
     return np.asarray((dot / w) ** 2 / (cos_i * cosine))
 
 
-def _spread(sines: Reals, power: Reals, lobe: float, count: int) -> Reals:
-    """Distribute powers (n,) at sines (n, 2) over the cells (count, count), with their lobes."""
+def _spread(sines: Reals, powers: Reals, lobe: float, count: int) -> Reals:
+    """Distribute powers (m, n) at sines (n, 2) over cells (m, count, count), with their lobes."""
     position = sines / _CELL + 0.5 * count
     nearest = np.round(position).astype(int)
     part = position - nearest
     # quadratic B-splines, whose variance is 1/4 wherever the position lies between cells
     weights = 0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2
-    cells = np.zeros(count * count)
+    cells = np.zeros((len(powers), count * count))
     for right, along in enumerate(weights):
         for up, across in enumerate(weights):
             index = (nearest[:, 1] + up - 1) * count + nearest[:, 0] + right - 1
-            weight = power * along[:, 0] * across[:, 1]
-            cells += np.bincount(index, weight, minlength=count * count)
+            share = along[:, 0] * across[:, 1]
+            for n, power in enumerate(powers):
+                cells[n] += np.bincount(index, power * share, minlength=count * count)
     deviation = math.sqrt((lobe / _CELL) ** 2 - 0.25)
-    return np.asarray(gaussian_filter(cells.reshape(count, count), deviation, mode="constant"))
+    fields = cells.reshape(-1, count, count)
+    return np.stack([gaussian_filter(each, deviation, mode="constant") for each in fields])
 
 
 def _chromaticity(xyz: Reals) -> Reals:

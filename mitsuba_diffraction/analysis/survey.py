@@ -32,7 +32,7 @@ from ..tables.source import TableSource
 from ..tables.store import key_of
 from ..tables.table import DiffractionTable
 from .crops import crops_of
-from .iridescence import WINDOW, chance_iridescence, diffracted_light, material_factor
+from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
 from .media import in_medium
@@ -42,11 +42,13 @@ from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 9
+VERSION = 10
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
 TABLE, SAMPLES, SCANS = "survey.csv", "samples.csv", "scans"
+# Of the last surface, by surface, angle of the light and variant.
+_materials: dict[Any, MaterialFactor] = {}
 
 
 @dataclass(frozen=True)
@@ -144,18 +146,18 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
     row["warnings"] = "; ".join(source.warnings(settings))
     phi = gratings[0].direction if gratings else 0.0
-    bsdf = bsdf_of(table, **dict(job.surface))
+    # the energy of a metal is solved for some ten seconds; neither map nor index need it
+    surface = {**dict(job.surface), "energy_conserving": False}
+    bsdf = bsdf_of(table, **surface)
     row["surface"] = bsdf.describe().summary
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     light = LightDirection(job.theta, phi)
-    set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
-    factor = material_factor(bsdf_of(table, **dict(job.surface)), light)
-    diffracted = diffracted_light(table, light, factor=factor)
+    diffracted, floor = light_and_chance(table, light, _material(job, table).at(light))
     row["diffracted"] = diffracted.share
     brightest, theta, phi = diffracted.brightest()
     row |= {"brightest": brightest, "brightest_theta_deg": theta, "brightest_phi_deg": phi}
-    index, floor = diffracted.iridescence(), chance_iridescence(table, light, factor)
+    index = diffracted.iridescence()
     row |= {"iridescence": index, "iridescence_by_chance": floor}
     # colour beyond chance, weighed by how much of the light has it
     row["iridescent_light"] = (
@@ -165,6 +167,23 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row["ranked_among"] = f"scans {'from' if enough else 'below'} {WINDOW:g} µm"
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": _exr(table), ".png": _png(measured)}
+
+
+def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
+    """Return the factor of the surface's material, which all scans share.
+
+    Mitsuba takes seconds to change the variant: it loads its integrators again.
+    """
+    from ..scene.load import set_variant
+
+    key = job.surface, job.theta, job.variant
+    if key not in _materials:
+        set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
+        bsdf = bsdf_of(table, **{**dict(job.surface), "energy_conserving": False})
+        _materials.clear()
+        _materials[key] = MaterialFactor.of(bsdf, job.theta)
+        set_variant(job.variant)
+    return _materials[key]
 
 
 def _exr(table: DiffractionTable) -> bytes:
@@ -259,7 +278,8 @@ def run_survey(
                 rows[len(named)] = stored
             named.append(name)
     todo = list(jobs)
-    progress(0, len(todo), "scans")
+    files_of_jobs = [Path(named[n]["file"]).name for n in todo]
+    progress(0, len(todo), _next(files_of_jobs, 0, client))
     results = run_jobs(client, measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
@@ -268,13 +288,18 @@ def run_survey(
         else:
             rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
         write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
-        progress(done, len(todo), "scans")
+        progress(done, len(todo), _next(files_of_jobs, done, client))
     result = write_rows(folder / TABLE, named, rows)
     write_repeats(folder / SAMPLES, result)
     ranking = ranked(result)
     write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
     write_sheets(folder, ranking)
     return result
+
+
+def _next(names: Sequence[str], done: int, client: Any) -> str:
+    """Return the scan that is measured next, for a progress bar; workers measure several."""
+    return names[done] if client is None and done < len(names) else "scans"
 
 
 def files_in(folder: Path) -> list[Path]:

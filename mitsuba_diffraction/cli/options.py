@@ -52,7 +52,11 @@ HEIGHTS: dict[str, tuple[str, str]] = {
     ),
     "height_unit": ("U", "unit of the numbers in the file, e.g. nm; overrides what it states"),
     "channel": ("C", "name or index of the channel; default: the heights"),
-    "crop": ("W[,H]", "µm, crop to a central region; default: all of the patch"),
+    "crop": (
+        "W[,H[,X,Y]]",
+        "µm, crop to a central region, or to one with the lower left corner X, Y; default: all of "
+        "the patch",
+    ),
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
     "level": (
         "METHOD",

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..scene.load import set_variant
@@ -18,6 +19,9 @@ from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, elapsed, output_name, save_figure
+
+if TYPE_CHECKING:
+    from ..analysis.spectra import Spectra
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -87,6 +91,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--illuminant LIGHT|CSV", "light of --observer: ideal, the same number of quanta at all "
          "wavelengths; d55, sun; d65, sun and sky; d75, sky in open shade; leaves, a model of "
          "shade under leaves; or a file of wavelengths (nm) and photons; default: ideal"),
+        ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
+         "first, which share the noise; default: the eye's, docs/seen.md", _ratios),
+        ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
+         "default: 0.1", _ratios),
+        ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
+         number_between(1e-4, 1e2)),
         ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
          "2019), fitted to lamps from 0 to 60 degrees and detectors between them, beside the "
          "mirror direction", bool),
@@ -131,12 +141,15 @@ def run(args: argparse.Namespace) -> Figures:
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         measurement = Measurement(args, geometry, lam, bar)
-        measured = {
-            name: [spectra for file in members for spectra in measurement.of_file(file)]
-            for name, members in groups.items()
-        }
+        measured = _measured(measurement, groups)
+    if any(len(groups[name]) > len(kept) for name, (kept, _) in measured.items()):
+        args.code = 1
+    groups = {name: kept for name, (kept, _) in measured.items()}
+    files = [file for members in groups.values() for file in members]
     measurement.say_notes()
-    everything = files_of_spectra.on_common_wavelengths(measured)
+    everything = files_of_spectra.on_common_wavelengths(
+        {name: parts for name, (_, parts) in measured.items()}
+    )
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} nm on, where every table begins")
@@ -177,6 +190,31 @@ def run(args: argparse.Namespace) -> Figures:
             "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
 
 
+def _measured(
+    measurement: Measurement, groups: dict[str, list[Path]]
+) -> dict[str, tuple[list[Path], list[Spectra]]]:
+    """Measure the spectra of each group; return the files that could be measured, and spectra.
+
+    A file among several that cannot be is said and left out.
+
+    Raises a DiffractionError if no file of a group can be measured.
+    """
+    measured = {}
+    for name, members in groups.items():
+        kept: list[Path] = []
+        spectra: list[Spectra] = []
+        for file in members:
+            try:
+                spectra += measurement.of_file(file)
+                kept.append(file)
+            except DiffractionError as error:
+                if file is members[-1] and not kept:
+                    raise
+                say(f"left out: {error}")
+        measured[name] = kept, spectra
+    return measured
+
+
 def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]:
     """Return the files of -o, with standard errors of `repeated` scans."""
     names = [
@@ -190,14 +228,29 @@ def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}.csv")
 
 
+def _ratios(text: str) -> tuple[float, ...]:
+    """Return the numbers of a list with commas."""
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"expected numbers, e.g. 1,1,2, got {text!r}") from error
+
+
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
     """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
     if args.observer is None:
-        options.refuse(args, ["illuminant"], ": is the light of --observer; name one")
+        theirs = ("illuminant", "cone_ratios", "weber", "weber_luminance")
+        options.refuse(args, theirs, ": belongs to --observer; name one")
         return None, None
     from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 
-    eye = eye_of(args.observer)
+    asked = options.given(args, ("cone_ratios", "weber", "weber_luminance"))
+    if "cone_ratios" in asked:
+        asked["density"] = asked.pop("cone_ratios")
+        if len(asked.get("weber", ())) > 1:
+            args.parser.error("argument --cone-ratios: with a Weber fraction of each receptor")
+    eye = replace(eye_of(args.observer), **asked)
+    say(f"{args.observer}: {eye}")
     quantum_catches(eye, lam, [[0.0]] * len(lam))
     return eye, illuminant_of(args.illuminant or "ideal")
 

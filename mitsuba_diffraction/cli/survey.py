@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,13 @@ def run(args: argparse.Namespace) -> Figures:
         say(
             f"scans are {wide[0]:.3g} to {wide[-1]:.3g} µm wide: small ones have more colour by "
             "chance; compare them with --crops 4, crops of 10 µm"
+        )
+    scans = Counter(row["sample"] for row in rows if not row["reason"])
+    alone = [r for r in rows if not r["reason"] and scans[r["sample"]] == 1]
+    if any(row.get("windows") == 1 for row in alone):
+        say(
+            "one index of a small scan is uncertain by some 15 %: its window sees one part of the "
+            "surface; compare means of several scans of a sample (samples.csv)"
         )
     whole = sum("crop" not in row for row in rows if not row["reason"])
     if args.crops is not None and whole:

@@ -79,20 +79,20 @@ def height_unit_of(value: str | None) -> str | None:
     return value.strip()
 
 
-def crop_of(value: Crop | None) -> tuple[float, float] | None:
-    """Return the size (width, height) in µm from a number, a pair, "20" or "20, 10".
+def crop_of(value: Crop | None) -> tuple[float, ...] | None:
+    """Return (width, height) or (width, height, x, y) in µm from a number, 2, 4, or a string.
 
     `None` and "none" give `None`: no crop.
     """
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
     lengths = numbers_of(value) or ()
-    if len(lengths) not in (1, 2) or min(lengths) <= 0:
+    if len(lengths) not in (1, 2, 4) or min(lengths[:2]) <= 0 or min(lengths) < 0:
         raise DiffractionError(
-            "crop: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
-            f"got {quoted(value)}"
+            "crop: expected a width or a pair (width, height) in µm, above 0, perhaps with the "
+            f"lower left corner, (width, height, x, y), or 'none'; got {quoted(value)}"
         )
-    return lengths[0], lengths[-1]
+    return lengths if len(lengths) > 1 else (lengths[0], lengths[0])
 
 
 def is_auto(value: object) -> bool:
@@ -106,7 +106,7 @@ def numbers_of(value: object) -> tuple[float, ...] | None:
         parts: list[Any] = [part for part in re.split(r"[,\s]+", value.strip()) if part]
     else:
         listed = value.ravel() if isinstance(value, np.ndarray) else value
-        parts = list(listed[:3] if isinstance(listed, tuple | list | np.ndarray) else [listed])
+        parts = list(listed[:5] if isinstance(listed, tuple | list | np.ndarray) else [listed])
         if any(isinstance(n, bool | np.bool_) or not isinstance(n, numbers.Real) for n in parts):
             return None
     try:

@@ -52,8 +52,8 @@ def load(
         Name or index of the channel of an instrument file (name for an EXR); by default the
         one that holds heights.
     crop
-        Crop to a central region (µm): one number for a square, a pair
-        (width, height), or a string of either.
+        Crop to a central region (µm): one number for a square, a pair (width, height); or to one
+        elsewhere, (width, height, x, y) with its lower left corner; or a string of these.
     fill
         Method to fill points without data: "nearest" or "harmonic" (see
         `preprocess.fill_missing`); by default they are refused.

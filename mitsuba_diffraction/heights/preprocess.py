@@ -17,33 +17,36 @@ from ..errors import DiffractionError
 from .field import FloatArray, HeightField, blocks
 
 Size = tuple[float, float]
+Region = tuple[float, ...]  # (width, height), or (width, height, x, y), µm
 
 FILLS = ("nearest", "harmonic")
 
 # Largest share of points without data that may be filled: beyond half, the filling and not the
 # sample would decide the picture.
 LARGEST_SHARE = 0.5
-# Makes the median absolute deviation of normally distributed heights their standard deviation:
-# 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
-_MAD_TO_SIGMA = 1.4826
+#: Makes the median absolute deviation of normally distributed heights their standard deviation:
+#: 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
+MAD_TO_SIGMA = 1.4826
 
 
-def central_part(
-    values: npt.NDArray[Any], pixel_size: Size, size: Size, name: str
+def part_of(
+    values: npt.NDArray[Any], pixel_size: Size, region: Region, name: str
 ) -> tuple[npt.NDArray[Any], str]:
-    """Return the central region of values (ny, nx), and the history line, "" if that is all.
+    """Return a region of values (ny, nx), and the history line, "" if that is all.
 
-    Raises a DiffractionError if the region is larger than the patch, or less than two pixels wide
-    or high.
+    Raises a DiffractionError if the region leaves the patch, or is less than two pixels wide or
+    high.
 
     Parameters
     ----------
     pixel_size : (dx, dy), µm.
-    size : (width, height) of the region, µm, met to half a pixel.
+    region : (width, height) of the central region, or (width, height, x, y) of one whose lower left
+        corner is at (x, y), µm, met to half a pixel.
     name : name of the patch in errors.
     """
     (ny, nx), (dx, dy) = values.shape, pixel_size
     whole = f"{nx * dx:.4g} x {ny * dy:.4g} µm"
+    size, corner = region[:2], region[2:]
     # at most one too many: the quotient may be infinite
     kept = round(min(size[0] / dx, nx + 1)), round(min(size[1] / dy, ny + 1))
     for count, most in zip(kept[::-1], (ny, nx), strict=True):
@@ -55,17 +58,26 @@ def central_part(
             )
     if kept == (nx, ny):
         return values, ""
-    left, top = (nx - kept[0]) // 2, (ny - kept[1]) // 2
+    left, low, where = (nx - kept[0]) // 2, (ny - kept[1]) // 2, "the middle "
+    if corner:
+        left, low = round(min(corner[0] / dx, nx)), round(min(corner[1] / dy, ny))
+        where = ""
+        if left + kept[0] > nx or low + kept[1] > ny:
+            raise DiffractionError(
+                f"{name}: crop to {size[0]:g} x {size[1]:g} µm from ({corner[0]:g}, {corner[1]:g}) "
+                f"leaves the patch, which is {whole}"
+            )
     line = (
-        f"cropped to the middle {kept[0] * dx:.4g} x {kept[1] * dy:.4g} µm of {whole} "
-        f"({kept[0]} x {kept[1]} of {nx} x {ny} pixels)"
+        f"cropped to {where}{kept[0] * dx:.4g} x {kept[1] * dy:.4g} µm of {whole} "
+        f"({kept[0]} x {kept[1]} of {nx} x {ny} pixels"
+        f"{f', from {left}, {low}' if corner else ''})"
     )
-    return values[top : top + kept[1], left : left + kept[0]], line
+    return values[low : low + kept[1], left : left + kept[0]], line
 
 
-def crop(field: HeightField, size: Size) -> HeightField:
-    """Crop to the central region of `size` = (width, height), µm, and mark the patch `cut_out`."""
-    heights, line = central_part(field.heights, field.pixel_size, size, field.name)
+def crop(field: HeightField, region: Region) -> HeightField:
+    """Crop to a region, as in `part_of`, and mark the patch `cut_out`."""
+    heights, line = part_of(field.heights, field.pixel_size, region, field.name)
     return field.changed(heights, line, cut_out=True, periodic=False) if line else field
 
 
@@ -221,7 +233,7 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
             f"clip: expected how many standard deviations to keep, at least 1, got {sigmas!r}"
         )
     median = float(np.median(field.heights))
-    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(field.heights - median)))
+    sigma = MAD_TO_SIGMA * float(np.median(np.abs(field.heights - median)))
     if sigma == 0 and field.range > 0:
         raise DiffractionError(
             f"{field.name}: clip finds no outliers, since more than half of the heights are equal; "

@@ -54,7 +54,7 @@ class LoadOptions:
     max_height: float | None = None
     height_unit: str | None = None
     channel: str | int | None = None
-    crop: tuple[float, float] | None = None
+    crop: tuple[float, ...] | None = None
     fill: str | None = None
     level: str | None = None
     clip: float | None = None
@@ -198,7 +198,7 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
         values = raw.values if scale == 1.0 else raw.values * np.float64(scale)
     notes = (*raw.notes, *lines)
     if options.crop is not None:
-        values, line = preprocess.central_part(values, pixel_size, options.crop, shown)
+        values, line = preprocess.part_of(values, pixel_size, options.crop, shown)
         notes = (*notes, line) if line else notes
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill

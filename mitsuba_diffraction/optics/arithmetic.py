@@ -17,10 +17,9 @@ Vectors are tuples of numbers. A branch on a value is `where`; a branch on a num
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
-from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -29,10 +28,6 @@ Number: TypeAlias = Any
 
 Mask: TypeAlias = Any
 """The result of a comparison of numbers."""
-
-
-Parameters = ParamSpec("Parameters")
-Result = TypeVar("Result")
 
 
 class Arithmetic(Protocol):
@@ -186,24 +181,6 @@ def modulus(z: Number) -> Number:
     return xp.sqrt(squared(z)) if is_complex(z) else xp.absolute(z)
 
 
-#: Writes a call of a formula while `shading.programs.Program` writes another; None otherwise.
-emission: Callable[[Callable[..., Any], tuple[Any, ...]], Any] | None = None
-
-
-def formula(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """Make a formula a function of its own in shaders, rather than a part of those that call it."""
-
-    @functools.wraps(function)
-    def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        if emission is None or kwargs:
-            return function(*args, **kwargs)
-        written: Result = emission(function, args)
-        return written
-
-    return call
-
-
-@formula
 def one_minus_exp(x: Number) -> Number:
     """Return 1 − exp(−x), x ≥ 0, without cancellation.
 

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arithmetic import Number, formula, one_minus_exp
+from .arithmetic import Number, one_minus_exp
 
 Real = NDArray[np.float64]
 
@@ -127,7 +127,6 @@ class RoughnessTable:
         return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
-@formula
 def kirchhoff_weight(kappa: Number, variance: Number, normal_reflectance: Number) -> Number:
     """Return 1 − s, the weight of Kirchhoff's matrix, eq. 9.
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .arithmetic import Number, formula, modulus, of, squared
+from .arithmetic import Number, modulus, of, squared
 from .boundary import Direction, Geometry, Jones
 from .fresnel import Index, amplitudes
 
@@ -47,7 +47,6 @@ class FaceCoefficients(NamedTuple):
     r_p: Number
 
 
-@formula
 def refracted(direction: Direction, n: Number) -> Direction:
     """Return a unit vector above the face as it is in the coat, of relative index n."""
     outside_x, outside_y, _ = direction
@@ -57,7 +56,6 @@ def refracted(direction: Direction, n: Number) -> Direction:
     return x, y, xp.sqrt(xp.maximum(1.0 - (x * x + y * y), 1e-12))
 
 
-@formula
 def crossing(cosine: Number, n: Number) -> FaceCoefficients:
     """Return T_s, T_p, r_s and r_p of a face, for the cosine of the angle outside."""
     xp = of(cosine, n)
@@ -78,7 +76,6 @@ def transmittances(cosine: Number, n: Number) -> Powers:
     return s, p
 
 
-@formula
 def face_transmittance(cosine: Number, n: Number) -> Number:
     """Return the transmittance of a face for unpolarised light, for the cosine outside."""
     s, p = transmittances(cosine, n)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import check_choice
-from .arithmetic import Number, formula, of
+from .arithmetic import Number, of
 
 #: CIE standard illuminant D65 (daylight), and E, equal energy at all wavelengths.
 ILLUMINANTS = ("D65", "E")
@@ -152,7 +152,6 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(encoded_channel(np.asarray(linear, np.float64)))
 
 
-@formula
 def encoded_channel(linear: Number) -> Number:
     """Encode a channel of linear sRGB for a display (IEC 61966-2-1), clipped to 0 to 1."""
     xp = of(linear)
@@ -161,7 +160,6 @@ def encoded_channel(linear: Number) -> Number:
     return xp.where(light > 0.0031308, curve, 12.92 * light)
 
 
-@formula
 def encoded_colour(linear: tuple[Number, Number, Number]) -> tuple[Number, Number, Number]:
     """Encode linear sRGB for a display, each channel by itself."""
     red, green, blue = linear

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import check_choice
-from .arithmetic import Number, formula, of
+from .arithmetic import Number, of
 from .colour import encode_srgb, encoded_colour
 
 Colour = tuple[Number, Number, Number]
@@ -84,13 +84,11 @@ def natural(linear: ArrayLike) -> Array:
     return np.stack(natural_colour((light[..., 0], light[..., 1], light[..., 2])), axis=-1)
 
 
-@formula
 def shown_colour(linear: Colour) -> Colour:
     """Encode linear sRGB, where 1 is white, for a display by the view `natural`."""
     return encoded_colour(natural_colour(linear))
 
 
-@formula
 def natural_colour(linear: Colour) -> Colour:
     """Return linear sRGB within the display's range by the view `natural`, still linear."""
     xp = of(*linear)
@@ -105,7 +103,6 @@ def natural_colour(linear: Colour) -> Colour:
     return fitted_colour(_product(_FROM_WIDE, (red, green, blue)), _LUMINANCE, 1.0)
 
 
-@formula
 def fitted_colour(light: Colour, luminance: Colour, most: Number) -> Colour:
     """Move a colour towards grey of its luminance until all channels are 0 to `most`."""
     xp = of(*light)
@@ -119,7 +116,6 @@ def fitted_colour(light: Colour, luminance: Colour, most: Number) -> Colour:
     return red, green, blue
 
 
-@formula
 def display_curve(stops: Number) -> Number:
     """Return AgX's curve from (0, 0) to (1, 1), of a fixed slope at its pivot."""
     xp = of(stops)

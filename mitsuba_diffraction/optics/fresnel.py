@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from .arithmetic import Number, formula, is_complex, of, squared
+from .arithmetic import Number, is_complex, of, squared
 from .stack import Stacked
 
 
@@ -123,7 +123,6 @@ def faces(cosine: Number, square: Number, index: Index) -> list[Face]:
     ]
 
 
-@formula
 def amplitudes(cosine: Number, square: Number, index: Index) -> tuple[Number, Number]:
     """Amplitude coefficients (r_s, r_p) of reflection, of opposite signs at normal incidence.
 
@@ -166,7 +165,6 @@ def _layer(square: Number, index: Filmed) -> _Layer:
     return _Layer(epsilon, film, within, once, back_s, back_p)
 
 
-@formula
 def decaying_root(square: Number) -> Number:
     """Return the root whose wave exp(i root |z|) decays, or else travels, away from the surface."""
     xp = of(square)
@@ -180,7 +178,6 @@ def decaying_root(square: Number) -> Number:
     return xp.complex(xp.where(travels, larger, smaller), xp.where(travels, smaller, larger))
 
 
-@formula
 def reflectance(cosine: Number, index: Index) -> Number:
     """Reflectance for unpolarised light, the mean of both polarisations; as `amplitudes`."""
     if not isinstance(index, Filmed | Stacked) and is_complex(index):
@@ -206,7 +203,6 @@ def _absorbing_reflectance(cosine: Number, index: Number) -> Number:
     return 0.5 * above * (ratios[0] + ratios[1]) * xp.reciprocal(below * ratios[1])
 
 
-@formula
 def normal_reflectance(index: Index) -> Number:
     """Return R₀ of eq. 9, the reflectance along the normal."""
     if isinstance(index, Filmed | Stacked):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
-from .arithmetic import Number, formula, of
+from .arithmetic import Number, of
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,6 @@ def kirchhoff_factor(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, sigma:
     return np.where(above, one_plus_dot**2 / (lam**2 * area * w**2 * cos_i * cos_o), 0.0)
 
 
-@formula
 def vcavity(cos_i: Number, cos_o: Number, one_plus_dot: Number) -> Number:
     """Return the shadowing of long V-shaped grooves with level edges, in any arithmetic.
 

@@ -26,7 +26,7 @@ one of 0.01, which changes R by up to 0.02 where R falls most steeply.
 
 from __future__ import annotations
 
-from .arithmetic import Number, formula, of
+from .arithmetic import Number, of
 from .boundary import Geometry, Jones, facets
 from .fresnel import Index, amplitudes
 
@@ -38,7 +38,6 @@ _X_SQUARE, _X = 4.5, 2.3
 _CORRECTION = 2.427449, -5.601868, 6.095016, -2.704111, 0.48678, -0.054289
 
 
-@formula
 def horizon_correction(level_i: Number, level_o: Number, k: Number) -> Number:
     """Return C(X_i) C(X_o).
 
@@ -57,7 +56,6 @@ def _correction(k: Number, level: Number) -> Number:
     return xp.fma(t, fit, 1.0)
 
 
-@formula
 def mirror_cosine(cos_half: Number, cos_i: Number, cos_o: Number, sharpness: Number) -> Number:
     """Return cosθm of the half vector's cosine, of both directions, and of kσ₀."""
     xp = of(cos_i, cos_o, sharpness)

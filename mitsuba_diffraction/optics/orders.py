@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .arithmetic import Mask, Number, formula, of
+from .arithmetic import Mask, Number, of
 
 
 class OrderCell(NamedTuple):
@@ -35,7 +35,6 @@ class OrderCell(NamedTuple):
     r: Number
 
 
-@formula
 def order_cell(
     x: Number, y: Number, inverse: Number, last_band: Number, least: Number
 ) -> OrderCell:
@@ -72,7 +71,6 @@ class OrderDirection(NamedTuple):
     square: Number
 
 
-@formula
 def order_direction(x: Number, y: Number, order: Number, stride: Number) -> OrderDirection:
     """Return the direction of order m of light along ωi, by the grating equation.
 
@@ -84,7 +82,6 @@ def order_direction(x: Number, y: Number, order: Number, stride: Number) -> Orde
     return OrderDirection(out, 1.0 - xp.fma(out, out, y * y))
 
 
-@formula
 def crossed_square(x: Number, y: Number, shift_x: Number, shift_y: Number) -> Number:
     """Return the squared cosine of an order of a crossed grating, at most 0 where it is evanescent.
 
@@ -95,7 +92,6 @@ def crossed_square(x: Number, y: Number, shift_x: Number, shift_y: Number) -> Nu
     return 1.0 - out_x * out_x - out_y * out_y
 
 
-@formula
 def port_power(z: Number, other: Number) -> Number:
     """Return G = 4z/|z + z'|², the factor of a channel in orders of an interface's light.
 
@@ -117,14 +113,12 @@ def least_c(index: float) -> float:
     return math.sqrt(1.0 - 1.0 / index**2)
 
 
-@formula
 def smooth_coordinate(t: Number) -> Number:
     """Return τ of t = sin²(πτ/2), in which square roots at both ends vanish."""
     xp = of(t)
     return xp.arcsin(xp.sqrt(xp.clip(t, 0.0, 1.0))) * (2.0 / math.pi)
 
 
-@formula
 def cell_wavelengths(
     k_continuous: Number, optical_period: Number, shortest: Number, longest: Number, least_c: Number
 ) -> tuple[Number, Number]:
@@ -141,14 +135,12 @@ def cell_wavelengths(
     return low, high
 
 
-@formula
 def wavelength_coordinate(wavelength: Number, low: Number, high: Number, least: Number) -> Number:
     """Return w, the place of a wavelength between the ends of `cell_wavelengths`, 0 to 1."""
     xp = of(wavelength, low)
     return xp.clip((wavelength - low) * xp.reciprocal(xp.maximum(high - low, least)), 0.0, 1.0)
 
 
-@formula
 def order_lobe(across: Number, along: Number, sharpness: Number) -> Number:
     """Return exp(−σ²|q − q_m|²), the lobe of order m over its largest value.
 
@@ -158,13 +150,11 @@ def order_lobe(across: Number, along: Number, sharpness: Number) -> Number:
     return of(across, along).exp(-sharpness * (across * across + along * along))
 
 
-@formula
 def lobe_peak(k: Number, sigma: Number) -> Number:
     """Return k²σ²/π, the largest value of a lobe of efficiency 1."""
     return k * k * (sigma * sigma * (1.0 / math.pi))
 
 
-@formula
 def wavenumber_step(u: Number, v: Number, period: Number) -> Number:
     """Return k_1 = 2π|u|/(d(u² + v²)): order m is brightest along a direction at k = m k_1."""
     xp = of(u, v)
@@ -172,7 +162,6 @@ def wavenumber_step(u: Number, v: Number, period: Number) -> Number:
     return xp.maximum(xp.absolute(u), 1e-8) * (2.0 * math.pi / period) * xp.reciprocal(square)
 
 
-@formula
 def lobe_falloff(u: Number, v: Number, sigma: Number, period: Number) -> Number:
     """Return c = σ² q_1² v²/(u² + v²); the lobe of order m is at most exp(−c m²) in a direction."""
     xp = of(u, v)

@@ -26,6 +26,12 @@ from ..shading.dialects import OSL
 from ..shading.pair_power import Coat, pair_power
 from ..shading.programs import Program
 
+#: Complex number of OSL, an index n + ik.
+_COMPLEX = """struct md_number { float re; float im; };
+md_number md_of(float re, float im) { md_number n; n.re = re; n.im = im; return n; }
+
+"""
+
 
 @functools.cache
 def shader_file(name: str) -> str:
@@ -64,7 +70,7 @@ def patch_formulas(model: Model | None, coated: bool = False) -> str:
             program.add(formula, "float", "float")
     flat = reflectance if model is not None else _everything
     program.add(flat, "float", "complex", name="flat_reflectance")
-    return program.text
+    return _COMPLEX + program.text
 
 
 def _everything(cosine: Any, index: Any) -> float:
@@ -73,7 +79,7 @@ def _everything(cosine: Any, index: Any) -> float:
 
 
 def _program() -> Program:
-    """Return an empty program; its functions never have a name of the shaders: md_… or a macro."""
+    """Return an empty program; its variables are never called like a macro of the shaders."""
     files = resources.files(__package__).joinpath("shaders").iterdir()
     text = "".join(shader_file(file.name) for file in files)
-    return Program(OSL, frozenset(re.findall(r"\b(?:md_\w+|[A-Z][A-Z_0-9]+)\b", text)))
+    return Program(OSL, frozenset(re.findall(r"\b[A-Z][A-Z_0-9]+\b", text)))

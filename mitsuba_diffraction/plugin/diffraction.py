@@ -6,11 +6,9 @@ well are of the plugin `diffraction_dielectric`.
 
 The surface
 -----------
-heightfield : string
-    File of the height map: image, array (NPY), text, instrument file or recipe (TOML). A table is
-    accepted, too.
-table : string
-    Instead: table file of `mitsuba-diffraction precompute`.
+filename : string
+    File of the height map: image, array (NPY), text, instrument file or recipe (TOML); or a table
+    of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
     Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
 pixel_size : float or string [from the file]
@@ -22,7 +20,7 @@ height_unit : string [from the file]
 channel : string or integer [the heights]
     Channel of an instrument file, by name or index; of an EXR image, by name.
 crop : float or string [none]
-    Size of the central region to keep, µm: one number, or "width, height".
+    Region to keep, µm: "width" or "width, height", central; or "width, height, x, y".
 fill : string [none]
     Points without data: `none` refuses them, `nearest` copies the nearest height, `harmonic` spans
     a membrane over the gap.
@@ -160,7 +158,7 @@ cannot record `sample` of a bitmap.
 XML and the same in Python:
 
     <bsdf type="diffraction">
-        <string name="heightfield" value="scale.png"/>
+        <string name="filename" value="scale.png"/>
         <float name="pixel_size" value="0.0488"/>
         <float name="max_height" value="0.375"/>
     </bsdf>
@@ -172,7 +170,7 @@ XML and the same in Python:
     bsdf = mi.load_dict(
         {
             "type": "diffraction",
-            "heightfield": "scale.png",
+            "filename": "scale.png",
             "pixel_size": 0.0488,
             "max_height": 0.375,
         }

@@ -21,6 +21,7 @@ from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from .arguments import directions_of
 from .fresnel import reflectance
+from .mirror import horizon_correction
 
 Real = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
@@ -67,6 +68,8 @@ def orders_brdf(
         lobe = (k * sigma) ** 2 / np.pi * np.exp(-(sigma**2) * distance)
         near = lobe > 0.0
         if near.any():
+            if m == 0:
+                lobe *= horizon_correction(light, sigma)
             at = light.wi[near], light.wavelength[near]
             result[near] += lobe[near] * _powers(efficiency, period, superstrate, *at, m)
     return np.where((light.wi[:, 2] > 0.0) & (light.wo[:, 2] > 0.0), result, 0.0)

@@ -4,7 +4,6 @@ Contents
 --------
 symbols     numbers that record a formula's expressions
 programs    formulas written as functions of a shading language
-printer     text of such a function
 dialects    words of GLSL and OSL
 powers      powers of a patch's orders as textures
 pair_power  power of a boundary model for a pair of directions, under a coat or bare

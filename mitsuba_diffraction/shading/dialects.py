@@ -15,8 +15,6 @@ class Dialect:
     types : by the kinds of symbols.
     result : word before a parameter that is a result.
     components : of a vector and of a complex number, by "xyz", "real" and "imag".
-    complex : by operation, with places for the operands: see `printer`.
-    prelude : functions of complex numbers that `complex` calls.
     functions : names of functions that differ from `symbols`.
     reserved : names that no variable may have.
     """
@@ -24,8 +22,6 @@ class Dialect:
     types: Mapping[str, str]
     result: str
     components: Mapping[str, str]
-    complex: Mapping[str, str]
-    prelude: str
     functions: Mapping[str, str]
     reserved: frozenset[str]
 
@@ -40,16 +36,6 @@ GLSL = Dialect(
     types={"float": "float", "complex": "vec2", "bool": "bool", "vector": "vec3"},
     result="out",
     components={"x": ".x", "y": ".y", "z": ".z", "real": ".x", "imag": ".y"},
-    complex={
-        "of": "vec2({}, {})", "sum": "{} + {}", "difference": "{} - {}", "plus": "plus({}, {})",
-        "scaled": "{} * {}", "times": "times({}, {})", "inverse": "inverse_of({})",
-        "negative": "-{}",
-    },
-    prelude="""// Complex numbers: sum with a real number, product, and 1/a.
-vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
-vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
-vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
-""",
     functions={"asin": "arcsine"},
     reserved=frozenset(
         (
@@ -58,7 +44,7 @@ vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
             "filter common partition noise texture entry discard switch case default sizeof "
             "cast namespace using this union enum typedef template packed goto inline "
             "volatile public static extern external interface long short double unsigned "
-            "superp plus times inverse_of"
+            "superp arcsine"
         ).split()
     ),
 )  # fmt: skip
@@ -67,28 +53,6 @@ OSL = Dialect(
     types={"float": "float", "complex": "md_number", "bool": "int", "vector": "vector"},
     result="output",
     components={"x": "[0]", "y": "[1]", "z": "[2]", "real": ".re", "imag": ".im"},
-    complex={
-        "of": "md_of({}, {})", "sum": "md_sum({}, {})", "difference": "md_difference({}, {})",
-        "plus": "md_plus({}, {})", "scaled": "md_scaled({}, {})", "times": "md_times({}, {})",
-        "inverse": "md_inverse({})", "negative": "md_scaled({}, -1.0)",
-    },
-    prelude="""// Complex numbers: sums, products, and 1/a.
-struct md_number { float re; float im; };
-md_number md_of(float re, float im) { md_number n; n.re = re; n.im = im; return n; }
-md_number md_sum(md_number a, md_number b) { return md_of(a.re + b.re, a.im + b.im); }
-md_number md_difference(md_number a, md_number b) { return md_of(a.re - b.re, a.im - b.im); }
-md_number md_plus(md_number a, float b) { return md_of(a.re + b, a.im); }
-md_number md_scaled(md_number a, float b) { return md_of(a.re * b, a.im * b); }
-md_number md_times(md_number a, md_number b)
-{
-    return md_of(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
-}
-md_number md_inverse(md_number a)
-{
-    float squared = a.re * a.re + a.im * a.im;
-    return md_of(a.re / squared, -a.im / squared);
-}
-""",
     functions={},
     reserved=frozenset(
         (

@@ -1,61 +1,49 @@
 """Programs: formulas of `optics`, written as functions of a shading language.
 
-`Program.add` runs a formula on `symbols`. The formula becomes a function of the program, and so
-does each function with the decorator `arithmetic.formula` that it calls. Local variables keep their
-names, the docstring's first paragraph becomes the function's comment, and an expression that is
-used more than once is a variable. The language (`dialects`) decides how numbers, complex numbers
-and calls are written.
+`Program.add` runs a formula on `symbols`, with all formulas that it calls, and writes one function.
+The docstring's first paragraph becomes its comment. An expression that is used more than once is a
+variable, with the name that the formula gives it.
 """
 
 from __future__ import annotations
 
 import inspect
+import math
 import re
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+import textwrap
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from ..errors import DiffractionError
-from ..optics import arithmetic
 from .dialects import Dialect
-from .printer import Function, Printer, record_of
-from .symbols import (
-    OWN_FILES,
-    Symbol,
-    argument_of,
-    components_of,
-    current,
-    refuse,
-    scopes,
-    symbol_kind,
-)
+from .symbols import Complex, Symbol, Trace
 
-OWN_FILES.add(__file__)
+_WIDTH = 100
+_JOINT = "\xa0"  # no line break
+_COMPONENTS = {"vector": "xyz", "complex": ("real", "imag")}
+_PRECEDENCE = {
+    "?": 1, "||": 2, "&&": 3, "==": 4, "!=": 4, "<": 5, "<=": 5, ">": 5, ">=": 5, "+": 6, "-": 6,
+    "*": 7, "/": 7, "neg": 8, "!": 8,
+}  # fmt: skip
+_ATOM = 9
 
 
 @dataclass
 class Program:
-    """Functions in a dialect, those that a function calls before it.
+    """Functions in a dialect.
 
-    declared : names that the rest of the shader declares: uniforms, functions, macros.
-    complex_numbers : whether a function has complex numbers; their operations then come first.
+    macros : names that variables must not have.
     """
 
     dialect: Dialect
-    declared: frozenset[str] = frozenset()
-    functions: dict[tuple[Any, ...], Function] = field(default_factory=dict)
-    complex_numbers: bool = False
-    _owners: dict[str, Callable[..., Any]] = field(default_factory=dict)
+    macros: frozenset[str] = frozenset()
+    functions: dict[str, str] = field(default_factory=dict)
 
-    def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> Function:
-        """Write a formula, and the formulas that it calls, as functions.
+    def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> None:
+        """Write a formula as a function.
 
-        Raises a DiffractionError if the formula cannot be written, with its line, or if the shader
-        declares the name.
+        Raises a DiffractionError if the formula cannot be written, with its line.
 
         Parameters
         ----------
@@ -64,36 +52,9 @@ class Program:
             tuple of kinds, or else a value that is constant in the program.
         name : of the function; the formula's by default.
         """
-        name = name or formula.__name__.lstrip("_")
-        self._check_name(formula, name)
-        return self.function_of(formula, arguments, name)
-
-    def function_of(
-        self, formula: Callable[..., Any], arguments: tuple[Any, ...], name: str = ""
-    ) -> Function:
-        """Return the function of a formula for kinds of arguments, written at its first use."""
-        formula = getattr(formula, "__wrapped__", formula)
-        key = (formula, name, *map(_key, arguments))
-        if key not in self.functions:
-            scope = Scope(
-                self, formula, name or self._free_name(formula, formula.__name__.lstrip("_"))
-            )
-            parameters, result = scope.run(arguments)
-            self.functions[key] = Printer(scope).function(parameters, result, _comment(formula))
-        return self.functions[key]
-
-    def _check_name(self, formula: Callable[..., Any], name: str) -> None:
-        """Refuse a name that is not this formula's alone."""
-        if self._free_name(formula, name) != name:
-            raise DiffractionError(f"the shader already declares the name {name}; choose another")
-
-    def _free_name(self, formula: Callable[..., Any], name: str) -> str:
-        """Return a name that neither the rest of the shader nor another formula has."""
-        formula = getattr(formula, "__wrapped__", formula)
-        taken = self.declared | self.dialect.reserved
-        while name in taken or self._owners.setdefault(name, formula) is not formula:
-            name += "_"
-        return name
+        name = name or formula.__name__
+        parameters, results = self._run(formula, arguments)
+        self.functions[name] = parameters.written(name, results, _comment(formula))
 
     def add_staged(
         self,
@@ -112,110 +73,203 @@ class Program:
         late : parameters of the second function; the others belong to the first.
         names : of both functions.
         """
-        for name in names:
-            self._check_name(formula, name)
-        scope = Scope(self, formula, names[1])
-        parameters, result = scope.run(arguments)
-        first, second = Printer(scope).staged(parameters, result, late, names, _comment(formula))
-        for function in (first, second):
-            self.functions[(formula, function.name)] = function
+        parameters, results = self._run(formula, arguments)
+        first, second = parameters.split(late)
+        changing = {id(leaf) for leaf in second.leaves}
+        for symbol in parameters.trace.order:
+            if any(id(part) in changing for part in symbol.parts):
+                changing.add(id(symbol))
+        read = [part for s in _needed(results.values()) if id(s) in changing for part in s.parts]
+        ready = {id(s): s for s in read if isinstance(s, Symbol) and id(s) not in changing}
+        stored = {f"pair_{s.name or n}": s for n, s in enumerate(ready.values())}
+        float_ = self.dialect.types["float"]
+        head = "".join(
+            f"{line}\n" for line in textwrap.wrap(f"{float_} {', '.join(stored)};", _WIDTH)
+        )
+        early = first.written(names[0], stored, f"Prepare `{names[1]}`.", stored=True)
+        self.functions[names[0]] = f"{head}\n{early}"
+        second.known = {id(symbol): name for name, symbol in stored.items()}
+        self.functions[names[1]] = second.written(names[1], results, _comment(formula))
+
+    def _run(self, formula: Callable[..., Any], arguments: Sequence[Any]) -> Any:
+        """Run a formula on symbols; return its parameters, and its results by name."""
+        parameters = _Parameters(self.dialect, self.macros, Trace())
+        names = inspect.signature(formula).parameters
+        values = [parameters.add(*pair) for pair in zip(names, arguments, strict=False)]
+        result = formula(*values)
+        parameters.trace.end_line()
+        if not isinstance(result, tuple) or _is_vector(result):
+            return parameters, {"": result}
+        fields = getattr(result, "_fields", ())
+        if len(fields) != len(result):
+            fields = [getattr(part, "name", None) or f"result{n}" for n, part in enumerate(result)]
+        return parameters, dict(zip(map(parameters.take, fields), result, strict=True))
 
     @property
     def text(self) -> str:
         """Source of all functions."""
-        texts = dict.fromkeys(function.text for function in self.functions.values())
-        prelude = [self.dialect.prelude] if self.complex_numbers else []
-        return "\n".join([*prelude, *texts])
+        return "\n".join(self.functions.values())
 
 
-class Scope:
-    """Function that is being written: its expressions, each once, in the order of the formula."""
+class _Parameters:
+    """Parameters of a function that is written, and the text of its expressions."""
 
-    def __init__(self, program: Program, formula: Callable[..., Any], name: str) -> None:
-        self.program, self.formula, self.name = program, formula, name
-        self.dialect = program.dialect
-        self.expressions: dict[tuple[Any, ...], Symbol] = {}
-        self.order: list[Symbol] = []
-        self.callees: set[str] = set()
-        self.taken: set[str] = set()
+    def __init__(self, dialect: Dialect, macros: frozenset[str], trace: Trace) -> None:
+        self.dialect, self.macros, self.trace = dialect, macros, trace
+        self.kinds: dict[str, str] = {}
+        self.leaves: list[Symbol] = []
+        self.known: dict[int, str] = {}
+        self._owners: dict[int, str] = {}
+        self._taken: set[str] = set()
 
-    def expression(self, kind: str, operation: str, parts: tuple[Any, ...]) -> Symbol:
-        """Return the symbol of an expression, which may be known already."""
-        key = (kind, operation, *(id(p) if isinstance(p, Symbol) else p for p in parts))
-        if key not in self.expressions:
-            self.program.complex_numbers |= kind == "complex"
-            self._check(parts)
-            self.expressions[key] = symbol = Symbol(kind, operation, parts, self)
-            self.order.append(symbol)
-        return self.expressions[key]
+    def add(self, name: str, argument: Any) -> Any:
+        """Return a formula's argument: symbols of a kind or of a tuple of kinds, or a constant."""
+        if isinstance(argument, tuple):
+            fields = getattr(argument, "_fields", [f"{name}{n}" for n in range(len(argument))])
+            values = [self.add(*pair) for pair in zip(fields, argument, strict=True)]
+            return argument._make(values) if hasattr(argument, "_make") else tuple(values)
+        if not isinstance(argument, str):
+            return argument
+        word = self.take(name)
+        self.kinds[word] = argument
+        parts = [f"{word}{self.dialect.components[part]}" for part in _COMPONENTS.get(argument, ())]
+        symbols = [Symbol("float", "name", (text,), self.trace) for text in parts or [word]]
+        self.leaves += symbols
+        self._owners |= {id(symbol): word for symbol in symbols}
+        if argument == "complex":
+            return Complex(*symbols)
+        return tuple(symbols) if argument == "vector" else symbols[0]
 
-    def _check(self, parts: Iterable[Any]) -> None:
-        for part in parts:
-            if isinstance(part, Symbol) and part.scope is not self:
-                refuse("it reads a variable of another function; hand it on as an argument")
-
-    def called(self, formula: Callable[..., Any], values: Sequence[Any]) -> Any:
-        """Return the results of a call of another formula, which is written if it is new."""
-        function = self.program.function_of(formula, tuple(map(symbol_kind, values)))
-        self.callees.add(function.name)
-        parts, kinds = (function.name, *map(argument_of, values)), function.kinds
-        if function.record is None:
-            return _components(self.expression(kinds[0], "call", parts))
-        call = self.expression("call", "call", parts)
-        results = [self.expression(kind, "result", (call, n)) for n, kind in enumerate(kinds)]
-        return function.record(list(map(_components, results)))
-
-    def run(self, arguments: Sequence[Any]) -> tuple[list[Symbol], Any]:
-        """Run the formula on symbols; return its parameters' symbols, and its result."""
-        parameters: list[Symbol] = []
-        names = list(inspect.signature(self.formula).parameters)
-        values = [
-            _parameter(self, name, argument, parameters)
-            for name, argument in zip(names, arguments, strict=False)
-        ]
-        with _active(self), _local_names(self):
-            return parameters, self.formula(*values)
+    def split(self, late: Sequence[str]) -> tuple[_Parameters, _Parameters]:
+        """Return the parameters without those named in `late`, and those alone."""
+        parts = []
+        for chosen in (False, True):
+            part = _Parameters(self.dialect, self.macros, self.trace)
+            part.kinds = {n: kind for n, kind in self.kinds.items() if (n in late) == chosen}
+            part.leaves = [s for s in self.leaves if (self._owners[id(s)] in late) == chosen]
+            part._taken = set(self.kinds)
+            parts.append(part)
+        return parts[0], parts[1]
 
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        macro = name.isupper() and name in self.program.declared
-        if macro or name in self.dialect.reserved or name in {self.name, *self.callees}:
+        if name in self.macros or name in self.dialect.reserved:
             name += "_"
         numbered, n = name, 1
-        while numbered in self.taken:
+        while numbered in self._taken:
             n += 1
             numbered = f"{name.rstrip('_')}_{n}"
-        self.taken.add(numbered)
+        self._taken.add(numbered)
         return numbered
 
+    def written(
+        self, name: str, results: Mapping[str, Any], comment: str, *, stored: bool = False
+    ) -> str:
+        """Write a function with its comment.
 
-def _parameter(scope: Scope, name: str, argument: Any, parameters: list[Symbol]) -> Any:
-    """Return a formula's argument, and add its leaves to the function's parameters."""
-    if isinstance(argument, str):
-        symbol = Symbol(argument, "name", (scope.take(name),), scope)
-        scope.program.complex_numbers |= argument == "complex"
-        parameters.append(symbol)
-        return symbol if argument != "vector" else components_of(scope, symbol)
-    if isinstance(argument, tuple):
-        fields = getattr(argument, "_fields", range(len(argument)))
-        parts = [
-            _parameter(scope, _word(name, argument, field), part, parameters)
-            for field, part in zip(fields, argument, strict=True)
-        ]
-        return record_of(argument)(parts)
-    return argument
+        results : by name; one without a name is returned.
+        stored : whether the results are global variables.
+        """
+        types = self.dialect.types
+        uses: dict[int, int] = {}
+        for symbol in _needed(results.values(), self.known):
+            for part in symbol.parts:
+                uses[id(part)] = uses.get(id(part), 0) + 1
+        for result in results.values():
+            for part in _parts(result):
+                uses[id(part)] = uses.get(id(part), 0) + 1
+        lines: list[str] = []
+        for symbol in self.trace.order:
+            often = uses.get(id(symbol), 0)
+            if id(symbol) in self.known or not often:
+                continue
+            if symbol.name or (often > 1 and not _signed_leaf(symbol)):
+                word = self.take(symbol.name or f"t{len(self.known)}")
+                lines += _wrapped(f"{types[symbol.kind]} {word} = {self.text(symbol)};")
+                self.known[id(symbol)] = word
+        for word, result in results.items():
+            start = f"{word} =" if word else "return"
+            lines += _wrapped(f"{start} {self.text(result)};")
+        words = [f"{types[kind]} {word}" for word, kind in self.kinds.items()]
+        kind = "void" if "" not in results else types[_kind(results[""])]
+        if not stored:
+            outputs = [(w, r) for w, r in results.items() if w]
+            words += [f"{self.dialect.result} {types[_kind(r)]} {w}" for w, r in outputs]
+        joined = ", ".join(word.replace(" ", _JOINT) for word in words)
+        head = textwrap.wrap(
+            f"{kind} {name}({joined})", _WIDTH, subsequent_indent=" " * (len(kind) + len(name) + 2)
+        )
+        note = textwrap.wrap(comment, _WIDTH - 3, initial_indent="// ", subsequent_indent="// ")
+        return "\n".join([*note, *head, "{", *lines, "}", ""]).replace(_JOINT, " ")
+
+    def text(self, value: Any, precedence: int = 0) -> str:
+        """Write an expression; precedence : of the operator around it."""
+        if isinstance(value, tuple):
+            return f"{self.dialect.types['vector']}({', '.join(map(self.text, value))})"
+        if not isinstance(value, Symbol):
+            return number(float(value))
+        if id(value) in self.known:
+            return self.known[id(value)]
+        text, own = self._expression(value.operation, value.parts)
+        return f"({text})" if own < precedence else text
+
+    def _expression(self, operation: str, parts: tuple[Any, ...]) -> tuple[str, int]:
+        """Return the text of an expression, and the precedence of its operator."""
+        if operation == "name":
+            return parts[0], _ATOM
+        own = _PRECEDENCE.get(operation)
+        if own is None:
+            function = self.dialect.functions.get(operation, operation)
+            return f"{function}({', '.join(map(self.text, parts))})", _ATOM
+        if operation == "?":
+            condition, one, other = (self.text(part, own + 1) for part in parts)
+            return f"{condition} ? {one} : {other}", own
+        if len(parts) == 1:
+            return f"{'-' if operation == 'neg' else operation}{self.text(parts[0], own)}", own
+        return f"{self.text(parts[0], own)} {operation} {self.text(parts[1], own + 1)}", own
 
 
-def _components(result: Symbol) -> Any:
-    """Return a number, or the components of a vector."""
-    return components_of(current(), result) if result.kind == "vector" else result
+def _needed(results: Iterable[Any], known: Container[int] = ()) -> list[Symbol]:
+    """Return the expressions that results depend on, and these, each once.
+
+    known : addresses of variables, whose own parts are not needed.
+    """
+    found: dict[int, Symbol] = {}
+    waiting = [part for result in results for part in _parts(result)]
+    while waiting:
+        symbol = waiting.pop()
+        if isinstance(symbol, Symbol) and id(symbol) not in found and id(symbol) not in known:
+            found[id(symbol)] = symbol
+            waiting += symbol.parts
+    return list(found.values())
 
 
-def _key(argument: Any) -> Any:
-    if isinstance(argument, tuple):
-        return (type(argument), *map(_key, argument))
-    return argument if isinstance(argument, str) else id(argument)
+def _signed_leaf(symbol: Symbol) -> bool:
+    """Whether an expression is a variable with a sign."""
+    return symbol.operation == "neg" and getattr(symbol.parts[0], "operation", "name") == "name"
+
+
+def _parts(result: Any) -> Sequence[Any]:
+    """Return the numbers of a result."""
+    return result if isinstance(result, tuple) else (result,)
+
+
+def _kind(result: Any) -> str:
+    """Return the kind of a result."""
+    return "vector" if isinstance(result, tuple) else getattr(result, "kind", "float")
+
+
+def _is_vector(value: tuple[Any, ...]) -> bool:
+    """Whether a value is three real numbers that are a direction or a colour."""
+    return type(value) is tuple and len(value) == 3
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(
+        text, _WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 8,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
 
 
 def _comment(formula: Callable[..., Any]) -> str:
@@ -223,66 +277,9 @@ def _comment(formula: Callable[..., Any]) -> str:
     return " ".join((inspect.getdoc(formula) or "").partition("\n\n")[0].split())
 
 
-@contextmanager
-def _active(scope: Scope) -> Iterator[None]:
-    """Let a function be the one that expressions belong to."""
-    before = arithmetic.emission
-    scopes.append(scope)
-    arithmetic.emission = _emitted
-    try:
-        yield
-    finally:
-        scopes.pop()
-        arithmetic.emission = before
-
-
-def _emitted(formula: Callable[..., Any], values: tuple[Any, ...]) -> Any:
-    """Call a formula from within another: write a call if a symbol is among its arguments."""
-    parts = [part for value in values for part in (value if isinstance(value, tuple) else [value])]
-    if not any(isinstance(part, Symbol) for part in parts):
-        return formula(*values)
-    return current().called(formula, values)
-
-
-@contextmanager
-def _local_names(scope: Scope) -> Iterator[None]:
-    """Name expressions like the local variables of the formula and of functions that it runs."""
-
-    def on_return(frame: FrameType, event: str, _: Any) -> None:
-        if event != "return" or scopes[-1:] != [scope]:
-            return
-        own, file = frame.f_code is scope.formula.__code__, frame.f_code.co_filename
-        if own or file == scope.formula.__code__.co_filename or file in formula_files:
-            for name, value in frame.f_locals.items():
-                _name(scope, name, value, own)
-
-    folder = Path(__file__).parent
-    formula_files = {str(file) for file in folder.glob("*.py")} - OWN_FILES
-    before = sys.getprofile()
-    sys.setprofile(on_return)
-    try:
-        yield
-    finally:
-        sys.setprofile(before)
-
-
-def _name(scope: Scope, name: str, value: Any, own: bool) -> None:
-    """Name a symbol, or the parts of a tuple; own : a variable of the formula itself."""
-    if isinstance(value, Symbol):
-        if value.scope is scope and own:
-            value.name = name
-        elif value.scope is scope and value.hint is None:
-            value.hint = name
-    elif isinstance(value, tuple):
-        fields = getattr(value, "_fields", range(len(value)))
-        for suffix, part in zip(fields, value, strict=True):
-            word = _word(name, value, suffix)
-            if not (isinstance(part, Symbol) and part.name):
-                _name(scope, word, part, own)
-
-
-def _word(name: str, record: tuple[Any, ...], field: str | int) -> str:
-    """Return the name of a tuple's part; `cos_i` of `geometry`, a record called after its class."""
-    if isinstance(field, int):
-        return f"{name}{field}"
-    return field if name == type(record).__name__.lower() else f"{name}_{field}"
+def number(value: float) -> str:
+    """Write a number with the digits of single precision."""
+    if not math.isfinite(value):
+        raise DiffractionError(f"{value} is in a formula, which no shader can hold; give a bound")
+    text = f"{value:.9g}"
+    return text if any(c in text for c in ".e") else f"{text}.0"

@@ -1,39 +1,78 @@
-"""Symbols: numbers that record the expressions of a formula, to write it in another language.
+"""Symbols: real numbers that record the expressions of a formula, to write it in another language.
 
-A symbol has the operators of a number, and `arithmetic.of` gives its functions. What no shader can
-express, a branch on values or an unknown function, raises a DiffractionError with the file and line
-of the formula. `programs` runs formulas on symbols and writes them.
+A symbol has the operators of a number, and `arithmetic.of` gives its functions. A complex number is
+a pair of symbols, so expressions are real or conditions. What no shader can express, a branch on
+values or an unknown function, raises a DiffractionError with the file and line of the formula.
+`programs` runs formulas on symbols and writes them.
 """
 
 from __future__ import annotations
 
 import linecache
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, NoReturn
 
 from ..errors import DiffractionError
 from ..optics import arithmetic
 
-#: Kinds of symbols: a real number, a complex number, a condition, and three real numbers.
-KINDS = ("float", "complex", "bool", "vector")
-
-#: Files whose frames are no formula's.
-OWN_FILES = {__file__, arithmetic.__file__}
+_OWN_FILES = {__file__, arithmetic.__file__}
+_ASSIGNED = re.compile(r"\s*([A-Za-z]\w*) = ")
 
 
-#: Function that is being written, see `programs`.
-Scope: TypeAlias = Any
+def _frame_of_formula() -> FrameType:
+    """Return the frame of the formula that runs."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None and frame.f_code.co_filename in _OWN_FILES:
+        frame = frame.f_back
+    assert frame is not None  # a formula called
+    return frame
 
-#: Functions that are being written, the current one last.
-scopes: list[Scope] = []
+
+def refuse(reason: str) -> NoReturn:
+    """Raise a DiffractionError with the line of the formula that runs."""
+    frame = _frame_of_formula()
+    file, line = frame.f_code.co_filename, frame.f_lineno
+    text = linecache.getline(file, line).strip()
+    raise DiffractionError(
+        f"{Path(file).name}, line {line}, cannot be written as a shader: {reason}: {text!r}"
+    )
 
 
-def current() -> Scope:
-    """Return the function that is being written."""
-    return scopes[-1]
+class Trace:
+    """Expressions of one function, each once, in the order in which the formula makes them."""
+
+    def __init__(self) -> None:
+        self.order: list[Symbol] = []
+        self._known: dict[tuple[Any, ...], Symbol] = {}
+        self._line: tuple[str, int] | None = None
+        self.pair: Complex | None = None  # last complex number
+
+    def expression(self, kind: str, operation: str, parts: tuple[Any, ...]) -> Symbol:
+        """Return the symbol of an expression, which may be known already."""
+        key = (kind, operation, *(id(p) if isinstance(p, Symbol) else p for p in parts))
+        if key not in self._known:
+            frame = _frame_of_formula()
+            line = frame.f_code.co_filename, frame.f_lineno
+            if line != self._line:
+                self.end_line()
+                self._line = line
+            self._known[key] = symbol = Symbol(kind, operation, parts, self)
+            self.order.append(symbol)
+        return self._known[key]
+
+    def end_line(self) -> None:
+        """Name the last number of a line like the variable that the line assigns."""
+        if self._line is None or not (match := _ASSIGNED.match(linecache.getline(*self._line))):
+            return
+        last, name = self.order[-1], match[1]
+        if self.pair is None or self.pair.imag is not last:
+            last.name = name
+        elif isinstance(self.pair.real, Symbol):
+            self.pair.real.name, last.name = f"{name}_re", f"{name}_im"
 
 
 def _condition(operation: str) -> Callable[[Any, Any], Any]:
@@ -46,41 +85,45 @@ class Symbol:
 
     Attributes
     ----------
-    kind : one of `KINDS`.
+    kind : "float" or "bool".
     operation, parts : operator or function, and its operands; "name" and its text for a variable.
-    name, hint : of the variable that holds the value in the formula, and in a function that the
-        formula runs.
-    scope : function that the expression belongs to.
+    trace : function that the expression belongs to.
+    name : variable that holds the value in the formula, or None.
     """
 
-    __slots__ = ("hint", "kind", "name", "operation", "parts", "scope")
+    __slots__ = ("kind", "name", "operation", "parts", "trace")
 
-    def __init__(
-        self, kind: str, operation: str, parts: tuple[Any, ...], scope: Scope | None = None
-    ) -> None:
-        self.kind, self.operation, self.parts, self.scope = kind, operation, parts, scope
+    def __init__(self, kind: str, operation: str, parts: tuple[Any, ...], trace: Trace) -> None:
+        self.kind, self.operation, self.parts, self.trace = kind, operation, parts, trace
         self.name: str | None = None
-        self.hint: str | None = None
 
     def __add__(self, other: Any) -> Any:
+        if isinstance(other, Complex):
+            return NotImplemented
         return self if _is(other, 0.0) else _node("+", self, other)
 
     def __radd__(self, other: Any) -> Any:
         return self if _is(other, 0.0) else _node("+", other, self)
 
     def __sub__(self, other: Any) -> Any:
+        if isinstance(other, Complex):
+            return NotImplemented
         return self if _is(other, 0.0) else _node("-", self, other)
 
     def __rsub__(self, other: Any) -> Any:
         return -self if _is(other, 0.0) else _node("-", other, self)
 
     def __mul__(self, other: Any) -> Any:
+        if isinstance(other, Complex):
+            return NotImplemented
         return self if _is(other, 1.0) else _node("*", self, other)
 
     def __rmul__(self, other: Any) -> Any:
         return self if _is(other, 1.0) else _node("*", other, self)
 
     def __truediv__(self, other: Any) -> Any:
+        if isinstance(other, Complex):
+            return NotImplemented
         return self if _is(other, 1.0) else _node("/", self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
@@ -106,13 +149,13 @@ class Symbol:
 
     @property
     def real(self) -> Any:
-        """Real part."""
-        return _part("real", self)
+        """The number itself."""
+        return self
 
     @property
-    def imag(self) -> Any:
-        """Imaginary part, 0.0 of a real number."""
-        return _part("imag", self)
+    def imag(self) -> float:
+        """0."""
+        return 0.0
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         """Let a NumPy number on the left of an operator be a constant; refuse other functions."""
@@ -136,9 +179,6 @@ class Symbol:
             raise AttributeError(name)
         refuse(f"numbers of a shader have no .{name}")
 
-    def __repr__(self) -> str:
-        return f"Symbol({self.name or self.operation})"
-
 
 _OPERATORS = {
     "add": "__radd__", "subtract": "__rsub__", "multiply": "__rmul__", "divide": "__rtruediv__",
@@ -146,24 +186,50 @@ _OPERATORS = {
 }  # fmt: skip
 
 
+class Complex:
+    """Complex number of two real ones, at least one of which is a symbol."""
+
+    __slots__ = ("imag", "real")
+
+    def __init__(self, real: Any, imag: Any) -> None:
+        self.real, self.imag = real, imag
+        if isinstance(imag, Symbol):
+            imag.trace.pair = self
+
+    def __add__(self, other: Any) -> Complex:
+        return Complex(self.real + other.real, self.imag + other.imag)
+
+    def __sub__(self, other: Any) -> Complex:
+        return Complex(self.real - other.real, self.imag - other.imag)
+
+    def __rsub__(self, other: Any) -> Complex:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Complex:
+        if not isinstance(other, Complex):
+            return Complex(self.real * other, self.imag * other)
+        return Complex(
+            self.real * other.real - self.imag * other.imag,
+            self.real * other.imag + self.imag * other.real,
+        )
+
+    def __truediv__(self, other: Any) -> Complex:
+        return self * Symbols.reciprocal(other)
+
+    def __rtruediv__(self, other: Any) -> Complex:
+        return Symbols.reciprocal(self) * other
+
+    def __neg__(self) -> Complex:
+        return Complex(-self.real, -self.imag)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
 def _is(value: Any, number: float) -> bool:
     return isinstance(value, int | float) and value == number
 
 
-def refuse(reason: str) -> NoReturn:
-    """Raise a DiffractionError with the line of the formula that runs."""
-    frame: FrameType | None = sys._getframe()
-    while frame is not None and frame.f_code.co_filename in OWN_FILES:
-        frame = frame.f_back
-    assert frame is not None  # a formula called
-    file, line = frame.f_code.co_filename, frame.f_lineno
-    text = linecache.getline(file, line).strip()
-    raise DiffractionError(
-        f"{Path(file).name}, line {line}, cannot be written as a shader: {reason}: {text!r}"
-    )
-
-
-def _node(operation: str, *parts: Any, kind: str | None = None) -> Any:
+def _node(operation: str, *parts: Any, kind: str = "float") -> Any:
     """Return the expression in the function that is written, each once."""
     for part in parts:
         if not isinstance(part, Symbol | int | float):
@@ -171,18 +237,8 @@ def _node(operation: str, *parts: Any, kind: str | None = None) -> Any:
                 float(part)
             except (TypeError, ValueError):
                 refuse(f"{part!r} is not a real number")
-    if kind is None:
-        kinds = {part.kind for part in parts if isinstance(part, Symbol)}
-        kind = "complex" if "complex" in kinds else "float"
-    return current().expression(kind, operation, parts)
-
-
-def _part(which: str, value: Symbol) -> Any:
-    if value.kind == "float":
-        return value if which == "real" else 0.0
-    if value.operation == "complex":
-        return value.parts[which == "imag"]
-    return current().expression("float", which, (value,))
+    trace = next(part.trace for part in parts if isinstance(part, Symbol))
+    return trace.expression(kind, operation, parts)
 
 
 class _UnknownFunctionError(DiffractionError, AttributeError):
@@ -192,25 +248,24 @@ class _UnknownFunctionError(DiffractionError, AttributeError):
 class Symbols:
     """Arithmetic of symbols, see `arithmetic`."""
 
-    @staticmethod
-    def complex(real: Any, imag: Any) -> Any:
-        """Return a complex number."""
-        return _node("complex", real, imag, kind="complex")
+    complex = Complex
 
     @staticmethod
     def exp(x: Any) -> Any:
         """Return exp(x), also of a complex number."""
-        if arithmetic.is_complex(x):
-            size = _node("exp", x.real)
-            return Symbols.complex(size * _node("cos", x.imag), size * _node("sin", x.imag))
-        return _node("exp", x)
+        if isinstance(x, Complex):
+            size = Symbols.exp(x.real)
+            return Complex(size * _function("cos", x.imag), size * _function("sin", x.imag))
+        return _function("exp", x)
 
     @staticmethod
     def where(condition: Any, one: Any, other: Any) -> Any:
         """Return one number where a condition holds, or else the other."""
-        if arithmetic.is_complex(one) or arithmetic.is_complex(other):
-            return Symbols.complex(*(Symbols.where(condition, a, b) for a, b in (
-                (_real(one), _real(other)), (_imag(one), _imag(other)))))  # fmt: skip
+        if isinstance(one, Complex) or isinstance(other, Complex):
+            return Complex(
+                _node("?", condition, one.real, other.real),
+                _node("?", condition, one.imag, other.imag),
+            )
         return _node("?", condition, one, other)
 
     @staticmethod
@@ -221,12 +276,15 @@ class Symbols:
     @staticmethod
     def reciprocal(x: Any) -> Any:
         """Return 1/x."""
-        return _node("/", 1.0, x)
+        if isinstance(x, Complex):
+            square = x.real * x.real + x.imag * x.imag
+            return Complex(x.real / square, -x.imag / square)
+        return 1.0 / x
 
     @staticmethod
     def is_complex(x: Any) -> bool:
         """Return whether a number is complex."""
-        return isinstance(x, complex) or (isinstance(x, Symbol) and x.kind == "complex")
+        return isinstance(x, complex | Complex)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("__"):
@@ -236,56 +294,19 @@ class Symbols:
                 refuse(f"no shader has the function {name}")
             except DiffractionError as error:
                 raise _UnknownFunctionError(str(error)) from None
-        return lambda *values: _node(_FUNCTIONS[name], *values)
+        return lambda *values: _function(name, *values)
+
+
+def _function(name: str, *values: Any) -> Any:
+    """Return the value of a function of `arithmetic`, a constant where all arguments are."""
+    if any(isinstance(value, Symbol) for value in values):
+        return _node(_FUNCTIONS[name], *values)
+    return getattr(arithmetic.of(*values), name)(*values)
 
 
 _FUNCTIONS = {
     "sqrt": "sqrt", "exp2": "exp2", "log2": "log2", "sin": "sin", "cos": "cos", "floor": "floor",
     "arcsin": "asin", "power": "pow", "absolute": "abs", "minimum": "min", "maximum": "max",
-    "clip": "clamp",
+    "clip": "clamp", "exp": "exp",
 }  # fmt: skip
-arithmetic.register(lambda x: isinstance(x, Symbol), Symbols())
-
-
-def _real(x: Any) -> Any:
-    return x.real if isinstance(x, Symbol | complex) else x
-
-
-def _imag(x: Any) -> Any:
-    return x.imag if isinstance(x, Symbol | complex) else 0.0
-
-
-def components_of(scope: Scope, vector: Symbol) -> tuple[Any, ...]:
-    """Return the three components of a vector."""
-    return tuple(scope.expression("float", axis, (vector,)) for axis in "xyz")
-
-
-def is_vector(value: Any) -> bool:
-    """Whether a value is three real numbers that are a direction or a colour."""
-    if type(value) is not tuple or len(value) != 3:
-        return False
-    return all(isinstance(v, int | float) or getattr(v, "kind", "") == "float" for v in value)
-
-
-def symbol_kind(value: Any) -> str:
-    """Return the kind of an argument or a result of a function."""
-    if isinstance(value, Symbol):
-        return value.kind
-    if is_vector(value):
-        return "vector"
-    if not isinstance(value, int | float):
-        refuse(f"{value!r} is not a number")
-    return "float"
-
-
-def argument_of(value: Any, scope: Scope | None = None) -> Any:
-    """Return three components as a vector, and other numbers as they are."""
-    if not is_vector(value):
-        return value
-    scope = scope or current()
-    first = value[0]
-    if isinstance(first, Symbol) and first.operation == "x":
-        vector = first.parts[0]
-        if all(v is c for v, c in zip(value, components_of(scope, vector), strict=True)):
-            return vector
-    return scope.expression("vector", "vector", value)
+arithmetic.register(lambda x: isinstance(x, Symbol | Complex), Symbols())

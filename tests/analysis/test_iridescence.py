@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
-from mitsuba_diffraction.analysis.iridescence import DiffractedLight, diffracted_light
+from mitsuba_diffraction.analysis.iridescence import (
+    DiffractedLight,
+    MaterialFactor,
+    diffracted_light,
+)
 from mitsuba_diffraction.analysis.maps import LightDirection
+from mitsuba_diffraction.analysis.scans import bsdf_of
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.tables import DiffractionTable
 
@@ -84,3 +91,27 @@ def test_a_single_colour_is_not_iridescent_and_a_rainbow_is():
 def test_a_table_of_few_wavelengths_is_refused():
     with pytest.raises(DiffractionError, match="380"):
         light_of(gratings.sinusoidal(1.6, 0.1, rows=2), wavelength_range=(500.0, 600.0))
+
+
+@pytest.mark.parametrize("surface", [{}, {"coat_ior": 1.33, "material": "keratin"}])
+def test_a_material_s_factor_is_the_plugin_s_at_any_azimuth(variant, surface):
+    if variant != "llvm_ad_spectral":
+        pytest.skip("the factor is of wavelengths")
+    table = DiffractionTable.build(gratings.sinusoidal(1.6, 0.05, rows=2), tolerance=0.05)
+    bsdf = bsdf_of(table, energy_conserving=False, **surface)
+    light = LightDirection(35.0, 70.0)
+    generator = np.random.default_rng(4)
+    radius, angle = np.sqrt(generator.random(200)) * 0.98, generator.uniform(0.0, 2 * np.pi, 200)
+    sines = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    value, w = MaterialFactor.of(bsdf, 35.0).at(light)(sines, 505.0)
+    si = dr.zeros(mi.SurfaceInteraction3f, 200)
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(si.n)
+    si.wi = mi.Vector3f(light.direction.tolist())
+    si.wavelengths = mi.UnpolarizedSpectrum(505.0)
+    wo = mi.Vector3f(*sines.T, np.sqrt(1.0 - radius**2))
+    site = bsdf.site_at(si, mi.Mask(True))
+    expected, expected_w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
+    # linear between directions one and five degrees apart
+    np.testing.assert_allclose(value, np.array(expected[0]), rtol=0.01)
+    np.testing.assert_allclose(w, np.array(expected_w), rtol=1e-3)

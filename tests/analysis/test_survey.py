@@ -15,7 +15,7 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
-from mitsuba_diffraction.analysis.iridescence import chance_iridescence, diffracted_light
+from mitsuba_diffraction.analysis.iridescence import light_and_chance
 from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
@@ -144,6 +144,7 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
     assert ran.code == 1
     assert "1 scans in survey.csv, 2 failed, 3 samples" in ran.out
     assert "none.npy" in ran.err
+    assert "uncertain by some 15 %" in ran.err
 
 
 @pytest.mark.parametrize(
@@ -246,7 +247,10 @@ def test_gratings_of_two_directions_are_both_found():
 
 
 def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
+    said = []
+
     def interrupt(done, total, text):
+        said.append(text)
         if done == 1:
             raise KeyboardInterrupt
 
@@ -255,6 +259,7 @@ def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
     with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [Path(row["file"]).stem for row in rows] == ["straight"]
+    assert said == ["straight.npy", "broken.npy"]
 
 
 def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
@@ -294,10 +299,28 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
     light = LightDirection(30.0, 0.0)
     for field, above in ((rough, 1.25), (grating, 1.3)):
         table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
-        index = diffracted_light(table, light).iridescence()
-        chance = chance_iridescence(table, light)
+        diffracted, chance = light_and_chance(table, light)
+        index = diffracted.iridescence()
         # chance differs by some 10 % from patch to patch
         assert (index > above * chance) == (field is grating), (index, chance)
+
+
+@pytest.mark.thorough
+def test_a_grating_ranks_alike_at_any_angle_and_number_of_periods():
+    x = 0.08 * np.arange(128)
+    ranks = []
+    for periods, turn in ((10.0, 0.0), (10.5, 0.0), (10.5, 1.0), (10.3, 30.0), (10.5, 45.0)):
+        c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        waves = np.sin(2 * np.pi * periods / 10.24 * (c * x + s * x[:, None]))
+        field = HeightField(0.015 * waves, 0.08, cut_out=True)
+        table = DiffractionTable.build(field, tolerance=0.01)
+        diffracted, chance = light_and_chance(table, LightDirection(30.0, turn))
+        index = diffracted.iridescence()
+        # a grating's own leakage around its lobes is no unordered surface
+        assert chance < 0.1 * index, (periods, turn)
+        ranks.append(np.sqrt(index**2 - chance**2) * diffracted.share)
+    # periods differ by 5 %, and windows see gratings at other phases
+    assert np.ptp(ranks) < 0.1 * np.mean(ranks), ranks
 
 
 def test_scans_of_different_sizes_are_measured_on_crops_of_one(survey, tmp_path):

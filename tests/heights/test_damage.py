@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.damage import damage
 from mitsuba_diffraction.heights.field import HeightField
 from tests.support.directions import rough_patch
 
+NORMAL = gaussian_filter(np.random.default_rng(1).normal(0.0, 0.03, (128, 128)), 3, mode="wrap")
 ROUGH = rough_patch((128, 128), (0.05, 0.05), 0.02).heights
 
 
@@ -26,6 +30,8 @@ def test_an_aborted_scan_is_named_with_what_is_left(rows, named, level):
     aborted[rows] = 0.0
     (line,) = damage(scan(aborted).treated(level=level))
     assert named in line
+    crop = re.search(r"use crop=([\d.,]+):", line)[1]
+    assert damage(scan(aborted).treated(level=level, crop=crop)) == []
 
 
 def test_repeated_rows_are_counted():
@@ -47,8 +53,18 @@ def test_a_bow_is_named_and_removed():
     assert left.std() < 0.3 * ROUGH.std()
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_dust_is_named_and_clipped(sign):
+    dusty = NORMAL.copy()
+    for x, y in ((20, 31), (77, 80), (101, 12)):
+        dusty[y : y + 4, x : x + 4] = sign * 0.15
+    (line,) = damage(scan(dusty))
+    assert "clip=5" in line
+    assert damage(scan(dusty).treated(clip=5.0)) == []
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_sound_scans_and_gratings_have_no_damage(turned):
     made = (gratings.lamellar(2.5, 0.3, periods=4, rows=64), gratings.sinusoidal(1.6, 0.1, rows=64))
-    for heights in (ROUGH, *(one.heights for one in made), np.zeros((32, 32))):
+    for heights in (ROUGH, NORMAL, *(one.heights for one in made), np.zeros((32, 32))):
         assert damage(scan(heights.T if turned else heights)) == []

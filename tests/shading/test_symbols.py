@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.arithmetic import formula, is_complex, of, squared
+from mitsuba_diffraction.optics.arithmetic import is_complex, of, squared
 from mitsuba_diffraction.shading.dialects import GLSL, OSL
 from mitsuba_diffraction.shading.programs import Program
 
@@ -21,14 +21,13 @@ class Ends(NamedTuple):
     high: Any
 
 
-@formula
 def halved(z: Any) -> Any:
     """Return z/2, eq. 3."""
     return 0.5 * z
 
 
 def both(wi: tuple[Any, Any, Any], ends: Ends, index: Any) -> tuple[Any, Any]:
-    """Return a real and a complex number, eq. 1.
+    """Return two numbers, eq. 1.
 
     More words.
     """
@@ -37,7 +36,7 @@ def both(wi: tuple[Any, Any, Any], ends: Ends, index: Any) -> tuple[Any, Any]:
     length = xp.sqrt(xp.maximum(x * x + z * z, 1e-20))
     steep = (length > ends.low) & (z < ends.high)
     chosen = xp.where(steep, length, 2.0)
-    return halved(chosen), (index - 1.0) / (index + 1.0) * halved(index)
+    return halved(chosen), squared((index - 1.0) / (index + 1.0) * halved(index))
 
 
 def printed(function: Any, *kinds: Any, dialect: Any = GLSL) -> str:
@@ -46,24 +45,21 @@ def printed(function: Any, *kinds: Any, dialect: Any = GLSL) -> str:
     return program.text
 
 
-def test_functions_and_variables_keep_their_names() -> None:
+def test_variables_keep_their_names() -> None:
     text = printed(both, "vector", Ends("float", "float"), "float")
-    assert "// Return a real and a complex number, eq. 1.\n" in text
+    assert "// Return two numbers, eq. 1.\n" in text
     assert "More words" not in text
     assert "void both(vec3 wi, float low, float high, float index," in text
     assert "float length_ = sqrt(max(wi.x * wi.x + wi.z * wi.z, 1e-20));" in text
     assert "bool steep = length_ > low && wi.z < high;" in text
-    # a formula is a function, before those that call it, once for all of its calls
-    assert text.index("float halved(float z)") < text.index("void both(")
-    assert text.count("float halved(") == 1
 
 
-def test_complex_and_real_formulas_are_two_functions_of_one_name() -> None:
+def test_complex_numbers_are_pairs() -> None:
     text = printed(both, "vector", Ends("float", "float"), "complex")
-    assert "float halved(float z)" in text
-    assert "vec2 halved(vec2 z)" in text
+    assert "vec2 index" in text
+    assert "index.x - 1.0" in text
     osl = printed(both, "vector", Ends("float", "float"), "complex", dialect=OSL)
-    assert "md_number halved(md_number z)" in osl
+    assert "md_number index" in osl
     assert "int steep = length_ > low && wi[2] < high;" in osl
 
 
@@ -148,29 +144,12 @@ def test_squares_and_kinds() -> None:
     assert "return z;" in printed(of_kind, "float")
 
 
-def test_names_that_the_shader_declares_are_no_functions() -> None:
-    program = Program(GLSL, frozenset({"halved", "GAIN"}))
-    with pytest.raises(DiffractionError, match="already declares the name halved"):
-        program.add(halved, "float")
+def test_macros_are_no_variables() -> None:
+    program = Program(GLSL, frozenset({"GAIN"}))
 
     def of_gain(GAIN: Any) -> Any:
         return halved(GAIN)
 
     program.add(of_gain, "float")
-    assert "float halved_(float z)" in program.text
     assert "float of_gain(float GAIN_)" in program.text
-    assert "return halved_(GAIN_);" in program.text
-
-
-def test_formulas_of_one_name_are_two_functions() -> None:
-    def outer(x: Any) -> Any:
-        return halved(x) + doubled(x)
-
-    def double(x: Any) -> Any:
-        return 2.0 * x
-
-    double.__name__ = "halved"
-    doubled = formula(double)
-    text = printed(outer, "float")
-    assert "return halved(x) + halved_(x);" in text
-    assert "return 2.0 * x;" in text
+    assert "return 0.5 * GAIN_;" in program.text

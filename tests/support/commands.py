@@ -135,7 +135,7 @@ def small_look(command: str, value: str) -> str:
         return value
     if command in ("brdf-map", "export-osl"):  # which take no parameters behind the name
         return "gold-foil"
-    return f"{value},heightfield={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
+    return f"{value},filename={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
 
 
 def without_size(rest: list[str]) -> list[str]:

@@ -8,6 +8,7 @@ build        tables, each built in a process of its own, whose memory is measure
 contenders   BSDFs to compare, the bare gathers and the thesis' look-up among them
 evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
 orders       `diffraction_orders`: times of the calls, noise of a sample
+survey       a survey of many scans, in one process and on workers
 scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
 """
 
@@ -49,7 +50,11 @@ def sections(
         from .build import measure_builds
 
         yield measure_builds(plan, folder, progress)
-    if set(parts) <= {"build"}:
+    if "survey" in parts:
+        from .survey import measure_survey
+
+        yield measure_survey(plan, folder, progress)
+    if set(parts) <= {"build", "survey"}:
         return
     import drjit as dr
 

@@ -25,7 +25,9 @@ from mitsuba_diffraction.errors import DiffractionError
 from ..figures.pages import add_measured, exit_code, measured_patch
 from . import figures, sections
 
-PARTS = ("build", "eval", "sample", "snake", "orders", "noise", "efficiency", "colours")
+PARTS = (
+    "build", "survey", "eval", "sample", "snake", "orders", "noise", "efficiency", "colours",
+)  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -2,6 +2,7 @@
 
 With q = k (u, v) of ωi + ωo, f cosθo = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²) cosθo: each
 lobe's integral over directions is its order's efficiency, but for what lies beyond the horizon.
+Order 0 is a mirror's lobe (`optics.mirror`): times C(X_i) C(X_o), it has all of its efficiency.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import sigma_of
+from ...optics.mirror import horizon_correction
 from ...optics.orders import lobe_falloff, lobe_peak, order_lobe, wavenumber_step
 from ...plugin.arithmetic import clip, index_of, maximum, minimum
 from ...plugin.directions import Pair
@@ -162,6 +164,11 @@ class OrderLobe:
         along = (position.y - order.y) * (d_x / d_y)
         return order_lobe(position.x - order.x, along, self._sharpness)
 
+    def visible(self, order: Any, pair: Pair, wavelength: Float) -> Float:
+        """Return C(X_i) C(X_o) of order 0, 1 of others."""
+        zeroth = (order.x == 0.0) & (order.y == 0.0) if self.crossed else order == 0.0
+        return dr.select(zeroth, pair.visible(self.sigma, wavenumber_of(wavelength)), 1.0)
+
     def mirrored(self) -> Any:
         """Return order 0."""
         return mi.Vector2f(0.0, 0.0) if self.crossed else mi.Float(0.0)
@@ -180,6 +187,11 @@ class OrderLobe:
         spread = mi.warp.square_to_std_normal(minimum(sample2, BELOW_ONE)) * wide
         centre = self.centre(drawn.order, wavelength)
         return Draw(centre + mi.Vector2f(spread), drawn.below, drawn.valid)
+
+
+def wavenumber_of(wavelength: Float) -> Float:
+    """Return 2π/λ, rad/µm, of a wavelength in nm."""
+    return 2e3 * math.pi * dr.rcp(wavelength)
 
 
 def nearest(position: Float, overlap: bool) -> list[Float]:
@@ -215,10 +227,11 @@ class SpectralLobes:
                 lobe = self._window.lobe(position, order)
                 share = self.lookup.share(row, order, lobe > 0.0, below)
                 near |= lobe > 0.0
-                light = dr.fma(share.efficiency, lobe, light)
                 chance = dr.fma(share.chance, lobe, chance)
+                lobe = lobe * self._window.visible(order, pair, wavelength)
+                light = dr.fma(share.efficiency, lobe, light)
                 terms.append((order, lobe, share.efficiency))
-            peak = lobe_peak(2e3 * math.pi * dr.rcp(wavelength), self._window.sigma) * pair.cos_o
+            peak = lobe_peak(wavenumber_of(wavelength), self._window.sigma) * pair.cos_o
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(maximum(self.lookup.total(row, near), _MIN_SUM))
         mean = density * (1.0 / len(wavelengths))
@@ -273,7 +286,7 @@ class DaylightLobes:
         """See `Lobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
         light = Incidence(pair.incident, pair.cos_i)
-        total = self._zeroth(light, below, radius)
+        total = self._zeroth(light, below, radius, pair)
         others = self.others(light, below, pair.uv, radius)
         total = [a + b for a, b in zip(total, others, strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
@@ -305,20 +318,22 @@ class DaylightLobes:
         share, total = self.lookup.share(row, order, True, below), self.lookup.total(row)
         return share.efficiency, share.chance * dr.rcp(maximum(total, _MIN_SUM))
 
-    def _zeroth(self, light: Incidence, below: Below, radius: Float) -> list[Float]:
+    def _zeroth(self, light: Incidence, below: Below, radius: Float, pair: Pair) -> list[Float]:
         """Sum order 0 over wavelengths, for red, green, blue and the density."""
         longest = dr.square(2e3 * math.pi * self.sigma / ENDS[1])
         count = dr.select(radius * longest < REACH, mi.UInt32(self._wavelengths), mi.UInt32(0))
 
-        def add(n: Index, inputs: tuple[Incidence, Float], sums: list[Float]) -> list[Float]:
-            light, radius = inputs
+        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
+            light, (radius, into, out) = inputs
             node = read_record(self._order_0, n, 8)
-            peak = lobe_peak(2e3 * math.pi * dr.rcp(node[CHANNELS]), self.sigma)
+            k = wavenumber_of(node[CHANNELS])
+            peak = lobe_peak(k, self.sigma)
             value, share = self.shares(light, below, node[CHANNELS], self._window.mirrored())
             lobe = peak * dr.exp(-math.pi * radius * peak)
-            return added(sums, node, lobe, value, share)
+            return added(sums, node, lobe, value * horizon_correction(into, out, k), share)
 
-        return sum_of(count, add, (light, radius), [mi.Float(0.0)] * CHANNELS)
+        levels = [dr.square(cosine) * self.sigma for cosine in (pair.cos_i, pair.cos_o)]
+        return sum_of(count, add, (light, [radius, *levels]), [mi.Float(0.0)] * CHANNELS)
 
     def others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
         """Sum all other orders, for red, green, blue and the density."""

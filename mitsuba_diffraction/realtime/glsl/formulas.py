@@ -32,19 +32,20 @@ from ...optics.orders import (
 from ...shading.dialects import GLSL
 from ...shading.pair_power import Coat, coated_mirror, relative_power
 from ...shading.programs import Program
-from .rewriting import declared_names
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "ORDERS": {
         order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
-        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
+        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4, horizon_correction: 3,
     },
     "FACE": {face_transmittance: 2, order_direction: 4},
     "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
 }  # fmt: skip
+#: Macros of the shaders that a variable of a formula could be called.
+_MACROS = frozenset({"PI", "PAGE", "TEXELS"})
 _KINDS = {"1": "float", "2": "complex"}
 
 
@@ -60,7 +61,7 @@ def formulas(definitions: Mapping[str, str]) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
-    program = Program(GLSL, declared_names())
+    program = Program(GLSL, _MACROS)
     program.add(encoded_colour, "vector")
     if "DISPLAYED" in names:
         shown = shown_colour if "NATURAL" in names else encoded_colour

@@ -64,3 +64,15 @@ def test_gaps_outside_the_middle_do_not_matter_and_tilt_is_that_of_the_middle(tm
 def test_no_size_is_named(bad):
     with pytest.raises(DiffractionError, match="crop: expected a width or a pair"):
         FIELD.treated(crop=bad)
+
+
+def test_a_region_elsewhere_has_its_lower_left_corner(tmp_path):
+    part = FIELD.treated(crop="2, 1, 0.5, 0.25", level="none")
+    np.testing.assert_array_equal(part.heights, FIELD.heights[1:5, 1:5])
+    assert "from 1, 1" in part.history[-1]
+    with pytest.raises(DiffractionError, match="leaves the patch"):
+        FIELD.treated(crop=(2.0, 1.0, 2.5, 0.0))
+    recipe = tmp_path / "a.toml"
+    np.save(tmp_path / "a.npy", FIELD.heights)
+    recipe.write_text('source = "a.npy"\npixel_size = [0.5, 0.25]\ncrop = [2, 1, 0.5, 0.25]\n')
+    assert HeightField.load(recipe).digest() == part.digest()

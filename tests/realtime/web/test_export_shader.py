@@ -290,7 +290,9 @@ def test_every_surface_is_valid_glsl_of_its_own(
     material = Path(md.__file__).parent / "realtime/glsl/three/diffraction.js"
     whole = shader.code + material.read_text(encoding="utf-8")
     code = re.sub(r"\s*//.*", "", whole)  # comments cost a program nothing
-    assert len(code.encode()) < 40_000
+    # programs of a size that browsers compile at once; formulas under coats are 20 kB, since their
+    # complex numbers are written out
+    assert len(code.encode()) < 42_000
 
 
 @pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])

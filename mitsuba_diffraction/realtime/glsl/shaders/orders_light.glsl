@@ -1,11 +1,20 @@
 // Light of all solved orders under the coherence window, like orders/bsdf/lobes.py:
-// f = Σ_m η_m (k²σ²/π) exp(−σ²|q − q_m|²).
+// f = Σ_m η_m (k²σ²/π) exp(−σ²|q − q_m|²), order 0 times C(X_i) C(X_o) of optics/mirror.py.
 
 #define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
 
 uniform float sigma;             // standard deviation of the amplitude window, µm
 
 const float FAR = 18.0;          // squared distance from a lobe's centre, in its widths, where it is 0
+
+vec2 lobe_ends = vec2(1.0);      // cosθi and cosθo
+
+// C(X_i) C(X_o) of order 0.
+float visible_mirror(float k)
+{
+    vec2 level = lobe_ends * lobe_ends * sigma;
+    return horizon_correction(level.x, level.y, k);
+}
 
 // Lobes of all orders of one wavenumber, from a look-up at it: f without the cosine.
 float orders_at(vec2 uv, float k)
@@ -18,6 +27,7 @@ float orders_at(vec2 uv, float k)
     float sum = 0.0;
     for (int m = int(ceil(place.x - reach)); m <= last; ++m) {
         float lobe = order_lobe(place.x - float(m), place.y, sharpness);
+        if (m == 0) lobe *= visible_mirror(k);
         if (lobe > exp(-FAR)) sum += lobe * efficiency_of(float(m));
     }
     return sum * lobe_peak(k, sigma);
@@ -70,7 +80,7 @@ vec3 all_orders(vec2 uv, int light)
             float k = 2.0 * PI / node.w;
             find_row(node.w);
             sum += node.rgb * (lobe_peak(k, sigma) * exp(-square * sigma * sigma * k * k)
-                               * efficiency_of(0.0));
+                               * visible_mirror(k) * efficiency_of(0.0));
         }
     return light_colour[light] * sum;
 }
@@ -116,5 +126,6 @@ vec3 all_orders(vec2 uv, int light)
 vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
     begin_orders(wi, rotation);
+    lobe_ends = vec2(wi.z, wo.z);
     return wo.z * all_orders(in_patch(wi + wo, rotation), light);
 }

@@ -1,0 +1,77 @@
+"""A survey of scans of 10 µm, as the command runs it, in a cache of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.tables.store import VARIABLE
+
+from .figures import Goal, Plan, Row, Section
+
+#: Scans of a full run, and seconds that they may take on two cores.
+SCANS, MOST = 62, 60.0
+_COLUMNS = ("s", "s a scan", "s of all cores a scan")
+_SIDE, _PIXELS = 10.0, 256  # µm, and pixels a side
+
+
+def measure_survey(plan: Plan, folder: Path, progress: Progress) -> Section:
+    """Time `survey` of gratings with roughness, in one process and on two workers."""
+    count = SCANS if plan.other_tables else 6
+    files = [str(file) for file in _scans(folder, count)]
+    ways = {"one process": []}
+    if importlib.util.find_spec("distributed") is not None:
+        ways["two workers"] = ["--workers", "2"]
+    rows = []
+    for n, (name, options) in enumerate(ways.items()):
+        progress(n, len(ways), f"survey, {name}")
+        seconds, busy = _timed(files, folder / name.split()[0], options)
+        goals = [Goal(f"at most {MOST:g} s", seconds <= MOST)] if count == SCANS else []
+        values = seconds, seconds / count, busy / count
+        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals))
+    progress(len(ways), len(ways), "surveyed")
+    return Section(
+        f"survey: {count} scans of {_SIDE:g} µm, {_PIXELS}² pixels, each way once, with an empty "
+        "cache and the start of the processes",
+        _COLUMNS, rows,
+    )  # fmt: skip
+
+
+def _scans(folder: Path, count: int) -> list[Path]:
+    """Write scans of turned gratings with roughness."""
+    generator = np.random.default_rng(5)
+    x = _SIDE / _PIXELS * np.arange(_PIXELS)
+    files = []
+    for n in range(count):
+        angle, period = generator.uniform(0.0, np.pi), generator.uniform(0.7, 2.0)
+        along = np.cos(angle) * x + np.sin(angle) * x[:, None]
+        rough = gaussian_filter(generator.normal(size=(_PIXELS, _PIXELS)), 2)
+        files.append(folder / f"scan-{n:02d}.npy")
+        np.save(files[-1], 0.02 * np.sin(2.0 * np.pi * along / period) + 0.03 * rough)
+    return files
+
+
+def _timed(files: list[str], folder: Path, options: list[str]) -> tuple[float, float]:
+    """Return the seconds that the command takes, and those of all its processes."""
+    command = [
+        sys.executable, "-m", "mitsuba_diffraction", "survey", *files, "--repeats", "folder",
+        "--pixel-size", str(_SIDE / _PIXELS), "-o", str(folder / "survey"), *options,
+    ]  # fmt: skip
+    start, before = time.perf_counter(), os.times()
+    ran = subprocess.run(
+        command, env={**os.environ, VARIABLE: str(folder / "cache")}, capture_output=True, text=True
+    )
+    if ran.returncode:
+        raise DiffractionError(f"the survey failed: {ran.stderr.strip().splitlines()[-1]}")
+    after = os.times()
+    busy = sum(end - begin for begin, end in zip(before[2:4], after[2:4], strict=True))
+    return time.perf_counter() - start, busy
