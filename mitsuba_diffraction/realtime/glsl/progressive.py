@@ -219,30 +219,27 @@ class ProgressiveLight:
         """Draw one light with its shadows."""
         if not len(self._visible.places):
             return
-        uniforms, each = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
+        uniforms = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
         uniforms["light_density"] = light.density
         definitions = {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
         textures = {"shadow_map": self._map.texture}
-        self._draw_surfaces(light, camera, definitions, uniforms, each, textures)
+        self._draw_surfaces(light, camera, definitions, uniforms, textures)
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
         uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
-        each: list[dict[str, Uniform]] = [{} for _ in self._visible.solid]
-        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
+        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, {})
 
     def _draw_surfaces(
         self, light: Lamp, camera: Camera, definitions: dict[str, str],
-        uniforms: dict[str, Uniform], each: list[dict[str, Uniform]], textures: dict[str, Any],
+        uniforms: dict[str, Uniform], textures: dict[str, Any],
     ) -> None:  # fmt: skip
         """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
-        for surface, solid in zip(each, self._visible.solid, strict=True):
-            surface["solid"] = solid
         self._draw(
             self._frame.frame, camera, [light], definitions, uniforms,
-            self._surroundings, each, textures,
+            self._surroundings, textures,
         )  # fmt: skip
 
     @property
