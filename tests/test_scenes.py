@@ -80,7 +80,7 @@ def test_the_patch_of_the_cd_follows_the_radius(gentle: dict[str, str]) -> None:
     file = SCENES / "meshes" / "cd_data.ply"
     bsdf = {
         "type": "diffraction",
-        "heightfield": gentle["patch"],
+        "filename": gentle["patch"],
         "pixel_size": gentle["pixel_size"],
         "coherence_width": float(gentle["coherence_width"]),
         "material": "none",

@@ -46,6 +46,6 @@ def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
         file = Path(folder) / ("table.nc" if solved else "table.exr")
         table.save(file)
         props = mi.Properties("diffraction_orders" if solved else "diffraction")
-        for name, value in {"table": str(file), **parameters}.items():
+        for name, value in {"filename": str(file), **parameters}.items():
             props[name] = value
         return DiffractionOrders(props) if solved else Diffraction(props)

@@ -67,7 +67,7 @@ def quiet_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
     """Load the plugin with a table, without warnings about the model's limits."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
+        return mi.load_dict({"type": "diffraction", "filename": str(table), **parameters})
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def bsdf_dict(
 
     Parameters
     ----------
-    field : heights in µm; or the path of a file, as for the parameter `heightfield`. Or a table of
+    field : heights in µm; or the path of a file, as for the parameter `filename`. Or a table of
         orders, whose plugin is `diffraction_orders`.
     plugin : `diffraction`, which reflects light, or `diffraction_dielectric`, which lets it through
         as well.
@@ -72,9 +72,9 @@ def bsdf_dict(
     if isinstance(field, Pluggable):
         return {"type": field.plugin, "data": TableData(field), **arguments}
     if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
-        return {"type": ORDERS, "table": os.fspath(field), **arguments}
+        return {"type": ORDERS, "filename": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):
-        return {"type": plugin, "heightfield": os.fspath(field), **arguments}
+        return {"type": plugin, "filename": os.fspath(field), **arguments}
     if not isinstance(field, HeightField):
         raise DiffractionError(
             f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "

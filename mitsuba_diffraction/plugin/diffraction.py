@@ -6,11 +6,9 @@ well are of the plugin `diffraction_dielectric`.
 
 The surface
 -----------
-heightfield : string
-    File of the height map: image, array (NPY), text, instrument file or recipe (TOML). A table is
-    accepted, too.
-table : string
-    Instead: table file of `mitsuba-diffraction precompute`.
+filename : string
+    File of the height map: image, array (NPY), text, instrument file or recipe (TOML); or a table
+    of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
     Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
 pixel_size : float or string [from the file]
@@ -151,8 +149,8 @@ spread, polarised variants keep the mean phase between s and p.
 For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
 indices and films hold it constant.
 
-**The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface;
-under a coat, of both flat faces. Spectra of pigments are constant beyond their ends.
+**The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface and
+its coat. Spectra of pigments are constant beyond their ends.
 
 **Tools.** Functions of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`. On CUDA Dr.Jit 1.5
 cannot record `sample` of a bitmap.
@@ -160,7 +158,7 @@ cannot record `sample` of a bitmap.
 XML and the same in Python:
 
     <bsdf type="diffraction">
-        <string name="heightfield" value="scale.png"/>
+        <string name="filename" value="scale.png"/>
         <float name="pixel_size" value="0.0488"/>
         <float name="max_height" value="0.375"/>
     </bsdf>
@@ -172,7 +170,7 @@ XML and the same in Python:
     bsdf = mi.load_dict(
         {
             "type": "diffraction",
-            "heightfield": "scale.png",
+            "filename": "scale.png",
             "pixel_size": 0.0488,
             "max_height": 0.375,
         }
@@ -241,7 +239,7 @@ class Diffraction(DiffractingSurface):
             self.wavelength,
             partial(reflector_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
-            beneath=nested is not None and self.coat is None,
+            beneath=nested is not None,
         )
         self.ready()
 
@@ -303,7 +301,7 @@ class Diffraction(DiffractingSurface):
         """See `SurfaceBSDF.beneath`: T = 1 − a, with a the flat reflectance times a smooth ratio.
 
         a is the albedo of the diffraction, so that what is not reflected goes on, and a white pair
-        reflects at most what it gets. Under a coat it is the flat reflectance alone.
+        reflects at most what it gets.
         """
         inwards, outwards = (
             dr.maximum(1.0 - self.energy.reflected(w, site) * flat, 0.0)

@@ -29,7 +29,7 @@ energy_conserving shares it among all other light.
 XML and the same in Python:
 
     <bsdf type="diffraction_dielectric">
-        <string name="heightfield" value="scale.png"/>
+        <string name="filename" value="scale.png"/>
         <float name="pixel_size" value="0.0488"/>
         <float name="max_height" value="0.375"/>
         <boolean name="thin" value="true"/>
@@ -42,7 +42,7 @@ XML and the same in Python:
     sheet = mi.load_dict(
         {
             "type": "diffraction_dielectric",
-            "heightfield": "scale.png",
+            "filename": "scale.png",
             "pixel_size": 0.0488,
             "max_height": 0.375,
             "thin": True,

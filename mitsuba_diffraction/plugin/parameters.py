@@ -32,7 +32,9 @@ from .types import BSDF, Properties
 from .varying import Orientation
 from .window_positions import TILINGS, WindowPositions
 
-SOURCES = ("heightfield", "table", "data")
+SOURCES = ("filename", "data")
+#: Earlier names of parameters, which are accepted with one line.
+EARLIER = {"heightfield": "filename", "table": "filename"}
 READING = tuple(field.name for field in fields(LoadOptions))
 #: Settings of the table.
 TABLE = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
@@ -64,7 +66,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
         "film_thickness", "layers", "pigment", "shadowing",
     ),
     TRANSMITTING: (*_COMMON, "thin"),
-    ORDERS: ("table", "data", "coherence_width", "orientation", "wavelength"),
+    ORDERS: (*SOURCES, "coherence_width", "orientation", "wavelength"),
 }  # fmt: skip
 
 #: Features that exclude each other.
@@ -87,6 +89,7 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
     through.
     """
     require_loaded_llvm()
+    _rename(props)
     for name in OPTIONAL:
         if name in props and props.get(name) == "none":
             del props[name]
@@ -113,6 +116,20 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
             "nest one that only reflects"
         )
     return bsdf
+
+
+def _rename(props: Properties) -> None:
+    """Give parameters their current names, with a warning about each earlier one.
+
+    Raises a DiffractionError if both names are given.
+    """
+    for old, new in EARLIER.items():
+        if old in props:
+            if new in props:
+                raise DiffractionError(f"{old} is now {new}, and both are given; give {new} alone")
+            props[new] = props.get(old)
+            del props[old]
+            warn(f"{old} is now {new}: rename the parameter")
 
 
 def _unknown(name: str, plugin: str) -> str:

@@ -53,8 +53,7 @@ class Preset:
         own = dict(self.parameters)
         if any(name in changes for name in MATERIALS):
             own = {name: value for name, value in own.items() if name not in MATERIALS}
-        source = "table" if self.plugin == ORDERS else "heightfield"
-        return {"type": self.plugin, source: str(self.patch), **own, **changes}
+        return {"type": self.plugin, "filename": str(self.patch), **own, **changes}
 
 
 @cache

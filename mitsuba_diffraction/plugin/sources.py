@@ -62,7 +62,7 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
             f"'{source.path}' is a table of orders, which the BSDF 'diffraction_orders' has as its "
             "table; change the type of the BSDF, or give heights"
         )
-    if name == "table" or source.kind is FileKind.TABLE:
+    if source.kind is FileKind.TABLE:
         table = _table_file(source, asked, height_scale, stretch)
     else:
         settings = source.settings_for(asked, height_scale)

@@ -310,7 +310,7 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
     else:
         solved = kind_of(file) is FileKind.ORDERS
         plugin = ORDERS if solved else TRANSMITTING if "thin" in values else REFLECTING
-        values["table" if solved else "heightfield"] = str(Path(file).absolute())
+        values["filename"] = str(Path(file).absolute())
     names = list(values)
     props = mi.Properties(plugin)
     for name, value in values.items():
@@ -348,7 +348,7 @@ def _value(text: str) -> float | bool | str:
 def _two_sided(state: Any, surface: Any) -> Any:
     """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
     name = surface.plugin_name()
-    if name == TRANSMITTING or (name == ORDERS and load_orders(surface["table"]).sides == 2):
+    if name == TRANSMITTING or (name == ORDERS and load_orders(surface["filename"]).sides == 2):
         return surface
     props = mi.Properties("twosided")
     props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))

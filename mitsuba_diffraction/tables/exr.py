@@ -121,7 +121,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     if not isinstance(document, dict):
         raise DiffractionError(
             f"'{path}' is an EXR image but no table; make a table with the command "
-            "'precompute' (DiffractionTable.build), or give it as heightfield"
+            "'precompute' (DiffractionTable.build), or give it as filename"
         )
     version = document.pop("version", None)
     if version != FORMAT_VERSION:

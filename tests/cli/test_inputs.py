@@ -73,7 +73,7 @@ def test_a_pipe_is_refused_at_once(run, here, alarm, suffix, arguments):
         '<shape type="ply"><string name="filename" value="pipe"/></shape>',
         '<include filename="pipe"/>',
         '<shape type="sphere"><bsdf type="diffraction">'
-        '<string name="heightfield" value="pipe"/></bsdf></shape>',
+        '<string name="filename" value="pipe"/></bsdf></shape>',
     ],
     ids=["mesh", "include", "heights"],
 )
@@ -164,7 +164,7 @@ def test_a_whole_number_of_many_digits_in_toml_is_refused_in_one_line(run, here,
     Path("a.xml").write_text(
         SCENE.format(
             '<shape type="sphere"><bsdf type="diffraction">'
-            '<string name="heightfield" value="a.toml"/></bsdf></shape>'
+            '<string name="filename" value="a.toml"/></bsdf></shape>'
         )
     )
     ran = run(*command.format("a.toml").split())

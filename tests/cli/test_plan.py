@@ -36,7 +36,7 @@ SCENE = """<scene version="3.5.0">
   <emitter type="constant"><spectrum name="radiance" value="1e-6"/></emitter>
   <shape type="rectangle">
     <bsdf type="diffraction" id="foil">
-      <string name="heightfield" value="$heights"/>
+      <string name="filename" value="$heights"/>
       <string name="pixel_size" value="0.3"/>
       <float name="coherence_width" value="18"/>
       <boolean name="energy_conserving" value="false"/>

@@ -139,7 +139,7 @@ def test_a_warning_of_the_heights_is_said_once(run, heights, here):
     # of the heights, not of the table
     assert "coarser than a quarter" in run("info", heights, "--pixel-size", "0.2").out
     assert "coarser than a quarter" not in run("info", "grating.exr").out
-    surface = '<bsdf type="diffraction"><string name="table" value="grating.exr"/></bsdf>'
+    surface = '<bsdf type="diffraction"><string name="filename" value="grating.exr"/></bsdf>'
     Path("a.xml").write_text(SCENE.replace('<bsdf type="diffuse"/>', surface))
     rendered = run("render", "a.xml", "-m", "scalar_rgb", "-s", 1)
     assert rendered.code == 0, rendered

@@ -13,7 +13,7 @@ from tests.support.room import QUICK, SCENE, pixels
 def test_a_scene_that_names_a_retired_parameter_is_rendered(run, heights, here, line):
     name = line.split('"')[1]
     surface = f"""<bsdf type="diffraction">
-      <string name="heightfield" value="{heights}"/><float name="coherence_width" value="6"/>
+      <string name="filename" value="{heights}"/><float name="coherence_width" value="6"/>
       <float name="pixel_size" value="0.08"/>
       <boolean name="energy_conserving" value="false"/>%s</bsdf>"""
     for file, parameter in (("old.xml", line), ("new.xml", "")):

@@ -16,7 +16,7 @@ SCENE = """<scene version="3.0.0"><integrator type="path"/>
     <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
     <integer name="height" value="8"/></film></sensor><emitter type="constant"/>
     <shape type="sphere"><transform name="to_world"><translate z="4"/></transform>
-    <bsdf type="diffraction"><string name="heightfield" value="scan.npy"/>
+    <bsdf type="diffraction"><string name="filename" value="scan.npy"/>
     <float name="pixel_size" value="0.1"/></bsdf></shape></scene>"""
 
 

@@ -30,7 +30,7 @@ _SCENE = """<scene version="3.0.0"><default name="resx" value="6"/>
 <integrator type="path"/><sensor type="perspective"><film type="hdrfilm">
 <integer name="width" value="$resx"/><integer name="height" value="4"/></film>
 <sampler type="independent"><integer name="sample_count" value="1"/></sampler></sensor>
-<shape type="sphere"><bsdf type="diffraction"><string name="table" value="ensemble.exr"/></bsdf>
+<shape type="sphere"><bsdf type="diffraction"><string name="filename" value="ensemble.exr"/></bsdf>
 </shape><emitter type="point"><point name="position" value="0,0,-4"/></emitter></scene>
 """
 # what would take long otherwise; an option that comes again counts

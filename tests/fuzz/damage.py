@@ -49,7 +49,7 @@ _SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="$width"/>
 <integer name="height" value="4"/></film></sensor>
 <shape type="sphere" id="ball"><transform name="to_world"><scale value="0.5"/></transform>
-<bsdf type="diffraction" id="skin"><string name="table" value="TABLE"/>
+<bsdf type="diffraction" id="skin"><string name="filename" value="TABLE"/>
 <string name="material" value="Al"/><boolean name="energy_conserving" value="false"/>
 <float name="orientation" value="30"/><float name="height_scale" value="1.2"/></bsdf></shape>
 <emitter type="point"><point name="position" value="0,0,-4"/></emitter></scene>

@@ -67,7 +67,7 @@ def check(rng: np.random.Generator) -> None:
         loaded = md.DiffractionTable.load(path)
         np.testing.assert_array_equal(loaded.coefficients, table.coefficients)
         scene = {
-            "type": "diffraction", "table": str(path), "material": "none",
+            "type": "diffraction", "filename": str(path), "material": "none",
             "energy_conserving": False,
         }  # fmt: skip
         bsdf = mi.load_dict(scene)

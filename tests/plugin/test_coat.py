@@ -163,7 +163,7 @@ def test_what_is_no_coat_is_one_line(some_variant, parameters, line):
 def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):
     file = tmp_path / "table.exr"
     md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(file)
-    plugin = {"type": "diffraction", "table": str(file), "material": "Al"}
+    plugin = {"type": "diffraction", "filename": str(file), "material": "Al"}
     mi.load_dict({**plugin, "coat_ior": 1.49, "energy_conserving": False})
     assert "height_scale_max=1.58" in refusal(lambda: mi.load_dict({**plugin, "coat_ior": 1.58}))
 

@@ -203,7 +203,7 @@ def test_tables_serve_no_larger_factors_than_1(mono, tmp_path):
     path = tmp_path / "patch.exr"
     md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(path)
     raw = {"material": "none", "energy_conserving": False}
-    plugin = {"type": "diffraction", "table": str(path), **raw}
+    plugin = {"type": "diffraction", "filename": str(path), **raw}
     mi.load_dict(plugin | {"lateral_scale": 0.9})
     said = refusal(lambda: mi.load_dict(plugin | {"lateral_scale": 1.1}))
     assert "give the height field instead of the table" in said

@@ -61,7 +61,7 @@ def test_scalar_variants_do_the_same(table):
 
 
 def test_the_surface_is_dark_beyond_the_limit_and_never_not_a_number(some_variant, saved):
-    bsdf = mi.load_dict({"type": "diffraction", "table": saved, "material": "none"})
+    bsdf = mi.load_dict({"type": "diffraction", "filename": saved, "material": "none"})
     wi, wo = polar(50.0, 20.0), uniform_directions(400, np.random.default_rng(4))
     values = evaluated(bsdf, wi, wo, 450.0)
     q = 2e3 * np.pi / 450.0 * (wi + wo)[:, :2]
@@ -73,5 +73,5 @@ def test_the_surface_is_dark_beyond_the_limit_and_never_not_a_number(some_varian
 
 def test_rgb_variants_refuse_it(saved):
     mi.set_variant("llvm_ad_rgb")
-    line = refusal(lambda: mi.load_dict({"type": "diffraction", "table": saved}))
+    line = refusal(lambda: mi.load_dict({"type": "diffraction", "filename": saved}))
     assert "RGB variants" in line

@@ -59,15 +59,14 @@ def test_an_image_an_array_a_recipe_and_a_table_are_one_surface(some_variant, pn
         'source = "patch.npy"\npixel_size = 0.08\ncoherence_width = 2.4\noutput = "patch.exr"\n'
     )
     surfaces = {
-        "image": loads(heightfield=str(png), **lengths, **SMALL)(),
+        "image": loads(filename=str(png), **lengths, **SMALL)(),
         "strings": loads(
-            heightfield=str(png), pixel_size="0.08", max_height=repr(PATCH.range), **SMALL
+            filename=str(png), pixel_size="0.08", max_height=repr(PATCH.range), **SMALL
         )(),
-        "npy": loads(heightfield=str(png.parent / "patch.npy"), pixel_size="0.08", **SMALL)(),
-        "recipe": loads(heightfield=str(recipe))(),
-        "recipe, auto": loads(heightfield=str(recipe), pixel_size="auto", max_height="auto")(),
-        "table": loads(table=str(table_file))(),
-        "table as heightfield": loads(heightfield=str(table_file), pixel_size="auto")(),
+        "npy": loads(filename=str(png.parent / "patch.npy"), pixel_size="0.08", **SMALL)(),
+        "recipe": loads(filename=str(recipe))(),
+        "recipe, auto": loads(filename=str(recipe), pixel_size="auto", max_height="auto")(),
+        "table": loads(filename=str(table_file), pixel_size="auto")(),
         "data": load(),
     }
     wo = [polar(25, phi) for phi in range(0, 360, 30)]
@@ -81,7 +80,7 @@ def test_an_image_an_array_a_recipe_and_a_table_are_one_surface(some_variant, pn
 def test_files_are_found_by_mitsuba_s_resolver(some_variant, table_file):
     mi.file_resolver().append(str(table_file.parent))
     try:
-        assert "Diffraction[" in str(loads(table="table.exr")())
+        assert "Diffraction[" in str(loads(filename="table.exr")())
     finally:
         resolver = mi.file_resolver()
         kept = [p for p in (str(x) for x in resolver) if p != str(table_file.parent)]
@@ -126,10 +125,10 @@ def test_the_wavelength_of_mono_variants_is_theirs_alone(tmp_path):
     try:
         for name in ("llvm_ad_spectral", "llvm_ad_rgb", "scalar_spectral"):
             mi.set_variant(name)
-            loads(table=str(table))()
+            loads(filename=str(table))()
         mi.set_variant("llvm_ad_mono")
-        assert refusal(loads(table=str(table))).startswith("wavelength=550 nm is outside")
-        loads(table=str(table), wavelength=250.0)()
+        assert refusal(loads(filename=str(table))).startswith("wavelength=550 nm is outside")
+        loads(filename=str(table), wavelength=250.0)()
     finally:
         mi.set_variant("llvm_ad_spectral")
 
@@ -157,7 +156,7 @@ def test_a_table_is_warned_of_where_it_is_built_and_not_where_it_is_found(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load(coarse, coherence_width=10.0)
-        loads(table=str(tmp_path / "coarse.exr"))()
+        loads(filename=str(tmp_path / "coarse.exr"))()
 
 
 def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
@@ -165,7 +164,7 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
 ):
     tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
     np.save(tmp_path / "tilted.npy", tilted)
-    given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
+    given = {"filename": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
     raw = {"level": "none"}
     counted = r"^\d notes? on 'tilted\.npy': mitsuba-diffraction info .* --pixel-size 0.08,0.08"
     with pytest.warns(md.DiffractionWarning, match=counted) as caught:
@@ -184,14 +183,14 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
 
 
 def test_a_patch_is_cropped_in_the_scene(some_variant, png):
-    given = {"heightfield": str(png), "pixel_size": 0.08, "max_height": PATCH.range}
+    given = {"filename": str(png), "pixel_size": 0.08, "max_height": PATCH.range}
     bsdf = loads(**given, crop="1.6, 2.4", coherence_width=1.6)()
     assert bsdf.table.source["shape"] == [30, 20]
 
 
 def test_a_path_makes_a_dictionary_too(some_variant, png):
     given = md.bsdf_dict(png, pixel_size=0.08, max_height=0.03)
-    assert given["heightfield"] == str(png)
+    assert given["filename"] == str(png)
     with pytest.raises(md.DiffractionError, match="expected a HeightField or the path of a file"):
         md.bsdf_dict(PATCH.heights)
 
@@ -200,7 +199,7 @@ def test_a_path_makes_a_dictionary_too(some_variant, png):
 
 
 REFUSED = [
-    ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: heightfield, table, data, pixel_size"),
+    ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: filename, data, pixel_size"),
     ({"coherence_widht": 60.0}, "unknown parameter 'coherence_widht'; did you mean coherence_wi"),
     ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
     (
@@ -248,8 +247,7 @@ REFUSED = [
     ({"pixel_size": 0.0}, "pixel_size: expected one length or a pair (dx, dy) in µm"),
     ({"pixel_size": "0.1, -0.1"}, "pixel_size: expected one length or a pair"),
     ({"pixel_size": float("nan")}, "pixel_size: expected one length or a pair"),
-    ({"heightfield": "a.png"}, "give exactly one of heightfield, table, data; got heightfield an"),
-    ({"table": "a.exr"}, "give exactly one of heightfield, table, data; got table and data"),
+    ({"filename": "a.exr"}, "give exactly one of filename, data; got filename and data"),
 ]
 
 
@@ -260,9 +258,9 @@ def test_parameters_that_do_not_fit_are_one_clear_line(some_variant, parameters,
 
 def test_a_source_is_needed(some_variant):
     text = refusal(loads())
-    assert text == "give exactly one of heightfield, table, data; got none"
+    assert text == "give exactly one of filename, data; got none"
     assert "data needs pixel_size" in refusal(loads(data=mi.TensorXf(np.zeros((4, 4), "f4"))))
-    assert "heightfield=1.0 must be the name of a file" in refusal(loads(heightfield=1.0))
+    assert "filename=1.0 must be the name of a file" in refusal(loads(filename=1.0))
 
 
 @pytest.mark.parametrize(
@@ -282,20 +280,20 @@ def test_tensors_that_are_no_height_field(some_variant, heights, message):
 
 def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
     for name in ("no.png", "no.exr", "no.npy", "no.toml"):
-        text = refusal(loads(heightfield=str(tmp_path / name), pixel_size=0.1))
+        text = refusal(loads(filename=str(tmp_path / name), pixel_size=0.1))
         assert str(tmp_path / name) in text
     (tmp_path / "empty.png").write_bytes(b"")
-    assert "empty.png" in refusal(loads(heightfield=str(tmp_path / "empty.png"), pixel_size=0.1))
-    assert str(tmp_path) in refusal(loads(heightfield=str(tmp_path)))
-    assert "does not exist" in refusal(loads(table=str(tmp_path / "no.exr")))
-    text = refusal(loads(heightfield="none.exr"))
-    assert "heightfield: 'none.exr' does not exist; looked for it in '" in text
+    assert "empty.png" in refusal(loads(filename=str(tmp_path / "empty.png"), pixel_size=0.1))
+    assert str(tmp_path) in refusal(loads(filename=str(tmp_path)))
+    assert "does not exist" in refusal(loads(filename=str(tmp_path / "no.exr")))
+    text = refusal(loads(filename="none.exr"))
+    assert "filename: 'none.exr' does not exist; looked for it in '" in text
     assert repr(str(Path.cwd())) in text
 
 
 def test_an_image_needs_its_lengths(some_variant, png):
-    assert "pixel_size" in refusal(loads(heightfield=str(png), max_height=0.1))
-    assert "max_height" in refusal(loads(heightfield=str(png), pixel_size=0.1))
+    assert "pixel_size" in refusal(loads(filename=str(png), max_height=0.1))
+    assert "max_height" in refusal(loads(filename=str(png), pixel_size=0.1))
 
 
 @pytest.mark.parametrize(
@@ -312,7 +310,7 @@ def test_an_image_needs_its_lengths(some_variant, png):
     ],
 )
 def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameters, message):
-    text = refusal(loads(table=str(table_file), **parameters))
+    text = refusal(loads(filename=str(table_file), **parameters))
     assert message in text
     (name,) = parameters
     if name in SCENE_SETTINGS:
@@ -324,7 +322,7 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
 @pytest.mark.parametrize("width", [2.4, "2.4", "auto"])
 def test_what_agrees_with_a_table_is_fine(some_variant, table_file, width):
     loads(
-        table=str(table_file),
+        filename=str(table_file),
         coherence_width=width,
         coherence="ensemble",
         basis="auto",
@@ -338,13 +336,13 @@ def test_an_automatic_coherence_width_is_the_recipe_s(some_variant, png, tmp_pat
     recipe = tmp_path / "narrow.toml"
     lengths = "pixel_size = 0.08\nmax_height = 0.02\n"
     recipe.write_text(f'source = "{png}"\n{lengths}coherence_width = 2.0\n')
-    assert loads(heightfield=str(recipe), coherence_width="auto")().table.coherence_width == 2.0
+    assert loads(filename=str(recipe), coherence_width="auto")().table.coherence_width == 2.0
 
 
 def test_a_table_for_fewer_wavelengths_than_mitsuba_s_is_refused(some_variant, tmp_path):
     file = tmp_path / "table.exr"
     md.DiffractionTable.build(PATCH, wavelength_range=(450.0, 700.0), **SMALL).save(file)
-    text = refusal(loads(table=str(file)))
+    text = refusal(loads(filename=str(file)))
     assert "starts at 450 nm, but Mitsuba renders from 360 nm on" in text
 
 
@@ -354,15 +352,15 @@ def test_a_table_of_a_laser_s_wavelength_serves_mono_variants_alone(tmp_path, nm
     md.DiffractionTable.build(PATCH, wavelength_range=(nm, nm + 1.1), **SMALL).save(file)
     try:
         mi.set_variant("llvm_ad_mono")
-        bsdf = loads(table=str(file), wavelength=nm + 0.5, int_ior=1.5)()
+        bsdf = loads(filename=str(file), wavelength=nm + 0.5, int_ior=1.5)()
         assert np.all(evaluated(bsdf, polar(10), [polar(25, phi) for phi in (0, 60)], nm) > 0)
         assert f"outside the table's {nm:g} to" in refusal(
-            loads(table=str(file), wavelength=nm - 1, int_ior=1.5)
+            loads(filename=str(file), wavelength=nm - 1, int_ior=1.5)
         )
     finally:
         mi.set_variant("llvm_ad_spectral")
     if nm > 360.0:
-        assert "360" in refusal(loads(table=str(file)))
+        assert "360" in refusal(loads(filename=str(file)))
 
 
 def test_two_nested_bsdfs_are_one_too_many(some_variant):
@@ -374,3 +372,11 @@ def test_nothing_lies_beneath_a_conductor(some_variant):
     for material in ("none", "Al"):
         text = refusal(lambda m=material: load(material=m, beneath={"type": "diffuse"}))
         assert "nested BSDF" in text
+
+
+@pytest.mark.parametrize("earlier", ["heightfield", "table"])
+def test_an_earlier_name_is_the_current_one_with_a_line(some_variant, table_file, earlier):
+    load = loads(**{earlier: str(table_file)})
+    with pytest.warns(md.DiffractionWarning, match=f"{earlier} is now filename"):
+        assert "Diffraction[" in str(load())
+    assert "both are given" in refusal(loads(**{earlier: "a.exr", "filename": "b.exr"}))

@@ -22,7 +22,7 @@ def test_a_look_is_mixed_and_coated_or_refused_in_one_line(name: str, tmp_path: 
     mi.set_variant("llvm_ad_rgb")
     solved = kind_of(find_preset(name).patch) is FileKind.ORDERS
     own: dict[str, Any] = (
-        {} if solved else {"heightfield": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}
+        {} if solved else {"filename": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}
     )
     mixed = {"type": "diffraction_mix", "look": md.preset(name, **own), "rest": {"type": "diffuse"}}
     assert "Diffraction" in str(mi.load_dict({**mixed, "weight_look": 0.5}))

@@ -25,7 +25,7 @@ XML = """<scene version="3.0.0">
   <shape type="rectangle">
     <bsdf type="twosided">
       <bsdf type="diffraction">
-        <string name="heightfield" value="patch.npy"/>
+        <string name="filename" value="patch.npy"/>
         <string name="pixel_size" value="0.085, 0.08"/>
         <string name="max_height" value="auto"/>
         <float name="coherence_width" value="4.5"/>

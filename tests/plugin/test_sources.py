@@ -49,7 +49,7 @@ def test_a_bsdf_and_a_measurement_of_one_scan_share_a_table(some_variant, tmp_pa
     monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
     scan = tmp_path / "scan.npy"
     np.save(scan, PATCH.heights)
-    bsdf = mi.load_dict({"type": "diffraction", "heightfield": str(scan), "pixel_size": 0.1})
+    bsdf = mi.load_dict({"type": "diffraction", "filename": str(scan), "pixel_size": 0.1})
     source = md.TableSource.of(scan, LoadOptions.parse(pixel_size="0.1"))
     assert source.table(source.settings_for({})) is bsdf.table
     array = md.TableSource.of(source.field())

@@ -59,7 +59,7 @@ def test_places_follow_scale_orientation_and_the_side_that_v_runs_to(variant, ta
     table.save(tmp_path / "patch.exr")
     turned = {"orientation": 90.0, "coherence": "surface", "uv_scale": "10, 20"}
     bsdf = mi.load_dict(
-        {"type": "diffraction", "table": str(tmp_path / "patch.exr"), "material": "none",
+        {"type": "diffraction", "filename": str(tmp_path / "patch.exr"), "material": "none",
          "energy_conserving": False, **turned}
     )  # fmt: skip
     uv = places(200)
@@ -236,7 +236,7 @@ def test_a_table_of_powers_has_no_places(some_variant, tmp_path):
     md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(tmp_path / "table.exr")
     said = refusal(
         lambda: mi.load_dict(
-            {"type": "diffraction", "table": str(tmp_path / "table.exr"), **ON_SURFACE}
+            {"type": "diffraction", "filename": str(tmp_path / "table.exr"), **ON_SURFACE}
         )
     )
     assert "coherence=ensemble" in said

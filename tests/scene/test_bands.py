@@ -34,7 +34,7 @@ SCENE = """<scene version="3.0.0">
     </sensor>
     <shape type="rectangle">
         <bsdf type="diffraction">
-            <string name="heightfield" value="{heights}"/>
+            <string name="filename" value="{heights}"/>
             <string name="pixel_size" value="{pixel}"/>
             <string name="level" value="none"/>
         </bsdf>
@@ -94,8 +94,8 @@ def test_tables_that_begin_at_longer_wavelengths_are_refused(scene, tmp_path):
     field, file = scene
     md.DiffractionTable.build(field).save(tmp_path / "table.exr")
     text = file.read_text()
-    first, last = text.index('<string name="heightfield"'), text.index("</bsdf>")
-    file.write_text(f'{text[:first]}<string name="table" value="table.exr"/>{text[last:]}')
+    first, last = text.index('<string name="filename"'), text.index("</bsdf>")
+    file.write_text(f'{text[:first]}<string name="filename" value="table.exr"/>{text[last:]}')
     with pytest.raises(md.DiffractionError, match="begins at 360 nm"):
         load_scene(file, {}, bands=SensorBands([300.0, 350.0, 400.0], {"u": [0.0, 1.0, 0.0]}))
     load_scene(file, {}, bands=SensorBands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
@@ -168,7 +168,7 @@ def test_solved_orders_are_named_with_their_own_range(scene, tmp_path):
     thin_grating().save(tmp_path / "orders.nc")
     text = file.read_text()
     first, last = text.index("<bsdf"), text.index("</bsdf>")
-    orders = '<bsdf type="diffraction_orders"><string name="table" value="orders.nc"/>'
+    orders = '<bsdf type="diffraction_orders"><string name="filename" value="orders.nc"/>'
     file.write_text(text[:first] + orders + text[last:])
     _banded(file, [(200.0, 600.0)])
     line = r"black outside [\d.]+ to [\d.]+ nm, .* make the table with a wider range of wave"

@@ -15,7 +15,7 @@ from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.scene.load import load_scene, plain_text
 
 BSDF = (
-    '<bsdf type="diffraction"><string name="heightfield" value="grating.npy"/>'
+    '<bsdf type="diffraction"><string name="filename" value="grating.npy"/>'
     '<float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>'
     '<boolean name="energy_conserving" value="false"/></bsdf>'
 )

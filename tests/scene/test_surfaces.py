@@ -64,7 +64,7 @@ def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
 def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
     thin_grating(0.6, counts=(2, 2, 1)).save(surface / "orders.nc")
     old = f"""<bsdf type="diffraction" id="tracks">
-        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <string name="filename" value="{surface / "grating.npy"}"/>
         <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
         <boolean name="energy_conserving" value="false"/><float name="orientation" value="30"/>
     </bsdf>"""
@@ -107,7 +107,7 @@ def test_a_look_is_put_on_an_id(surface):
 def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surface, old):
     name, value = old.split("=")
     xml = f"""<scene version="3.0.0"><bsdf type="diffraction" id="skin">
-        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <string name="filename" value="{surface / "grating.npy"}"/>
         <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
         <boolean name="energy_conserving" value="false"/><string name="{name}" value="{value}"/>
     </bsdf><shape type="disk"><ref id="skin"/></shape></scene>"""
@@ -167,7 +167,7 @@ def test_each_edit_is_said_with_its_shapes_and_index(surface):
 def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
     xml = f"""<scene version="3.0.0"><default name="up" value="0"/><default name="r" value="1"/>
     <bsdf type="diffraction" id="skin">
-        <string name="heightfield" value="{surface / "grating.npy"}"/>
+        <string name="filename" value="{surface / "grating.npy"}"/>
         <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
         <boolean name="energy_conserving" value="false"/><float name="lateral_scale" value="$r"/>
     </bsdf><shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>

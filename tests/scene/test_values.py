@@ -15,7 +15,7 @@ SCENE = """<scene version="3.0.0">
     <default name="lamp" value="1"/><default name="sky" value="1"/>
     <default name="material" value="Al"/>
     <shape type="sphere"><bsdf type="twosided"><bsdf type="diffraction" id="skin">
-        <string name="heightfield" value="grating.npy"/>
+        <string name="filename" value="grating.npy"/>
         <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
         <boolean name="energy_conserving" value="false"/><string name="material" value="$material"/>
     </bsdf></bsdf></shape>

@@ -135,7 +135,7 @@ def small_look(command: str, value: str) -> str:
         return value
     if command in ("brdf-map", "export-osl"):  # which take no parameters behind the name
         return "gold-foil"
-    return f"{value},heightfield={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
+    return f"{value},filename={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
 
 
 def without_size(rest: list[str]) -> list[str]:
@@ -176,7 +176,7 @@ def small_tree(folder: Path) -> Path:
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
         for program in blocks("docs/orders.md", "python"):
-            if "import csv" in program or "netcdf_file" in program:
+            if "mine.csv" in program:
                 exec(program, {})
     # tables and recipes of commands that are left out here
     crossed.table().save(folder / "lumps.nc")

@@ -76,7 +76,7 @@ _BENIGN = """<scene version="3.0.0"><integrator type="path"/>
 <integer name="sample_count" value="1"/></sampler>
 <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform></sensor>
 <emitter type="point"><point name="position" value="0,0,4"/></emitter>
-<shape type="sphere"><bsdf type="diffraction"><string name="heightfield" value="heights.npy"/>
+<shape type="sphere"><bsdf type="diffraction"><string name="filename" value="heights.npy"/>
 <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/></bsdf></shape>
 <shape type="ply"><string name="filename" value="mesh.ply"/>
 <bsdf type="conductor"><string name="material" value="Al"/></bsdf></shape>{}</scene>
@@ -102,16 +102,16 @@ SCENES = {
         '<bsdf type="diffuse"><spectrum name="reflectance" filename="pipe.csv"/></bsdf>'
     ),
     "heights": _SHAPE.format(
-        '<bsdf type="diffraction"><string name="heightfield" value="pipe.npy"/></bsdf>'
+        '<bsdf type="diffraction"><string name="filename" value="pipe.npy"/></bsdf>'
     ),
     "recipe": _SHAPE.format(
-        '<bsdf type="diffraction"><string name="heightfield" value="pipe_in.toml"/></bsdf>'
+        '<bsdf type="diffraction"><string name="filename" value="pipe_in.toml"/></bsdf>'
     ),
     "table": _SHAPE.format(
-        '<bsdf type="diffraction_orders"><string name="table" value="pipe.nc"/></bsdf>'
+        '<bsdf type="diffraction_orders"><string name="filename" value="pipe.nc"/></bsdf>'
     ),
     "layers": _SHAPE.format(
-        '<bsdf type="diffraction"><string name="heightfield" value="heights.npy"/>'
+        '<bsdf type="diffraction"><string name="filename" value="heights.npy"/>'
         '<float name="pixel_size" value="0.08"/><string name="layers" value="pipe.toml"/></bsdf>'
     ),
 }

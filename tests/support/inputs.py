@@ -21,7 +21,7 @@ SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
 <string name="filename" value="scale.png"/></texture></bsdf></shape>
 <shape type="ply"><string name="filename" value="mesh.ply"/></shape>
 <shape type="sphere" id="ball"><bsdf type="diffraction" id="skin">
-<string name="heightfield" value="recipe.toml"/><string name="material" value="Al"/></bsdf></shape>
+<string name="filename" value="recipe.toml"/><string name="material" value="Al"/></bsdf></shape>
 </scene>"""
 LIGHT = """<scene version="3.0.0"><emitter type="envmap">
 <string name="filename" value="sky.exr"/></emitter></scene>"""

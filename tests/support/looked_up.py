@@ -54,7 +54,7 @@ def _check_window_sums(table: DiffractionTable) -> None:
 
 def _check_compiled(path: Path) -> None:
     mi.set_variant("llvm_ad_spectral")
-    scene = {"type": "diffraction", "table": str(path), "energy_conserving": False}
+    scene = {"type": "diffraction", "filename": str(path), "energy_conserving": False}
     rng = np.random.default_rng(1)
     tangential = rng.uniform(-0.7, 0.7, (2, 64, 2))
     wi, wo = (np.c_[uv, np.sqrt(1.0 - (uv**2).sum(axis=1))] for uv in tangential)
@@ -73,7 +73,7 @@ def use_table(path: Path) -> None:
     table = md.DiffractionTable.load(path)
     _look_up(table)
     mi.set_variant("scalar_spectral")  # where reading outside of an array is an error
-    scene = {"type": "diffraction", "table": str(path), "energy_conserving": False}
+    scene = {"type": "diffraction", "filename": str(path), "energy_conserving": False}
     try:
         bsdf = mi.load_dict({**scene, "material": "none"})
     except RuntimeError as error:

@@ -12,7 +12,7 @@ SCENE = """<scene version="3.0.0">
     <emitter type="directional"><vector name="direction" value="0.2, 0, -1"/></emitter>
 </scene>"""
 SKIN = """<bsdf type="diffraction">
-    <string name="heightfield" value="grating.toml"/>
+    <string name="filename" value="grating.toml"/>
     <float name="coherence_width" value="4"/>
     <boolean name="energy_conserving" value="false"/>
 </bsdf>"""

@@ -106,7 +106,7 @@ def test_our_reader_finds_what_the_page_s_writer_wrote(examples):
 
 
 def test_the_plugin_takes_what_the_page_s_writer_wrote(examples, some_variant):
-    plugin = {"type": "diffraction", "table": str(examples[2]), "energy_conserving": False}
+    plugin = {"type": "diffraction", "filename": str(examples[2]), "energy_conserving": False}
     assert "chebyshev power" in str(mi.load_dict(plugin))
 
 

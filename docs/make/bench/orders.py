@@ -45,7 +45,7 @@ def _load(table: Path) -> Any:
             f"'{table}' does not exist; solve it with 'mitsuba-diffraction solve "
             f"{table.with_suffix('.toml')}'"
         )
-    return mi.load_dict({"type": "diffraction_orders", "table": str(table)})
+    return mi.load_dict({"type": "diffraction_orders", "filename": str(table)})
 
 
 def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:

@@ -70,7 +70,7 @@ class Example:
         inputs["Pigment"] = _PIGMENT
         pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": _PIGMENT}}
         patch = str(Path(self.source).resolve())
-        return Surface({"type": "diffraction", "heightfield": patch, "nested": pigment}, cycles)
+        return Surface({"type": "diffraction", "filename": patch, "nested": pigment}, cycles)
 
     @property
     def angle(self) -> float:

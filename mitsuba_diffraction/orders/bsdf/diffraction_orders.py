@@ -5,7 +5,7 @@ For steep grooves, most of all of metal: a CD, a blazed grating, an embossed hol
 
 The grating
 -----------
-table : string
+filename : string
     File of `mitsuba-diffraction solve`, or of `save` of a table.
 data : OrderTable
     Instead: a table, in dictionaries only, by `md.bsdf_dict`.
@@ -43,7 +43,7 @@ depolarise light. Component 0 is the reflection, component 1 the transmission.
 XML and the same in Python:
 
     <bsdf type="diffraction_orders">
-        <string name="table" value="grating.nc"/>
+        <string name="filename" value="grating.nc"/>
         <float name="orientation" value="90"/>
     </bsdf>
 
@@ -52,7 +52,7 @@ XML and the same in Python:
 
     mi.set_variant("llvm_ad_spectral")
     md.OrderTable.mirror(period=1.6, reflectance=0.9).save("grating.nc")
-    bsdf = mi.load_dict({"type": "diffraction_orders", "table": "grating.nc", "orientation": 90})
+    bsdf = mi.load_dict({"type": "diffraction_orders", "filename": "grating.nc", "orientation": 90})
 """
 
 from __future__ import annotations

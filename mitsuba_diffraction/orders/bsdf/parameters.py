@@ -66,9 +66,9 @@ def read_parameters(props: Properties) -> Parameters:
 
 
 def _table(props: Properties) -> OrderTable:
-    if ("table" in props) == ("data" in props):
+    if ("filename" in props) == ("data" in props):
         raise DiffractionError(
-            f"{ORDERS} takes one of table, a file of orders, and data, an "
+            f"{ORDERS} takes one of filename, a file of orders, and data, an "
             "OrderTable of md.bsdf_dict"
         )
     if "data" in props:
@@ -76,10 +76,10 @@ def _table(props: Properties) -> OrderTable:
         if not isinstance(data, TableData) or not isinstance(data.table, OrderTable):
             raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
         return data.table
-    name = props.get("table")
+    name = props.get("filename")
     if not isinstance(name, str):
-        raise DiffractionError(f"table={name!r} must be the name of a file")
-    return loaded_once(resolved_path(name, "table"), load_orders, _tables)
+        raise DiffractionError(f"filename={name!r} must be the name of a file")
+    return loaded_once(resolved_path(name, "filename"), load_orders, _tables)
 
 
 def _coherence_width(props: Properties, table: OrderTable) -> float:

@@ -23,7 +23,7 @@ SCENE = """<scene version="3.5.0">
   <integrator type="path"/>
   <shape type="rectangle" id="plate">
     <bsdf type="diffraction">
-      <string name="table" value="grating.exr"/>
+      <string name="filename" value="grating.exr"/>
       <bsdf type="diffuse"><spectrum name="reflectance" value="0.2"/></bsdf>
     </bsdf>
   </shape>

@@ -140,7 +140,7 @@ def patch_scene(scene, heights, monkeypatch):
     scene.write_text(
         SCENE.replace(
             '<bsdf type="diffuse"/>',
-            '<bsdf type="diffraction"><string name="heightfield" value="$patch"/>'
+            '<bsdf type="diffraction"><string name="filename" value="$patch"/>'
             '<float name="pixel_size" value="$pixel_size"/>'
             '<float name="coherence_width" value="6"/></bsdf>',
         ).replace(

@@ -62,7 +62,7 @@ def test_unfit_parameters_are_refused_in_one_line(some_variant, parameters, mess
 def test_files_are_loaded_by_name(some_variant, tmp_path):
     path = tmp_path / "grating.nc"
     thin_grating(0.6, counts=(2, 2, 1)).save(path)
-    bsdf = mi.load_dict({"type": "diffraction_orders", "table": str(path)})
+    bsdf = mi.load_dict({"type": "diffraction_orders", "filename": str(path)})
     assert "0.6 µm" in str(bsdf)
     with pytest.raises(Exception, match="does not exist"):
-        mi.load_dict({"type": "diffraction_orders", "table": str(tmp_path / "none.nc")})
+        mi.load_dict({"type": "diffraction_orders", "filename": str(tmp_path / "none.nc")})

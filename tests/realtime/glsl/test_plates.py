@@ -28,7 +28,7 @@ def test_what_lies_beneath_gets_the_light_that_the_table_leaves(
     gl: Any, table_file: Path, some_variant: str
 ) -> None:
     white = {"type": "diffuse", "reflectance": 1.0}
-    skin = {"type": "diffraction", "table": str(table_file), "int_ior": 2.5, "orientation": 25.0}
+    skin = {"type": "diffraction", "filename": str(table_file), "int_ior": 2.5, "orientation": 25.0}
     plate = mi.load_dict({**skin, "nested": white})
     wo = np.array([-0.6, 0.64, 0.48])
     parameters = mi.traverse(plate)
@@ -131,7 +131,7 @@ def reflected(bsdf: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def test_a_mix_is_drawn_by_its_weights(gl: Any, some_variant: str, table_file: Path) -> None:
-    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
+    skin = {"type": "diffraction", "filename": str(table_file), "model": "kirchhoff"}
     paint = {"type": "diffuse", "reflectance": 0.7}
 
     def drawn(bsdf: dict[str, Any]) -> NDArray[np.float32]:

@@ -48,7 +48,7 @@ def plate_scene(table_file: Path, width: int = 160, **parts: Any) -> Any:
             "skin": {
                 "type": "rectangle",
                 "to_world": T().translate([0, 8, -0.5]).scale(0.1),
-                "bsdf": {"type": "diffraction", "table": str(table_file)},
+                "bsdf": {"type": "diffraction", "filename": str(table_file)},
             },
             **parts,
         }
@@ -254,7 +254,12 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
 ) -> None:
     """Each material under an area light and an environment; the light itself is seen, too."""
     T = mi.ScalarTransform4f
-    skin = {"type": "diffraction", "table": str(table_file), "material": "Al", "orientation": 30.0}
+    skin = {
+        "type": "diffraction",
+        "filename": str(table_file),
+        "material": "Al",
+        "orientation": 30.0,
+    }
     bumps = np.tile(np.sin(np.linspace(0.0, 6.3, 16, endpoint=False)) * 0.02, (16, 1))
     materials = {
         "skin": skin,

@@ -29,7 +29,7 @@ def test_cameras_without_perspective_are_refused(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
     # what the shaders draw
-    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
+    skin = {"type": "diffraction", "filename": str(table_file), "model": "kirchhoff"}
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -63,7 +63,7 @@ def test_a_mesh_without_texture_coordinates_is_refused(
     parameters.update()
     mesh.write_ply(str(tmp_path / "flake.ply"))
     flake = {"type": "ply", "filename": str(tmp_path / "flake.ply")}
-    skin = {"type": "diffraction", "table": str(table_file)}
+    skin = {"type": "diffraction", "filename": str(table_file)}
     scene = {"type": "scene", "sensor": SENSOR, "flake": {**flake, "bsdf": skin}}
     with pytest.raises(DiffractionError, match="flake: the mesh has no texture coordinates"):
         Renderer(mi.load_dict(scene), context=gl)

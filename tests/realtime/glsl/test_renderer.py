@@ -59,7 +59,7 @@ def several_surfaces(table_file: Path, directory: Path) -> dict[str, Any]:
     chequers = np.full((4, 4, 3), 0.1, np.float32)
     chequers[::2, ::2] = [0.5, 0.2, 0.1]
     # what the shaders draw
-    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
+    skin = {"type": "diffraction", "filename": str(table_file), "model": "kirchhoff"}
     transform = mi.ScalarTransform4f
     return {
         "type": "scene",
@@ -149,7 +149,7 @@ def test_all_that_is_not_shown_is_named_in_warnings(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
     # what the shaders draw
-    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
+    skin = {"type": "diffraction", "filename": str(table_file), "model": "kirchhoff"}
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -199,7 +199,7 @@ def test_a_sky_over_one_half_lights_what_faces_it(
             "speck": {
                 "type": "rectangle", "to_world": mi.ScalarTransform4f().scale(1e-3),
                 "bsdf": {
-                    "type": "diffraction", "table": str(table_file), "energy_conserving": False
+                    "type": "diffraction", "filename": str(table_file), "energy_conserving": False
                 },
             },
             "sky": {"type": "envmap", "bitmap": mi.Bitmap(half), "to_world": upright},

@@ -95,7 +95,7 @@ def lookups_by_hand(u, v, w, wavelength, light):
 
 def from_file(file, **parameters):
     """The plate with its heights from a file."""
-    return plate(patch=None, heightfield=str(file), pixel_size="0.3", **parameters)
+    return plate(patch=None, filename=str(file), pixel_size="0.3", **parameters)
 
 
 def tables_of(scene):
@@ -249,7 +249,7 @@ def test_heights_without_a_file_have_no_recipe(traced):
 def test_scenes_without_anything_to_plan_are_refused(tmp_path):
     file = tmp_path / "table.exr"
     md.DiffractionTable.build(PATCH, coherence_width=18.0).save(file)
-    table = {"type": "diffraction", "table": str(file), "energy_conserving": False}
+    table = {"type": "diffraction", "filename": str(file), "energy_conserving": False}
     for bsdf, expected in (
         ({"type": "diffuse"}, "has no BSDF 'diffraction'"),
         ({**table, "type": "diffraction_dielectric"}, "has no BSDF 'diffraction'"),
