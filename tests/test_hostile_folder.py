@@ -39,6 +39,7 @@ DONE = [
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
      "100", "--no-compiled", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],
+    ["scatter", *_TABLE, "-o", "out/scatter.csv"],
     ["solve", "lamellar", "--period", "0.6", "--depth", "0.1", "--resolution", "80",
      "--wavelength-range", "590:610", "--theta", "0", "--step", "20", *_METAL, "-o",
      "out/orders.nc"],
@@ -58,8 +59,8 @@ _SOME_SCENES = ["plugin.xml", "nested.xml", "recipe.xml"]
 _SOME_HEIGHTS = ["pipe.npy", "pipe_in.toml"]
 _OF_HEIGHTS = {
     "precompute": [], "brdf-map": _METAL, "spectrum": ["--light", "0", *_METAL],
-    "evaluate": _METAL, "tradeoff": [], "export-shader": _METAL, "export-osl": _METAL,
-    "export-bsdf": [*_METAL, "--wavelength", "550"],
+    "evaluate": _METAL, "scatter": [], "tradeoff": [], "export-shader": _METAL,
+    "export-osl": _METAL, "export-bsdf": [*_METAL, "--wavelength", "550"],
 }  # fmt: skip
 #: Commands that are refused in one line.
 REFUSED = [

@@ -52,7 +52,8 @@ GRID = np.arange(300.0, 701.0)
 #: of the northern sky, in open shade (G. Wyszecki and W. S. Stiles, Color Science, Wiley 1982);
 #: shade under leaves, a model (`_under_leaves`).
 ILLUMINANTS = ("ideal", "d55", "d65", "d75", "leaves")
-#: Weber fraction of the receptor of the longest waves, measured of birds.
+#: Weber fraction of the receptor of the longest waves, of the Pekin robin, and of luminance: pavo's
+#: defaults.
 WEBER = 0.1
 # Names that a film's channel cannot have, since the film has such parameters.
 _TAKEN = ("width", "height", "component_format", "rfilter", "sample_border", "compensate")
@@ -72,11 +73,42 @@ class Eye:
     names : of the receptors.
     sensitivity : (receptors, GRID), each of area 1 before the ocular media.
     density : relative numbers of receptors, by which noise is shared.
+    weber : Weber fraction of the receptor of the longest waves, or one of each receptor.
+    weber_luminance : Weber fraction of luminance.
+    luminance : receptors whose catches, times their numbers, add up to luminance.
     """
 
     names: tuple[str, ...]
     sensitivity: Reals
     density: tuple[float, ...]
+    weber: tuple[float, ...] = (WEBER,)
+    weber_luminance: float = WEBER
+    luminance: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.luminance:
+            object.__setattr__(self, "luminance", self.names[-1:])
+
+        counts = {"density": (len(self.names),), "weber": (1, len(self.names))}
+        for what, count in counts.items():
+            values = getattr(self, what)
+            if len(values) not in count or not all(0.0 < value < np.inf for value in values):
+                raise DiffractionError(
+                    f"{'cone ratios' if what == 'density' else 'Weber fractions'}: expected "
+                    f"{' or '.join(map(str, count))} numbers above 0, one for each of "
+                    f"{', '.join(self.names)}; got {', '.join(f'{value:g}' for value in values)}"
+                )
+
+    def __str__(self) -> str:
+        cones = " : ".join(
+            f"{name} {n:g}" for name, n in zip(self.names, self.density, strict=True)
+        )
+        noise = " : ".join(f"{e:g}" for e in self.weber)
+        noisy = self.names[-1] if len(self.weber) == 1 else "each"
+        return (
+            f"numbers of receptors {cones}; Weber fraction {noise} of {noisy}; luminance by "
+            f"{' and '.join(self.luminance)}, Weber fraction {self.weber_luminance:g}"
+        )
 
 
 def pigment_template(peak: float, beta: bool = True) -> Reals:
@@ -125,7 +157,8 @@ def _modelled(
 def _human() -> Eye:
     """Model the human eye: cone fundamentals per quantum, and 2, 33 and 65 % of the cones."""
     curves = cone_fundamentals(GRID) / GRID
-    return Eye(("s", "m", "l"), curves / curves.sum(axis=1, keepdims=True), (1.0, 16.0, 32.0))
+    sensitivity = curves / curves.sum(axis=1, keepdims=True)
+    return Eye(("s", "m", "l"), sensitivity, (1.0, 16.0, 32.0), luminance=("m", "l"))
 
 
 #: Animals by name: λmax, relative numbers of receptors (1 if unknown), oil droplets, their λcut.
@@ -160,6 +193,8 @@ def eye_of(name: str) -> Eye:
             f"'{name}' is not a table of receptors: give a header, wl and a name for each of two "
             "receptors or more, and rows of wavelengths in nm and sensitivities"
         )
+    # R puts dots into names of columns, and a film's channel may have none
+    names = tuple(name.replace(".", "_") for name in names)
     if wrong := [n for n in names if names.count(n) > 1 or not n.isidentifier() or n in _TAKEN]:
         raise DiffractionError(
             f"'{name}': {quoted(wrong[0])} cannot name a receptor; give each a name of its own, of "
@@ -277,10 +312,25 @@ def quantum_catches(
     return np.asarray(fine * illuminant @ eye.sensitivity.T)
 
 
-def noises(eye: Eye, weber: float = WEBER) -> Reals:
-    """Return the noise e of each receptor's channel: `weber` for the longest waves."""
+def noises(eye: Eye) -> Reals:
+    """Return the noise e of each receptor's channel, `Eye.weber` of the longest waves or of all."""
+    if len(eye.weber) > 1:
+        return np.array(eye.weber)
     density = np.array(eye.density)
-    return np.asarray(weber * np.sqrt(density[-1] / density))
+    return np.asarray(eye.weber[0] * np.sqrt(density[-1] / density))
+
+
+def luminance_contrasts(eye: Eye, catches: ArrayLike) -> Reals:
+    """Return contrasts of luminance ΔL (spectra, spectra) in just noticeable differences.
+
+    ΔL = |ln(L1/L2)| / e, as in pavo's `coldist`. Dark spectra have none, nan.
+    """
+    weights = [n * (name in eye.luminance) for name, n in zip(eye.names, eye.density, strict=True)]
+    luminance = np.asarray(catches, np.float64) @ weights
+    f = np.where(luminance > 0.0, np.log(np.maximum(luminance, 1e-300)), np.nan)
+    result = np.abs(f[:, None] - f) / eye.weber_luminance
+    np.fill_diagonal(result, 0.0)
+    return np.asarray(result)
 
 
 def contrasts(catches: ArrayLike, noise: ArrayLike) -> Reals:

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
-from .observers import Eye, contrasts, noises, quantum_catches
+from .observers import Eye, contrasts, luminance_contrasts, noises, quantum_catches
 from .spectra import Reals, Spectra
 from .spectral_variables import colours_of, daylit
 from .survey_files import write_table
@@ -101,7 +101,7 @@ def save_angular(groups: Groups, path: Any) -> None:
 def save_catches(
     groups: Groups, eye: Eye, illuminant: Reals, catches_path: Any, contrasts_path: Any
 ) -> None:
-    """Write an animal's quantum catches of each spectrum, and its contrasts of each pair in JND.
+    """Write quantum catches of each spectrum, and contrasts of colour and luminance in JND.
 
     illuminant : quanta of the light, of `observers.illuminant_of`.
     """
@@ -114,12 +114,14 @@ def save_catches(
         for name, row in zip(names, catches, strict=True)
     ]
     write_table(catches_path, ("spectrum", *eye.names), rows)
-    distances = contrasts(catches, noises(eye))
+    distances, steps = contrasts(catches, noises(eye)), luminance_contrasts(eye, catches)
+    columns = ("patch1", "patch2", "dS", "dL")
     pairs = [
-        {"patch1": names[i], "patch2": names[j], "dS": f"{distances[i, j]:.6g}"}
+        dict(zip(columns, (names[i], names[j], f"{distances[i, j]:.6g}", f"{steps[i, j]:.6g}"),
+                 strict=True))
         for i, j in itertools.combinations(range(len(names)), 2)
-    ]
-    write_table(contrasts_path, ("patch1", "patch2", "dS"), pairs)
+    ]  # fmt: skip
+    write_table(contrasts_path, columns, pairs)
 
 
 def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:

@@ -22,6 +22,7 @@ spectrum               reflectance spectra as a spectrometer measures them
 measured_spectra       spectra of files of `spectrum`: tables, scans and their crops
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
+scatter                power spectrum and scatter of a rough mirror
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
 export_bsdf            a surface's BRDF for other programs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -90,6 +91,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--illuminant LIGHT|CSV", "light of --observer: ideal, the same number of quanta at all "
          "wavelengths; d55, sun; d65, sun and sky; d75, sky in open shade; leaves, a model of "
          "shade under leaves; or a file of wavelengths (nm) and photons; default: ideal"),
+        ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
+         "first, which share the noise; default: the eye's, docs/seen.md", _ratios),
+        ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
+         "default: 0.1", _ratios),
+        ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
+         number_between(1e-4, 1e2)),
         ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
          "2019), fitted to lamps from 0 to 60 degrees and detectors between them, beside the "
          "mirror direction", bool),
@@ -221,14 +228,29 @@ def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}.csv")
 
 
+def _ratios(text: str) -> tuple[float, ...]:
+    """Return the numbers of a list with commas."""
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"expected numbers, e.g. 1,1,2, got {text!r}") from error
+
+
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
     """Return the eye of --observer, or None, and its light; refuse wavelengths beside its range."""
     if args.observer is None:
-        options.refuse(args, ["illuminant"], ": is the light of --observer; name one")
+        theirs = ("illuminant", "cone_ratios", "weber", "weber_luminance")
+        options.refuse(args, theirs, ": belongs to --observer; name one")
         return None, None
     from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 
-    eye = eye_of(args.observer)
+    asked = options.given(args, ("cone_ratios", "weber", "weber_luminance"))
+    if "cone_ratios" in asked:
+        asked["density"] = asked.pop("cone_ratios")
+        if len(asked.get("weber", ())) > 1:
+            args.parser.error("argument --cone-ratios: with a Weber fraction of each receptor")
+    eye = replace(eye_of(args.observer), **asked)
+    say(f"{args.observer}: {eye}")
     quantum_catches(eye, lam, [[0.0]] * len(lam))
     return eye, illuminant_of(args.illuminant or "ideal")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import colour
 import numpy as np
@@ -14,6 +15,7 @@ from mitsuba_diffraction.analysis.observers import (
     contrasts,
     eye_of,
     illuminant_of,
+    luminance_contrasts,
     noises,
     pigment_template,
     quantum_catches,
@@ -142,6 +144,36 @@ def test_contrasts_are_vorobyev_and_osorio_s_of_four_three_and_two_receptors(cou
     q = np.random.default_rng(0).uniform(0.1, 0.9, (2, count))
     e = np.array([0.2, 0.14, 0.13, 0.1])[:count]
     assert contrasts(q, e)[0, 1] == pytest.approx(distance(q[0], q[1], e), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["avian_uv", "human"])
+def test_contrasts_of_luminance_are_logarithms_over_the_weber_fraction(name):
+    eye = replace(eye_of(name), weber_luminance=0.05)
+    bright, dark = np.full_like(LAM, 0.9), np.full_like(LAM, 0.3)
+    catches = quantum_catches(eye, LAM, np.stack([bright, dark], axis=1))
+    assert luminance_contrasts(eye, catches)[0, 1] == pytest.approx(math.log(3.0) / 0.05)
+    # light that only the other receptors catch has no luminance
+    alone = np.eye(len(eye.names))
+    steps = luminance_contrasts(eye, alone)
+    unseen = [n not in eye.luminance for n in eye.names]
+    assert np.isnan(steps[unseen]).sum() == sum(unseen) * (len(unseen) - 1)
+
+
+def test_ratios_and_weber_fractions_are_the_user_s():
+    eye = eye_of("avian_v")
+    assert noises(replace(eye, density=(1.0, 1.0, 4.0, 1.0))) == pytest.approx(
+        [0.1, 0.1, 0.05, 0.1]
+    )
+    assert noises(replace(eye, weber=(0.2, 0.3, 0.4, 0.5))).tolist() == [0.2, 0.3, 0.4, 0.5]
+    for wrong in ({"density": (1.0, 2.0)}, {"weber": (0.1, -1.0, 1.0, 1.0)}):
+        with pytest.raises(DiffractionError, match=r"expected .* numbers above 0"):
+            replace(eye, **wrong)
+
+
+def test_receptors_are_named_as_r_writes_columns(tmp_path):
+    file = tmp_path / "eye.csv"
+    file.write_text('"","wl","blue.tit.u","blue.tit.s"\n"1",300,1,0\n"2",700,1,1\n')
+    assert eye_of(str(file)).names == ("blue_tit_u", "blue_tit_s")
 
 
 @pytest.mark.parametrize("name", EYES)

@@ -182,9 +182,19 @@ def test_an_observer_has_catches_of_each_column_and_contrasts_of_each_pair(run, 
     assert catches[0] == "spectrum,u,s,m,l"
     assert len(catches) == 4
     pairs = (here / "o-contrasts.csv").read_text("utf-8").splitlines()
-    assert pairs[0] == "patch1,patch2,dS"
+    assert pairs[0] == "patch1,patch2,dS,dL"
     assert [line.split(",")[1][-2:] for line in pairs[1:]] == ["30", "40", "40"]
-    for arguments, named in ((("dragon", *span), "dragon"), (("avian_uv", *QUICK), "from 305")):
+    assert "u 1 : s 1.92 : m 2.68 : l 2.7; Weber fraction 0.1 of l; luminance by l" in ran.err
+    noise = ["--cone-ratios", "1,1,1,1", "--weber", "0.2", "--weber-luminance", "0.2"]
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *span, "--observer", "avian_uv", *noise,
+              "--detector", "20", "30", "40", "-o", "p.csv")  # fmt: skip
+    others = (here / "p-contrasts.csv").read_text("utf-8").splitlines()
+    for one, other in zip(pairs[1:], others[1:], strict=True):
+        assert float(other.split(",")[3]) == pytest.approx(float(one.split(",")[3]) / 2, rel=1e-4)
+    for arguments, named in (
+        (("dragon", *span), "dragon"), (("avian_uv", *QUICK), "from 305"),
+        (("dog", *span, "--cone-ratios", "1,2,3"), "expected 2 numbers"),
+    ):  # fmt: skip
         ran = run("spectrum", scans / "scan0.npy", *PIXEL, "--observer", *arguments)
         assert ran.code == 1
         assert named in ran.err
