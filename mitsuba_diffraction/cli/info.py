@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> Figures:
         options.refuse(args, others, " with --formats, which is about no file")
         return _formats(args)
     if args.file is None:
-        raise DiffractionError("name a file, or give --formats")
+        args.parser.error("name a file, or give --formats")
     data = {"file": str(args.file), **_describe(args.file, args)}
     for name, kinds, what in (
         ("energy", ("table",), "a table"),
