@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,6 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from . import cells
 from .cells import Array, B, Counts
-
-if TYPE_CHECKING:
-    from .table import OrderTable
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
 LARGEST_SUM = 1.001
@@ -99,17 +95,19 @@ class CellResponse:
         sizes = sorted({" x ".join(map(str, band.counts)) for band in self.bands})
         return f"{len(self.bands)} bands of {', '.join(sizes)} nodes"
 
-    def check(self, table: OrderTable) -> None:
-        """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies."""
-        expected = table.last_band + 1
+    def check(self, sides: int, last_band: int) -> None:
+        """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies.
+
+        sides, last_band : of the table; see `OrderTable`.
+        """
+        expected = last_band + 1
         if [band.k for band in self.bands] != list(range(expected)):
             raise DiffractionError(
-                f"{len(self.bands)} bands of orders, expected {expected}, k = 0 to {expected - 1}: "
-                f"period {table.period:g} µm at {table.wavelengths[0]:g} nm and index "
-                f"{table.block or table.superstrate:g}"
+                f"{len(self.bands)} bands, expected {expected}, k = 0 to {expected - 1}, by "
+                "the table's period, shortest wavelength and index"
             )
         for band in self.bands:
-            _check_band(band, table.sides, self.elements)
+            _check_band(band, sides, self.elements)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,9 +152,12 @@ class ListedResponse:
         waves, theta, phi = map(len, self.axes)
         return f"{waves} wavelengths x {theta} theta x {phi} phi, {len(self.orders)} orders"
 
-    def check(self, table: OrderTable) -> None:
-        """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies."""
-        sides, count = table.sides, len(self.orders)
+    def check(self, sides: int, last_band: int) -> None:
+        """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies.
+
+        sides, last_band : of the table; see `OrderTable`.
+        """
+        count = len(self.orders)
         shape = (*map(len, self.axes), sides, sides * count, self.elements)
         if self.values.shape != shape or self.values.dtype != np.float32:
             raise DiffractionError(

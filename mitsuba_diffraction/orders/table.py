@@ -84,7 +84,7 @@ class OrderTable:
         )
         if self.crossed and not listed:
             raise DiffractionError("a crossed grating has listed light, no cells of grooves")
-        self.response.check(self)
+        self.response.check(self.sides, self.last_band)
 
     @classmethod
     def mirror(
