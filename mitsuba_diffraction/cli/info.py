@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..heights.source import Source
 
 # What `render MESH` and `tangents` do with a mesh without normals
-_SMOOTH = "none in the file; render MESH and tangents make smooth ones over all edges"
+_SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
 
