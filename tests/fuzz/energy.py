@@ -21,9 +21,9 @@ from tests.support.lanes import interaction, lanes, spectra, vectors
 _DIRECTIONS, _VALUES = 3, 256
 #: Samples of a direction, and of those that may send on too much.
 _SAMPLES = 1 << 13, 1 << 17
-#: Angle (degrees) beyond which half of the directions are; shares by which R + T may exceed 1 within
-#: the wavelengths (nm) that scales of energy are tabulated for and beyond, where the scale is that
-#: of the last one; and the standard errors of its mean that are added.
+#: Angle (degrees) beyond which half of the directions are; shares by which R + T may exceed 1, in
+#: light that scales of energy are tabulated for (nm) and beyond, where the scale is that of the
+#: last one; and the standard errors of its mean that are added.
 _GRAZING, _EXCESS, _ERRORS = 85.0, (0.005, 0.01), 5.0
 _TABULATED = 360.0, 830.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
