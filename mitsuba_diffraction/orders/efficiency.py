@@ -15,7 +15,8 @@ from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import nearest_jones, nearest_pure, s_and_p
-from .table import ALONG, LINEAR, UNPOLARISED, ListedResponse, OrderTable
+from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
+from .table import OrderTable
 
 #: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
 _IN_PLANE = 1e-7

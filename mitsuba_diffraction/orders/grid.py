@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from . import blocks
 from .cells import Array, Counts
 from .polarised import smooth_elements
+from .response import MUELLER, ListedResponse
 from .rows import Kind, cells_of, kinds_of, on_cells, resampled, rows
-from .table import MUELLER, ListedResponse, OrderTable
+from .table import OrderTable
 
 #: Largest number that a half float shall hold; 65504 is its limit.
 _LARGEST = 32768.0

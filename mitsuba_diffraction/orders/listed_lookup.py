@@ -12,7 +12,8 @@ from .cells import Array
 from .grid import OrderGrid
 from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
 from .polarised import ODD
-from .table import ListedResponse, OrderTable
+from .response import ListedResponse
+from .table import OrderTable
 
 _DEGREE = 180.0 / np.pi
 #: Against division by 0 along the grooves.
