@@ -44,18 +44,18 @@ SURFACE_SOURCE = (
 )  # fmt: skip
 #: Options of a surface's material and layers, by the plugin's names.
 MATERIAL = (
-    ("--material MATERIAL", f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, "
-     "gold or Au; or none for a reflectance of 1; default: a dielectric of --int-ior"),
+    ("--material MATERIAL", f"{', '.join(TISSUES)}; index, 1.56 or 1.56+0.05i; conductor, gold; or "
+     "none (R = 1); default: --int-ior"),
     ("--int-ior N", "index of the dielectric at all wavelengths, or its name; default: 1.5, as in "
      "scenes"),
-    ("--ext-ior N", "index of the medium that light comes and goes in, or its name: water for an "
-     "animal under water; default: air"),
+    ("--ext-ior N", "refractive index of the surrounding medium, or its name: water for an animal "
+     "under water; default: air"),
     ("--coat-ior N", "index of a flat clear coat over the surface, or its name: water on a wet "
      "animal"),
     ("--layers TOML", "stack of thin layers on the surface; parameter layers in "
      "docs/parameters.md"),
-    ("--pigment COLOUR|CSV", "diffuse pigment beneath a clear material: a grey from 0 to 1, "
-     "'r,g,b', sienna, or a file of wavelengths (nm) and reflectances; default: none"),
+    ("--pigment COLOUR|CSV", "diffuse pigment beneath a clear material: grey, 'r,g,b', sienna, or "
+     "a file of wavelengths (nm) and reflectances; default: none"),
 )  # fmt: skip
 #: See `gain_of`.
 RELATIVE = (

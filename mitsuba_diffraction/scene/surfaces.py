@@ -154,9 +154,9 @@ def check_parameters_act(
 
     Raises a DiffractionError that names the parameter.
     """
-    expected = _effective(edited)
+    expected = effective(edited)
     for name, state in plain.items():
-        if _effective(state) == expected:
+        if effective(state) == expected:
             raise DiffractionError(
                 f"{name}={values[name]} changes nothing: the scene uses it in a BSDF that the "
                 f"surface on {', '.join(materials)} replaces; give that surface the parameter "
@@ -164,7 +164,7 @@ def check_parameters_act(
             )
 
 
-def _effective(state: Any) -> list[str]:
+def effective(state: Any) -> list[str]:
     """Return the properties of all nodes but those of BSDFs that no shape uses."""
     hidden = (mi.ObjectType.BSDF, mi.ObjectType.Texture, mi.ObjectType.Scene)
     waiting = [n for n, node in enumerate(state.nodes) if node.type not in hidden]
