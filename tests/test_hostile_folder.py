@@ -39,6 +39,7 @@ DONE = [
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
      "100", "--no-compiled", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],
+    ["scatter", *_TABLE, "-o", "out/scatter.csv"],
     ["solve", "lamellar", "--period", "0.6", "--depth", "0.1", "--resolution", "80",
      "--wavelength-range", "590:610", "--theta", "0", "--step", "20", *_METAL, "-o",
      "out/orders.nc"],
@@ -47,19 +48,19 @@ DONE = [
     ["export-osl", *_TABLE, *_METAL, "-o", "out/osl"],
     ["export-bsdf", *_TABLE, *_METAL, "--format", "zemax", "--wavelength", "550", "-o",
      "out/a.bsdf"],
-    ["export-viewer", "scene.xml", "out/page.html", "-m", "llvm_ad_rgb", "--method", "exact"],
+    ["export-viewer", "scene.xml", "-o", "out/page.html", "-m", "llvm_ad_rgb", "--method", "exact"],
     ["export-osl", "--addon", "out/addon.zip", "--with", "out/osl"],
 ]  # fmt: skip
 _OF_SCENES = {
     "plan": ["-o", "out/refused.toml"], "compare": ["-o", "out/refused"], "view": [],
-    "export-viewer": ["out/refused.html"],
+    "export-viewer": ["-o", "out/refused.html"],
 }  # fmt: skip
 _SOME_SCENES = ["plugin.xml", "nested.xml", "recipe.xml"]
 _SOME_HEIGHTS = ["pipe.npy", "pipe_in.toml"]
 _OF_HEIGHTS = {
     "precompute": [], "brdf-map": _METAL, "spectrum": ["--light", "0", *_METAL],
-    "evaluate": _METAL, "tradeoff": [], "export-shader": _METAL, "export-osl": _METAL,
-    "export-bsdf": [*_METAL, "--wavelength", "550"],
+    "evaluate": _METAL, "scatter": [], "tradeoff": [], "export-shader": _METAL,
+    "export-osl": _METAL, "export-bsdf": [*_METAL, "--wavelength", "550"],
 }  # fmt: skip
 #: Commands that are refused in one line.
 REFUSED = [

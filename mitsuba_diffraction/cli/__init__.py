@@ -9,7 +9,7 @@ tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
 solve_crossed          orders of a crossed grating, for `solve`
 orders                 efficiencies of solved orders as a CSV
-presets                the named looks of --preset
+presets                the presets of --preset
 hologram               a logo as textures and a scene
 plan                   recipes of smaller tables, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
@@ -22,6 +22,7 @@ spectrum               reflectance spectra as a spectrometer measures them
 measured_spectra       spectra of files of `spectrum`: tables, scans and their crops
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
+scatter                power spectrum and scatter of a rough mirror
 tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
 export_bsdf            a surface's BRDF for other programs

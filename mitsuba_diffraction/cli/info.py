@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..heights.source import Source
 
 # What `render MESH` and `tangents` do with a mesh without normals
-_SMOOTH = "none in the file; render MESH and tangents make smooth ones over all edges"
+_SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
 
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> Figures:
         options.refuse(args, others, " with --formats, which is about no file")
         return _formats(args)
     if args.file is None:
-        raise DiffractionError("name a file, or give --formats")
+        args.parser.error("name a file, or give --formats")
     data = {"file": str(args.file), **_describe(args.file, args)}
     for name, kinds, what in (
         ("energy", ("table",), "a table"),

@@ -37,6 +37,7 @@ from . import (
     presets,
     realtime,
     render,
+    scatter,
     solve,
     spectrum,
     survey,
@@ -57,7 +58,8 @@ COMMANDS = (
     tangents.add_parser, presets.add_parser, hologram.add_parser, plan.add_parser,
     render.add_parser, tonemap.add_parser,
     brdf_map.add_parser, spectrum.add_parser,
-    evaluate.add_parser, survey.add_parser, sweep.add_parser, tradeoff.add_parser,
+    evaluate.add_parser, survey.add_parser, scatter.add_parser, sweep.add_parser,
+    tradeoff.add_parser,
     realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,
     export_osl.add_parser, export_bsdf.add_parser,
 )  # fmt: skip

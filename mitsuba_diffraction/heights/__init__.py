@@ -12,6 +12,7 @@ preprocess   treatments of heights: crop, fill, level, clip
 gratings     height fields computed from formulas
 damage       aborted and repeated lines, and the bow of a scanner
 validity     warnings where a patch leaves the model or its own resolution
+scatter      scatter of a rough mirror: power spectrum, total integrated scatter, ABg model
 spectra      spectrum of heights, and powers of their orders
 coherence    coherence width that a patch allows
 lengths      checks of lengths, counts and other numbers that users write

@@ -149,8 +149,8 @@ spread, polarised variants keep the mean phase between s and p.
 For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
 indices and films hold it constant.
 
-**The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface;
-under a coat, of both flat faces. Spectra of pigments are constant beyond their ends.
+**The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface and
+its coat. Spectra of pigments are constant beyond their ends.
 
 **Tools.** Functions of `dr.freeze` give `mi.render` a seed of type `mi.UInt32`. On CUDA Dr.Jit 1.5
 cannot record `sample` of a bitmap.
@@ -239,7 +239,7 @@ class Diffraction(DiffractingSurface):
             self.wavelength,
             partial(reflector_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
-            beneath=nested is not None and self.coat is None,
+            beneath=nested is not None,
         )
         self.ready()
 
@@ -301,7 +301,7 @@ class Diffraction(DiffractingSurface):
         """See `SurfaceBSDF.beneath`: T = 1 − a, with a the flat reflectance times a smooth ratio.
 
         a is the albedo of the diffraction, so that what is not reflected goes on, and a white pair
-        reflects at most what it gets. Under a coat it is the flat reflectance alone.
+        reflects at most what it gets.
         """
         inwards, outwards = (
             dr.maximum(1.0 - self.energy.reflected(w, site) * flat, 0.0)

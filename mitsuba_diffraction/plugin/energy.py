@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..optics import fresnel
+from ..optics.coat import coated_reflectance, cosine_within
 from ..optics.stack import Stacked
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy import conserved
@@ -134,7 +135,9 @@ class EnergyModel:
         assert albedo is not None
         assert isinstance(material, conserved.Reflector)
         index: Any = material.index(albedo.wavelengths)
-        flat = fresnel.reflectance(np.cos(albedo.grid.theta), index[:, None])
+        cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
+        flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
+        flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
         # of an index of 1 there is neither
         ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
         values = albedo.values * ratio

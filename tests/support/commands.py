@@ -98,7 +98,7 @@ def run(words: list[str]) -> None:
     if "--preset" in rest:
         at = rest.index("--preset") + 1
         rest[at] = small_look(command, rest[at])
-    if "--addon" in rest and "--with" not in rest:  # all named looks take minutes
+    if "--addon" in rest and "--with" not in rest:  # all presets take minutes
         rest += ["--with", "cd-osl"]
     if command == "render" and {"--frames", "--orbit"} & set(rest):
         rest += ["--frames", "2"]
@@ -176,7 +176,7 @@ def small_tree(folder: Path) -> Path:
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):
         for program in blocks("docs/orders.md", "python"):
-            if "import csv" in program or "netcdf_file" in program:
+            if "mine.csv" in program:
                 exec(program, {})
     # tables and recipes of commands that are left out here
     crossed.table().save(folder / "lumps.nc")

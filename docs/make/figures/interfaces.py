@@ -21,7 +21,7 @@ from . import pages
 
 #: Commands by what they are for, in the order of the page.
 GROUPS = {
-    "Measure a surface": ("info", "spectrum", "brdf-map", "survey", "evaluate"),
+    "Measure a surface": ("info", "spectrum", "brdf-map", "survey", "scatter", "evaluate"),
     "Render": ("render", "tonemap", "presets", "tangents", "hologram", "plan"),
     "Tables and solved orders": ("precompute", "solve", "orders"),
     "Other programs, real time": (

@@ -79,33 +79,29 @@ SCENES = (
         _RECIPE.format("lamellar") + "period = 1.6\ndepth = 0.12\npixels_per_period = 64\n",
         "material=Al,coat_ior=1.58", ("resx=450", "resy=330", "spp=128"),
         "Order 2, the green and violet fan behind the hole, is missing in the model, whose "
-        "grooves, half as wide as their period, have no even orders. Where it mirrors "
-        "the room the solved disc is grey; the model is blue in front and behind.",
+        "grooves, half as wide as their period, have no even orders.",
     ),
     Scene(
         "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
         "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=256"),
-        "A viewer hardly sees a difference. Hues follow from the grating equation, and the blaze "
-        "makes order 1 bright in both pictures.",
+        "A viewer hardly sees a difference: hues follow from the grating equation.",
     ),
     Scene(
         "orders_on_wall", "the same grating before a wall", "rulings", "wall", _BLAZED,
         "material=Al", ("resx=450", "resy=210", "spp=512"),
-        "Order 1, the first on the right, is alike. Weak orders are not: those on the left are too "
-        "dark in the model, and its order 0 is blue instead of pink.",
+        "Order 1 on the right is alike. Weak orders on the left are too dark in the model, and its "
+        "order 0 is blue instead of pink.",
     ),
     Scene(
         "spectrometer", "clear grating, 600 lines/mm", "rulings", "screen",
         _RECIPE.format("sinusoidal") + "period = 1.6667\ndepth = 0.09\npixels_per_period = 24\n",
         "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=160"),
-        "Order 2, faint at both ends, is 2 to 4 times as bright as in the model. Light that the "
-        "flat side sends back meets the grooves again from within, where their phase is larger.",
+        "Order 2, faint at both ends, is 2 to 4 times as bright as in the model.",
     ),
 )  # fmt: skip
 _HOW = (
     "ΔE2000 is that of blocks of {} pixels on the disc, grating, wall or screen, as a display "
-    "shows them, with the noise of both pictures in it. `python -m docs.make.figures.orders` makes "
-    "pictures and table."
+    "shows them. `python -m docs.make.figures.orders` makes pictures and table."
 )
 _HEADER = (
     "scene", "mean ΔE2000", "95th percentile", "processor time, solved / model",

@@ -10,6 +10,7 @@ import argparse
 import io
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -67,6 +68,11 @@ def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> No
             f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
         )
     update(path, present)
+
+
+def markers(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the parts that a file has markers for."""
+    return re.findall(r"<!-- begin (\S+) -->", _read(Path(path)))
 
 
 def _read(file: Path) -> str:

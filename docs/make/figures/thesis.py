@@ -161,7 +161,8 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
     small = blazed(2.0, 0.2, periods=6, rows=8)
     patch = patch or (small if args.small else elaphe_like())
     parts = {}
-    for kind in args.only or SWEEPS:
+    shown = pages.markers(page)
+    for kind in args.only or [kind for kind in SWEEPS if kind in shown]:
         print(f"sweeping {kind}", flush=True)
         result = sweep(kind, patch, _LIGHT, resolution=args.resolution or 160)
         parts[kind] = numbers(result)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 
-class Format(NamedTuple):
+class Known(NamedTuple):
     """A format that is read.
 
     Attributes
@@ -31,7 +31,7 @@ class Unread(NamedTuple):
 
     Attributes
     ----------
-    name, suffixes, makers : as of `Format`.
+    name, suffixes, makers : as of `Known`.
     begins : first bytes of a file; () if they do not tell it.
     export : what to do instead.
     """
@@ -48,47 +48,47 @@ _UNITS = "--pixel-size, --height-unit"
 
 #: Formats that need no extra.
 OWN = (
-    Format("grey image", (".png", ".bmp", ".tif", ".tiff"), "any program; 1, 8 or 16 bits", _GREY),
-    Format("image of floats, µm", (".tif", ".tiff", ".exr"), "any program", _PIXEL),
-    Format("NumPy array, µm", (".npy",), "Python", _PIXEL),
-    Format("text: a grid of heights, or x, y and height", (".txt", ".csv", ".tsv", ".xyz"),
+    Known("grey image", (".png", ".bmp", ".tif", ".tiff"), "any program; 1, 8 or 16 bits", _GREY),
+    Known("image of floats, µm", (".tif", ".tiff", ".exr"), "any program", _PIXEL),
+    Known("NumPy array, µm", (".npy",), "Python", _PIXEL),
+    Known("text: a grid of heights, or x, y and height", (".txt", ".csv", ".tsv", ".xyz"),
            "Gwyddion, spreadsheets, R; units as the header says, else µm",
            "--pixel-size, unless it has x and y or a header of Gwyddion"),
 )  # fmt: skip
 
 #: Formats of the extra `afm`, of scanning-probe instruments and of optical profilometers.
 PROBES = (
-    Format("NanoScope", (".spm", ".001", ".di"), "Bruker, Veeco, Digital Instruments, from 4.3 on"),
-    Format("Gwyddion", (".gwy",), "Gwyddion, which opens nearly all others"),
-    Format("Igor binary wave", (".ibw",), "Asylum Research, Oxford Instruments"),
-    Format("Park Systems TIFF", (".tiff", ".tif"), "Park Systems"),
-    Format("JPK image", (".jpk",), "JPK, Bruker NanoWizard"),
-    Format("NID, EZD", (".nid", ".ezd"), "Nanosurf"),
-    Format("MDT", (".mdt",), "NT-MDT"),
-    Format("MI", (".mi",), "Agilent, Keysight, Molecular Imaging"),
-    Format("WSxM", (".top", ".stp", ".tom", ".cur"), "Nanotec, WSxM"),
-    Format("BCR-STM", (".bcr", ".bcrf"), "Image Metrology SPIP"),
+    Known("NanoScope", (".spm", ".001", ".di"), "Bruker, Veeco, Digital Instruments, from 4.3 on"),
+    Known("Gwyddion", (".gwy",), "Gwyddion, which opens nearly all others"),
+    Known("Igor binary wave", (".ibw",), "Asylum Research, Oxford Instruments"),
+    Known("Park Systems TIFF", (".tiff", ".tif"), "Park Systems"),
+    Known("JPK image", (".jpk",), "JPK, Bruker NanoWizard"),
+    Known("NID, EZD", (".nid", ".ezd"), "Nanosurf"),
+    Known("MDT", (".mdt",), "NT-MDT"),
+    Known("MI", (".mi",), "Agilent, Keysight, Molecular Imaging"),
+    Known("WSxM", (".top", ".stp", ".tom", ".cur"), "Nanotec, WSxM"),
+    Known("BCR-STM", (".bcr", ".bcrf"), "Image Metrology SPIP"),
 )  # fmt: skip
 OPTICAL = (
-    Format("X3P", (".x3p",), "ISO 25178-72: confocal and white-light instruments"),
-    Format("SDF", (".sdf",), "ISO 25178-71"),
-    Format("SUR, MNT", (".sur", ".mnt"), "Digital Surf, Mountains"),
-    Format("PLU, PLUX", (".plu", ".plux"), "Sensofar"),
-    Format("OPD, OPDx", (".opd", ".opdx"), "Wyko, Bruker"),
-    Format("DAT, DATX", (".dat", ".datx"), "Zygo MetroPro, Mx"),
-    Format("LEXT, OIR, POIR", (".lext", ".oir", ".poir"), "Olympus"),
-    Format("VK, ZON", (".vk3", ".vk4", ".vk6", ".vk7", ".zon"), "Keyence"),
-    Format("AL3D", (".al3d",), "Alicona"),
-    Format("ZMG", (".zmg",), "KLA Zeta"),
-    Format("NMS", (".nms",), "NanoFocus", "--pixel-size, where a file lacks it"),
-    Format("TMD, FRT, QEP, OS3D", (".tmd", ".frt", ".qep", ".os3d"),
+    Known("X3P", (".x3p",), "ISO 25178-72: confocal and white-light instruments"),
+    Known("SDF", (".sdf",), "ISO 25178-71"),
+    Known("SUR, MNT", (".sur", ".mnt"), "Digital Surf, Mountains"),
+    Known("PLU, PLUX", (".plu", ".plux"), "Sensofar"),
+    Known("OPD, OPDx", (".opd", ".opdx"), "Wyko, Bruker"),
+    Known("DAT, DATX", (".dat", ".datx"), "Zygo MetroPro, Mx"),
+    Known("LEXT, OIR, POIR", (".lext", ".oir", ".poir"), "Olympus"),
+    Known("VK, ZON", (".vk3", ".vk4", ".vk6", ".vk7", ".zon"), "Keyence"),
+    Known("AL3D", (".al3d",), "Alicona"),
+    Known("ZMG", (".zmg",), "KLA Zeta"),
+    Known("NMS", (".nms",), "NanoFocus", "--pixel-size, where a file lacks it"),
+    Known("TMD, FRT, QEP, OS3D", (".tmd", ".frt", ".qep", ".os3d"),
            "TrueMap, FRT, Mahr, OmniSurf3D"),
 )  # fmt: skip
 ARRAYS = (
-    Format("HDF5", (".h5",), "any program; the data set called height, else --channel", _UNITS),
-    Format("MATLAB", (".mat",), "MATLAB, Octave", _UNITS),
-    Format("NetCDF", (".nc",), "SurfaceTopography"),
-    Format("NPZ", (".npz",), "Python", _UNITS),
+    Known("HDF5", (".h5",), "any program; the data set called height, else --channel", _UNITS),
+    Known("MATLAB", (".mat",), "MATLAB, Octave", _UNITS),
+    Known("NetCDF", (".nc",), "SurfaceTopography"),
+    Known("NPZ", (".npz",), "Python", _UNITS),
 )  # fmt: skip
 
 _GWYDDION = "open it in Gwyddion and save it as .gwy"
@@ -129,9 +129,9 @@ def sections() -> dict[str, list[dict[str, str]]]:
     }
 
 
-def _rows(formats: Iterable[Format]) -> list[dict[str, str]]:
+def _rows(formats: Iterable[Known]) -> list[dict[str, str]]:
     return [{**_named(f), "lengths to give": f.lengths or "none"} for f in formats]
 
 
-def _named(entry: Format | Unread) -> dict[str, str]:
+def _named(entry: Known | Unread) -> dict[str, str]:
     return {"format": entry.name, "suffixes": " ".join(entry.suffixes), "from": entry.makers}

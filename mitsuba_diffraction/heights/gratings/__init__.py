@@ -8,6 +8,7 @@ fingers  positions and shape of a scale's fingers
 noise    periodic random fields
 discs    tracks of CDs and DVDs
 brushed  random lines of brushed and ground metal
+rough    rough mirrors with a K-correlation spectrum
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 from .brushed import brushed
 from .discs import cd, dvd
 from .ideal import blazed, lamellar, sinusoidal
+from .rough import rough
 from .scales import elaphe_like, xenopeltis_like
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "dvd",
     "elaphe_like",
     "lamellar",
+    "rough",
     "sinusoidal",
     "xenopeltis_like",
 ]

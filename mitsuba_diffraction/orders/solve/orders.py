@@ -14,16 +14,8 @@ from ...errors import DiffractionError, check_choice, quoted, warn
 from .. import cells
 from ..cells import Counts
 from ..polarised import mueller_of
-from ..table import (
-    ALONG,
-    MOST_NODES,
-    MUELLER,
-    UNPOLARISED,
-    Band,
-    CellResponse,
-    OrderTable,
-    check_outline,
-)
+from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
+from ..table import OrderTable, check_outline
 from .accuracy import WORST, measured_error, missed_tolerance, powers
 from .block import to_node
 from .directions import Directions, solve_directions
@@ -52,6 +44,8 @@ from .stations import Complex, Grating, Real
 
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
 REFINEMENTS, _FINER = 2, 1.4
+#: Part of a band's error that more nodes remove, at least.
+_GAINED = 0.5
 #: Times that the resolution is raised, if solutions at nodes have light from nothing.
 _RAISED = 3
 #: Nodes of a block's first table; each refinement halves the distance between them.
@@ -202,8 +196,9 @@ def _solve_cells(
         header |= error.facts()
         if not (missed := missed_tolerance(header)) or refinement == REFINEMENTS:
             break
-        finer = _refined_counts(counts, error.bands, grating.block)
-        if table.nbytes * np.prod(finer[0]) / np.prod(counts[0]) > MOST_BYTES:
+        excess = max(error.mean, error.polarised or 0.0, error.most / WORST) / how.tolerance
+        finer = _refined_counts(counts, error.bands, excess, grating.block)
+        if _size(grating, finer, elements) > MOST_BYTES:
             break
         counts = finer
     header |= {"processor_seconds": round(work.processor_seconds, 1)}
@@ -226,11 +221,7 @@ def _solved_at_nodes(
     """Solve all nodes, at a higher resolution if solutions have light from nothing."""
     along = _nodes(problem.grating)
     places = [place for band in counts for place in places_of(band, counts[band], along)]
-    ports = {
-        k: sum((problem.grating.sides * (k + 1 - kind)) ** 2 for kind in kinds_of(k))
-        for k in counts
-    }
-    size = 4.0 * elements * sum(math.prod(count) * ports[k] for k, count in counts.items())
+    size = _size(problem.grating, counts, elements)
     for _ in range(_RAISED):
         announce_stage(announce, "solving", problem, jobs, places, size)
         solved = jobs.amplitudes(problem, places, "solving orders")
@@ -244,21 +235,36 @@ def _solved_at_nodes(
     )
 
 
+def _size(grating: Grating, counts: Mapping[int, Counts], elements: int) -> float:
+    """Return the bytes of a table's numbers."""
+    pairs = {k: sum((k + 1 - kind) ** 2 for kind in kinds_of(k)) for k in counts}
+    return 4.0 * elements * grating.sides**2 * sum(
+        math.prod(count) * pairs[k] for k, count in counts.items()
+    )  # fmt: skip
+
+
 def _nodes(grating: Grating) -> Callable[[int], Real]:
     """Return the nodes of a grating's table: even ones of blocks, else Chebyshev's."""
     return cells.even_nodes if grating.block else cells.nodes
 
 
-def _refined_counts(counts: Mapping[int, Counts], missed: Real, block: bool) -> dict[int, Counts]:
-    """Return more nodes for the bands that miss most, at least a mean band's share.
+def _refined_counts(
+    counts: Mapping[int, Counts], missed: Real, excess: float, block: bool
+) -> dict[int, Counts]:
+    """Return more nodes for as few bands as bring the error down to the tolerance.
 
     Even nodes of blocks are halved in all bands, so that the old ones are nodes again.
+
+    missed : error of each band, a share of all light; excess : error over tolerance.
     """
     if block:
         return {k: Counts(*(2 * n - 1 for n in of_band)) for k, of_band in counts.items()}
+    order = np.argsort(-missed)
+    gained = _GAINED * np.cumsum(missed[order])
+    enough = int(np.searchsorted(gained, (1.0 - 1.0 / excess) * missed.sum())) + 1
     return {
         k: Counts(*(n if n == 1 else min(int(np.ceil(_FINER * n)), MOST_NODES) for n in of_band))
-        if missed[k] >= missed.mean()
+        if k in order[:enough]
         else of_band
         for k, of_band in counts.items()
     }

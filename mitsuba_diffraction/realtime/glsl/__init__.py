@@ -5,6 +5,7 @@ Contents
 Renderer       draw a Mitsuba scene by shaders, without a window (in `renderer`)
 export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
+packed_scene   all that shaders read of a scene, for the renderer and the page
 shader_materials  BSDFs, and the gloss of plain ones
 modelled       surfaces of `diffraction`: constants, energy conservation, tables
 solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
@@ -22,7 +23,7 @@ texels         textures, uniforms and definitions that a shader reads; packing o
 methods        tables and programs of each method, also of the thesis' methods
 formulas       formulas of optics that a shader calls, as functions in GLSL
 source         text of the shaders, by method and surface
-rewriting      files of shaders; removal of unused code, and prefixed names, for other programs
+rewriting      files of shaders; prefixed names for other programs
 context        OpenGL without a window: programs, textures, framebuffers
 timing         time per fragment
 """

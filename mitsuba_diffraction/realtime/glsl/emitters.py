@@ -49,6 +49,9 @@ from .surroundings import Environment, beside, is_flat
 
 Array = NDArray[np.float64]
 
+#: Refusal of a scene in the dark.
+NO_LIGHT = "no emitter of the scene lights the surfaces that diffract; add one, or brighten it"
+
 _BLOCK = 256  # lights that an emitter draws at a time
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _SUN_SHARE = 0.625  # share of a sky's lights that are directions of its sun
@@ -78,9 +81,7 @@ class Emitters:
                 self._sequences.append(sequence)
                 irradiances.append(irradiance)
         if not irradiances:
-            raise DiffractionError(
-                "no emitter of the scene lights the surfaces that diffract; add one, or brighten it"
-            )
+            raise DiffractionError(NO_LIGHT)
         shares = np.array(irradiances) / sum(irradiances)
         # (n,) probability of each emitter with light
         self.probabilities = (1.0 - _EVEN) * shares + _EVEN / len(shares)

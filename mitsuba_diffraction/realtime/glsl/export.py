@@ -18,7 +18,7 @@ from ...tables.exr import write_channels
 from .maps import Map
 from .methods import CONSUMERS
 from .packing import pack_responses
-from .rewriting import global_names, pruned, renamed, resolved, shader_file
+from .rewriting import global_names, renamed, shader_file
 from .shader_materials import (
     GLSL,
     ShaderMaterial,
@@ -144,8 +144,8 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         uniforms={"height_scale": described.height_scale.number},
         definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
     )
-    common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
-    tables = {method: surface.tables(method, floats=True) for method in methods}
+    common |= Packed(definitions={"SURFACE_KIND": "0", **common.definitions})
+    tables = {method: surface.tables(method) for method in methods}
     if "exact" in tables:
         tables["exact"] |= pack_responses([(np.array([360.0, 830.0]), np.ones(2))])
     return _joined(common, tables, described, surface.words)
@@ -185,19 +185,20 @@ def export_shader(
 def _joined(common: Packed, tables: dict[str, Packed], described: Surface, words: str) -> Shader:
     """Join the shared source with each method's, under prefixed names."""
     stretch = described.lateral_scale.number
-    definitions = dict(common.definitions)
-    for packed in tables.values():
-        definitions |= packed.definitions
-    constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
+    shared_by_all = dict(set.intersection(*(set(t.definitions.items()) for t in tables.values())))
+    definitions = {**common.definitions, **shared_by_all}
+    constants = [f"#define {name} {value}\n" for name, value in definitions.items()]
     files = [part(name, definitions) for name in surface_files(definitions)]
-    shared = "".join(constants) + resolved("\n".join(files), definitions)
+    shared = "".join(constants) + "\n".join(files)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     declared = _declared(common, _PREFIX, names)
     for method, packed in tables.items():
         prefix = f"{_PREFIX}{method}_"
         text = "\n".join(map(shader_file, method_files(method, definitions)))
-        text = resolved(text, {**common.definitions, **packed.definitions})
+        own = {n: v for n, v in packed.definitions.items() if n not in definitions}
+        text = "".join(f"#define {n} {v}\n" for n, v in own.items()) + text
+        text += "".join(f"\n#undef {n}" for n in own)
         method_names = global_names(text)
         text = renamed(text, [(_PREFIX, names), (prefix, method_names)])
         code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix, stretch=stretch))
@@ -207,7 +208,7 @@ def _joined(common: Packed, tables: dict[str, Packed], described: Surface, words
         version=version("mitsuba_diffraction"), surface=words,
         functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
     )  # fmt: skip
-    text = f"{head}\n" + pruned("".join(code) + _BENEATH, _PREFIX)
+    text = f"{head}\n" + "".join(code) + _BENEATH
     textures = {texture.name: texture for texture in declared.textures}  # methods share some
     width = stretch * described.coherence_width
     return Shader(text, dict(declared.uniforms), tuple(textures.values()), functions, words, width)

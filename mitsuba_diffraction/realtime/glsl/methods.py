@@ -18,7 +18,7 @@ from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method
 from .context import Bindings, compile_program
 from .packing import area_factor
-from .scene import VERTEX, RealtimeScene
+from .scene import VERTEX
 from .shader_materials import GLSL, Diffracting
 from .source import METHODS, THESIS_METHODS
 from .texels import Packed, as_half, listed, texels
@@ -121,7 +121,8 @@ def pack_method(method: Method) -> Packed:
 class Prepared:
     """Programs and tables of one method for all surfaces of a scene.
 
-    surfaces : bindings of each surface, without the method's tables.
+    tables : tables of the method.
+    surfaces : bindings of each surface, without the method's tables; `numbers` of its table.
 
     Raises a DiffractionError if the method is unknown, or does not support a table.
     """
@@ -129,27 +130,18 @@ class Prepared:
     def __init__(
         self,
         context: Any,
-        scene: RealtimeScene,
         method: str,
+        tables: Sequence[Packed],
+        numbers: Sequence[int | None],
         surfaces: Sequence[Bindings],
         buffers: Sequence[Any],
     ) -> None:
         self._context, self._method = context, method
         self._surfaces, self._buffers = surfaces, buffers
-        bound: dict[int, Bindings] = {}
-        self.nbytes = 0  # size of the method's textures
-        for surface in scene.diffracting:
-            key = id(surface.described.table)
-            if key not in bound:
-                packed = method_tables(method, surface)
-                bound[key] = Bindings(context, packed)
-                self.nbytes += packed.nbytes
-        without = Bindings(context, Packed())
-        # one for each surface
-        self.tables = [
-            without if surface is None else bound[id(surface.described.table)]
-            for surface in (s.material.diffraction for s in scene.surfaces)
-        ]
+        self.nbytes = sum(packed.nbytes for packed in tables)  # size of the method's textures
+        bound = [Bindings(context, packed) for packed in (*tables, Packed())]
+        # one for each surface, the last without a table
+        self.tables = [bound[-1 if number is None else number] for number in numbers]
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
 

@@ -73,13 +73,10 @@ class Modelled:
             return beneath
         return beneath | pack_energy([FINE.ones if s is None else luminous_mean(s) for s in pages])
 
-    def tables(self, method: str, *, floats: bool = False) -> Packed:
-        """Pack the table for `fast` or `exact`.
-
-        floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
-        """
+    def tables(self, method: str) -> Packed:
+        """Pack the table for `fast` or `exact`."""
         if method == "fast":
-            return pack_colours(cached_colours(self.described.patch), floats=floats)
+            return pack_colours(cached_colours(self.described.patch))
         return pack_powers(self.described.patch)
 
     def lobes(self) -> Packed:

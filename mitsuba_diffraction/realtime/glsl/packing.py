@@ -20,7 +20,7 @@ from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
 from ...tables.table import DiffractionTable
-from .texels import Packed, Texture, as_half, listed, paired, texels
+from .texels import Packed, Texture, as_half, listed, paired
 
 Array = NDArray[np.float64]
 
@@ -32,31 +32,20 @@ _RESPONSES = 2048  # nodes over k, about 0.4 nm apart
 _ANGLES, _WAVELENGTHS = 129, 64  # nodes of a conductor's reflectance
 
 
-def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
-    """Pack a colour table for `fast`.
-
-    floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
-    """
+def pack_colours(table: ColourTable) -> Packed:
+    """Pack a colour table for `fast`."""
     grid = table.grid
     starts = np.array([grid.start(n) for n in range(grid.rings)])
-    counts = np.array(grid.counts)  # always below 2¹⁶: larger tables exceed the textures
-    pairs = np.stack([starts[:-1], counts[:-1] | counts[1:] << 16], axis=1).astype(np.uint32)
+    counts = np.array(grid.counts)
+    # floats are exact up to 2²⁴: larger tables exceed the textures
+    rings = np.stack([starts[:-1], counts[:-1], counts[1:], counts[1:]], axis=1)
     radii, zs = table.order_0.shape[:2]
-    if floats:
-        bins = np.stack([starts[:-1], counts[:-1], counts[1:], counts[1:]], axis=1)
-        listings = (
-            listed("colours", table.coefficients.reshape(-1, 4)),
-            listed("rings", bins.astype(np.float32)),  # floats are exact up to 2²⁴
-            listed("glossy", texels(table.order_0[..., :3].reshape(-1, 3)).astype(np.float32)),
-        )
-    else:
-        listings = (
-            listed("colours", paired(table.coefficients).reshape(-1, 4)),
-            listed("rings", pairs),
-            listed("glossy", paired(_with_next(table.order_0[..., :3]))),
-        )
     return Packed(
-        textures=listings,
+        textures=(
+            listed("colours", paired(table.coefficients).reshape(-1, 4)),
+            listed("rings", rings.astype(np.float32)),
+            listed("glossy", paired(_with_next(table.order_0[..., :3]))),
+        ),
         uniforms={
             "bins": grid.bins,
             "last_ring": grid.rings - 1,

@@ -18,15 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bounces import pack_bounces
+from ...errors import DiffractionError
 from .camera import Camera
 from .context import Bindings, ShaderPass, Target, compile_plain, set_uniforms
-from .emitters import Emitters
+from .emitters import NO_LIGHT
 from .lights import Lamp
 from .methods import vertex_array
-from .scene import RealtimeScene
+from .packed_scene import PackedScene
 from .shadows import SIZE, Casters, ShadowMap
-from .surroundings import flat_shapes, pack_flats, pack_obstacles
 from .texels import Packed, Uniform
 
 Array = NDArray[np.float64]
@@ -41,31 +40,29 @@ _WHITE = Lamp("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 8
 
 
 class Stage:
-    """Emitters, surroundings and shadow casters of a scene, independent of the camera.
+    """Emitters, surroundings and shadow casters of a scene, uploaded; independent of the camera.
 
     Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
     """
 
-    def __init__(
-        self, context: Any, mitsuba_scene: Any, scene: RealtimeScene, buffers: list[Any]
-    ) -> None:
-        self.context, self._scene, self._mitsuba_scene = context, scene, mitsuba_scene
-        self._with_bounces: list[list[Bindings]] | None = None
+    def __init__(self, context: Any, packed: PackedScene, buffers: list[Any]) -> None:
+        self.context, self._packed, self._scene = context, packed, packed.scene
+        self._bounces: Bindings | None = None
         self._resources: list[Any] = []
-        self.emitters = Emitters(mitsuba_scene, scene.middle)
+        if packed.emitters is None:
+            raise DiffractionError(NO_LIGHT)
+        self.emitters = packed.emitters
         self._add_glowing(buffers)
-        flats = flat_shapes(mitsuba_scene)
-        self._around = self._bound(pack_surroundings(scene, self.emitters, flats))
+        self._around = self._bound(packed.around)
+        self._obstacles = self._bound(packed.obstacles)
+        self._lobes = [self._bound(lobes) for lobes in packed.lobes]
         self._background: ShaderPass | None = None
         if self.emitters.environment is not None:
             shared = ("library.glsl", "surroundings.glsl")
             self._background = self._register(
                 ShaderPass(context, "background.frag", shared, self._around.definitions)
             )
-        # bindings of each surface
-        self.extras = self._with_lobes([self._around, self._bound(pack_solid(scene, flats))])
-        # whether lobes can look up any light
-        self.looks_up = self._scene.glows or self._background is not None
+        self.looks_up = packed.looks_up
 
     def _register(self, resource: Any) -> Any:
         """Add a resource that `release` frees, and return it."""
@@ -85,26 +82,16 @@ class Stage:
         self._glowing = [self._register(vertex_array(context, self._glow, v)) for v in vertices]
         self.casters = self._register(Casters(context, scene.surfaces, buffers, vertices))
 
-    def _with_lobes(self, around: list[Bindings]) -> list[list[Bindings]]:
-        """Return the bindings of each surface: the surroundings, and its lobes if it diffracts."""
-        lobes: dict[int, Bindings] = {}
-        extras = []
-        for surface in self._scene.surfaces:
-            parts = [*around]
-            if (diffraction := surface.material.diffraction) is not None:
-                key = id(diffraction.described.table)
-                if key not in lobes:
-                    lobes[key] = self._bound(diffraction.lobes())
-                parts.append(lobes[key])
-            extras.append(parts)
-        return extras
-
-    def with_bounces(self) -> list[list[Bindings]]:
-        """Return `extras` with the light between surfaces, traced at the first call."""
-        if self._with_bounces is None:
-            traced = self._bound(pack_bounces(self._mitsuba_scene, self._scene))
-            self._with_bounces = [[*extra, traced] for extra in self.extras]
-        return self._with_bounces
+    def extras(self, bounces: bool) -> list[list[Bindings]]:
+        """Return the bindings of each surface: surroundings, lobes, and light between surfaces."""
+        shared = [self._around, self._obstacles]
+        if bounces:
+            self._bounces = self._bounces or self._bound(self._packed.bounces)
+            shared.append(self._bounces)
+        return [
+            shared + ([] if surface.table is None else [self._lobes[surface.table]])
+            for surface in self._packed.surfaces
+        ]
 
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
         """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
@@ -130,28 +117,6 @@ class Stage:
             resource.release()
 
 
-def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[Any]) -> Packed:
-    """Pack the environment and flat shapes for shaders/surroundings.glsl."""
-    extent = float(np.ptp([scene.low, scene.high]))
-    packed = pack_flats(flats, emitters.share_of)
-    packed |= Packed((), {"least_distance": 1e-6 * extent, "surroundings_lit": (1.0, 1.0)})
-    environment = emitters.environment
-    if environment is not None:
-        packed |= environment.packed(emitters.share_of(environment.emitter))
-    return packed
-
-
-def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
-    """Pack all other shapes that obstruct directions, for shaders/obstacles.glsl."""
-    exact = {shape.ptr for shape in flats}
-    solid = [
-        surface.vertices[:, :3].reshape(-1, 3, 3)
-        for surface in scene.surfaces
-        if surface.shape.ptr not in exact and surface.radiance is None
-    ]
-    return pack_obstacles(np.concatenate(solid)) if solid else Packed()
-
-
 class ProgressiveLight:
     """Picture that accumulates frames, created by `Renderer.progressive`.
 
@@ -169,14 +134,15 @@ class ProgressiveLight:
         self._fixed = [replace(light, spectrum=len(lights) * light.spectrum) for light in lights]
         bounces = bounces and not lights
         self._looks_up = (stage.looks_up or bounces) and not lights
-        self._surroundings = stage.with_bounces() if bounces else stage.extras
+        self._surroundings = stage.extras(bounces)
         context = stage.context
         self._map = ShadowMap(stage.casters, shadow_size)
         self._frame = Target(context, *camera.size)
         self._sums = [Target(context, *camera.size) for _ in range(2)]  # one per kind of frame
         self._counts = [0, 0]
         self._lights: Iterator[Lamp] = iter(())
-        self.restart(camera)
+        self._visible = stage.casters.visible(camera)
+        self.restart()
         self._add = ShaderPass(context, "add.frag")
 
     @property
@@ -184,11 +150,8 @@ class ProgressiveLight:
         """Number of frames in the picture."""
         return sum(self._counts)
 
-    def restart(self, camera: Camera | None = None) -> None:
-        """Start again, with another camera of the same size."""
-        if camera is not None:
-            self._camera = camera
-            self._visible = self._stage.casters.visible(camera)
+    def restart(self) -> None:
+        """Start again."""
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
@@ -234,15 +197,20 @@ class ProgressiveLight:
         self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
 
     def _draw_surfaces(
-        self, light: Lamp, camera: Camera, definitions: dict[str, str],
-        uniforms: dict[str, Uniform], each: list[dict[str, Uniform]], textures: dict[str, Any],
-    ) -> None:  # fmt: skip
+        self,
+        light: Lamp,
+        camera: Camera,
+        definitions: dict[str, str],
+        uniforms: dict[str, Uniform],
+        each: list[dict[str, Uniform]],
+        textures: dict[str, Any],
+    ) -> None:
         """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
         for surface, solid in zip(each, self._visible.solid, strict=True):
             surface["solid"] = solid
         self._draw(
-            self._frame.frame, camera, [light], definitions, uniforms,
-            self._surroundings, each, textures,
+            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings, each,
+            textures,
         )  # fmt: skip
 
     @property

@@ -22,10 +22,9 @@ from .context import (
 )
 from .lights import Lamp
 from .methods import Prepared
+from .packed_scene import PackedScene
 from .packing import pack_responses
 from .progressive import ProgressiveLight, Stage
-from .scene import RealtimeScene, load, read_scene
-from .shader_materials import pack_conservation, pack_emission, pack_surface
 from .shadows import SIZE
 from .source import LIGHTS
 from .texels import Uniform
@@ -42,8 +41,8 @@ class Renderer:
     has all emitters, shadows and the lens. Light between surfaces is left out. Unsupported parts of
     the scene are listed in a warning, and in `scene.omissions`.
 
-    Raises a DiffractionError if OpenGL 3.3 is missing, nothing diffracts, the camera is not a
-    perspective one, or the view is unknown.
+    Raises a DiffractionError if OpenGL 3.3 is missing, nothing diffracts, or the camera is
+    not a perspective one.
 
     Parameters
     ----------
@@ -53,8 +52,8 @@ class Renderer:
     """
 
     def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
-        self.mitsuba_scene = load(scene)
-        self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
+        self.packed = PackedScene(scene, sensor)
+        self.scene = self.packed.scene
         self._warn([o for o in self.scene.omissions if o not in self.scene.of_light])
         self._of_light = list(self.scene.of_light)
         self.camera = self.scene.camera
@@ -64,15 +63,7 @@ class Renderer:
         self.context = headless_context() if context is None else context
         check_version(self.context)
         self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
-        self.bindings = [
-            Bindings(
-                self.context,
-                pack_surface(s.material)
-                | pack_conservation(s.material)
-                | pack_emission(s.radiance),
-            )
-            for s in self.scene.surfaces
-        ]
+        self.bindings = [Bindings(self.context, s.packed) for s in self.packed.surfaces]
         self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
         self._stage: Stage | None = None
@@ -194,7 +185,7 @@ class Renderer:
     def stage(self) -> Stage:
         """Return the scene's emitters, surroundings and shadow casters, built at the first call."""
         if self._stage is None:
-            self._stage = Stage(self.context, self.mitsuba_scene, self.scene, self.buffers)
+            self._stage = Stage(self.context, self.packed, self.buffers)
         return self._stage
 
     def draw_lights(
@@ -250,8 +241,8 @@ class Renderer:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if (diffraction := surface.material.diffraction) is not None:
-                scale = diffraction.described.height_scale.number
-                set_uniforms(program, {"height_scale": scale})
+                height_scale = diffraction.described.height_scale.number
+                set_uniforms(program, {"height_scale": height_scale})
             array.render()
 
     def release(self) -> None:
@@ -270,9 +261,11 @@ class Renderer:
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._methods:
+            numbers = [surface.table for surface in self.packed.surfaces]
             self._methods[method] = Prepared(
-                self.context, self.scene, method, self.bindings, self.buffers
-            )
+                self.context, method, self.packed.tables(method), numbers, self.bindings,
+                self.buffers,
+            )  # fmt: skip
         return self._methods[method]
 
     def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:

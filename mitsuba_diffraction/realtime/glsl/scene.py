@@ -172,6 +172,12 @@ class SceneSurface:
     exact: bool  # whether all of its material is supported
     radiance: Array | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
 
+    @property
+    def table(self) -> Any:
+        """Table of heights or of solved orders; None where nothing diffracts."""
+        diffraction = self.material.diffraction
+        return None if diffraction is None else diffraction.described.table
+
 
 @dataclass(frozen=True)
 class Glow:

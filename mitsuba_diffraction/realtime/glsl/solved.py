@@ -53,8 +53,8 @@ class SolvedSurface:
         """See `Modelled.conservation`: solved orders conserve energy."""
         return Packed()
 
-    def tables(self, method: str, *, floats: bool = False) -> Packed:
-        """See `Modelled.tables`; the textures are floats in any case."""
+    def tables(self, method: str) -> Packed:
+        """See `Modelled.tables`."""
         return pack_orders(method, self.table, self.described.sigma)
 
     def lobes(self) -> Packed:

@@ -45,7 +45,7 @@ _PREAMBLES = {
     "desktop": "#version 330 core\n",
     "web": (
         "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-        "precision highp sampler2D;\nprecision highp usampler2D;\n"
+        "precision highp sampler2D;\n"
     ),
 }
 

@@ -30,7 +30,7 @@ class Texture:
     """Data of one texture."""
 
     name: str  # name of the sampler in the shader
-    # (rows, columns, channels) float16, float32, uint8 or uint32 (read as whole numbers), one, two
+    # (rows, columns, channels) float16, float32 or uint8, one, two
     # or four channels
     data: NDArray[np.generic]
     # True: a picture, filtered and repeated; False: a list, read texel by texel
@@ -131,10 +131,15 @@ def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return (nearest & np.uint32(0xFFFF0000)).view(np.float32)
 
 
-def paired(values: NDArray[np.floating]) -> NDArray[np.uint32]:
-    """Pack the upper halves of `shortened` numbers (…, 2n) in words (…, n), low half first."""
-    upper = shortened(values).view(np.uint32)
-    return np.asarray(upper[..., ::2] >> 16 | upper[..., 1::2], np.uint32)
+def paired(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Pack the upper halves of `shortened` numbers (…, 2n) in floats (…, n), low half first.
+
+    A second number of 0 becomes 1e-38: cards may read floats without exponent as 0.
+    """
+    bits = shortened(values).view(np.uint32)
+    low, high = bits[..., ::2], bits[..., 1::2]
+    high = np.where(high & np.uint32(0x7F800000), high, np.uint32(0x00800000))
+    return np.asarray(low >> 16 | high, np.uint32).view(np.float32)
 
 
 def plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -21,17 +21,11 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
 from ...progress import Progress, silent
-from ..glsl.emitters import Emitters
 from ..glsl.methods import CONSUMERS
+from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
-from ..glsl.scene import RealtimeScene, SceneSurface, load, read_scene
-from ..glsl.shader_materials import (
-    Diffracting,
-    ShaderMaterial,
-    pack_conservation,
-    pack_emission,
-    pack_surface,
-)
+from ..glsl.scene import RealtimeScene
+from ..glsl.shader_materials import Diffracting
 from ..glsl.source import (
     WEB_METHODS,
     display_definitions,
@@ -39,11 +33,10 @@ from ..glsl.source import (
     plain_source,
     vertex_source,
 )
-from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
 from .material_choices import INDEXED, changeable, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
-from .tables import fitting_tables, strongest_orders
+from .tables import WebTable, fitting_tables, strongest_orders
 
 #: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000
@@ -113,7 +106,9 @@ def make_page(
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if is_file else "Diffraction"
-    header, data = _packed(load(scene), sensor, title, methods, view, bounces, progress)
+    progress(0, 0, "packing surfaces and light")
+    writer = _Writer(PackedScene(scene, sensor, [2.0**n for n in OCTAVES]), bounces)
+    header, data = writer.written(title, methods, view, progress)
     text = _filled(header, data)
     if len(text.encode()) > MAX_BYTES:
         raise DiffractionError(
@@ -171,119 +166,149 @@ def _asset(name: str) -> str:
     return resources.files(__package__).joinpath("page", name).read_text(encoding="utf-8")
 
 
-def _packed(
-    loaded: Any,
-    sensor: int,
-    title: str,
-    methods: Sequence[str],
-    view: str,
-    bounces: bool,
-    progress: Progress,
-) -> tuple[dict[str, Any], bytes]:
-    """Return the page's header, as JSON types, and all arrays and pictures, compressed.
+class _Writer:
+    """Header of a page, as JSON types that its scripts read by name, and its data.
 
-    The last methods are left out if their tables exceed the size of the page.
-
-    The scripts of the page read the header's entries by name:
-
-    light, around : see `light.packed_light` and `light.packed_surroundings`.
-    tables : numbers of each table's sections, by method.
-    octaves, energy_pages : ends of the slider of height scales, and pages of energy scales.
-    background : radiance of the sky, linear sRGB.
-    box, subject : corners of the scene, and of what diffracts.
-    programs : section of the distinct sources; the page replaces LIGHTS_LIT by its light's
-        definitions and appends one of `mains`.
-    vertex, shadow, shown : other sources.
-    loss, left_out, omissions : see `Page`.
-    orders : brightest orders of each table.
-    materials : materials that surfaces can be given.
-    sections : position and layout of each section.
-    surfaces : of each the name; numbers of the sections of its `mesh` and `parts`; whether it
-        `emits` light; the scene's `height_scale`, null where nothing diffracts; number of its
-        `table`; number of its shader's source by method, `programs`, and the same with one of the
-        materials, `named`, empty where it cannot change; number of its `coat` among the materials'
-        parts; and whether it is `pigmented`: diffracts over a diffuse base.
+    Each method writes the entries of the header that it returns.
     """
-    scene = read_scene(loaded, sensor)
-    emitters = Emitters(loaded, scene.middle) if loaded.emitters() else None
-    sections = Sections()
-    packers: dict[int, Diffracting] = {}
-    for diffracting in scene.diffracting:
-        packers.setdefault(id(diffracting.described.table), diffracting)
-    numbers = {key: n for n, key in enumerate(packers)}
-    tables = list(packers.values())  # a surface of each table
-    stored = []
-    for n, surface in enumerate(scene.surfaces):
-        progress(n, len(scene.surfaces), f"packing {surface.name}")
-        common = _common(surface)
-        mesh = packed_mesh(surface.vertices, sections)
-        stored.append((common, mesh, packed_parts(common, sections)))
-    light = packed_light(scene, emitters, sections)
-    coats = sorted(
-        {_coat(s.material) for s in scene.surfaces if changeable(s.material.diffraction)}
-    )
-    materials = packed_materials(coats, sections)
-    progress(0, 0, "light between surfaces")
-    around, definitions = packed_surroundings(loaded, scene, emitters, tables, sections, bounces)
-    room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
-    shown, packed, left_out = _fitted(methods, tables, room, progress)
-    sources: list[str] = []
 
-    def program(method: str, known: dict[str, str]) -> int:
-        """Return the number of a shader's source."""
-        source = _source(method, {**known, **definitions, "SHADOWED": "", "LIVE": ""})
-        if source not in sources:
-            sources.append(source)
-        return sources.index(source)
-
-    stored_tables, losses = {}, {}
-    for method in shown:
-        rounded = [packed[method, n] for n in range(len(tables))]
-        stored_tables[method] = [packed_parts(t.packed, sections, t.sections) for t in rounded]
-        # largest mean and largest 99th percentile
-        losses[method] = tuple(map(max, zip(*(table.loss for table in rounded), strict=True)))
-    entries = []
-    for surface, (common, mesh, parts) in zip(scene.surfaces, stored, strict=True):
-        diffraction = surface.material.diffraction
-        described = None if diffraction is None else diffraction.described
-        number = numbers[id(described.table)] if described else 0
-        known = {
-            method: {
-                **common.definitions,
-                **(packed[method, number].packed.definitions if described else {}),
-            }
-            for method in shown
-        }
-        given = known if changeable(diffraction) else {}
-        entries.append(
+    def __init__(self, packed: PackedScene, bounces: bool) -> None:
+        self._packed, self._sections = packed, Sections()
+        self._sources: list[str] = []
+        self._surfaces = [
             {
-                "name": surface.name,
-                "mesh": mesh,
-                "parts": parts,
-                "emits": surface.radiance is not None,
-                "height_scale": described.height_scale.number if described else None,
-                "table": number,
-                "programs": {m: program(m, d) for m, d in known.items()},
-                "named": {m: program(m, {**d, **INDEXED}) for m, d in given.items()},
-                "coat": coats.index(_coat(surface.material)) if given else 0,
-                "pigmented": described is not None and described.nested is not None,
+                "mesh": packed_mesh(surface.scene.vertices, self._sections),
+                "parts": packed_parts(surface.packed, self._sections),
             }
+            for surface in packed.surfaces
+        ]
+        self._light = packed_light(packed, self._sections)
+        self._coats = sorted({coat for s in packed.surfaces if (coat := _coat(s)) is not None})
+        self._materials = packed_materials(self._coats, self._sections)
+        self._around, self._around_definitions = packed_surroundings(
+            packed, self._sections, bounces
         )
-    joined = json.dumps(sources).encode()
-    programs = sections.add(packed_array(np.frombuffer(joined, np.uint8)[:, None]))
-    data, layouts = sections.joined()
+
+    def written(
+        self, title: str, methods: Sequence[str], view: str, progress: Progress
+    ) -> tuple[dict[str, Any], bytes]:
+        """Return the whole header, and all arrays and pictures, compressed.
+
+        The last methods are left out if their tables exceed the size of the page.
+        """
+        room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - self._sections.nbytes
+        shown, tables, left_out = _fitted(methods, self._packed.diffracting, room, progress)
+        header = {
+            "title": title,
+            "methods": shown,
+            "left_out": left_out,
+            "omissions": _omissions(self._packed),
+            "light": self._light,
+            "around": self._around,
+            "materials": self._materials,
+            # ends of the slider of height scales, and pages of energy scales
+            "octaves": (OCTAVES[0], OCTAVES[-1]),
+            "energy_pages": len(OCTAVES),
+            **self._tables(shown, tables),
+            **self._shaded(shown, tables),
+            **_shaders(view),
+            **_framed(self._packed.scene),
+        }
+        data, header["sections"] = self._sections.joined()
+        return header, data
+
+    def _tables(
+        self, shown: Sequence[str], tables: Mapping[str, Sequence[WebTable]]
+    ) -> dict[str, Any]:
+        """Return sections of each table and its loss by method; brightest orders of each table."""
+        return {
+            "tables": {
+                method: [packed_parts(t.packed, self._sections, t.sections) for t in tables[method]]
+                for method in shown
+            },
+            # largest mean and largest 99th percentile
+            "loss": {
+                method: tuple(map(max, zip(*(table.loss for table in tables[method]), strict=True)))
+                for method in shown
+            },
+            "orders": [strongest_orders(table.described) for table in self._packed.diffracting],
+        }
+
+    def _shaded(
+        self, shown: Sequence[str], tables: Mapping[str, Sequence[WebTable]]
+    ) -> dict[str, Any]:
+        """Return the surfaces, and the section of all distinct sources of their shaders."""
+        surfaces = []
+        for surface, stored in zip(self._packed.surfaces, self._surfaces, strict=True):
+            definitions = {m: self._definitions(surface, tables[m]) for m in shown}
+            surfaces.append({**stored, **self._surface(surface, definitions)})
+        joined = json.dumps(self._sources).encode()
+        programs = packed_array(np.frombuffer(joined, np.uint8)[:, None])
+        return {"surfaces": surfaces, "programs": self._sections.add(programs)}
+
+    def _definitions(self, surface: PackedSurface, tables: Sequence[WebTable]) -> dict[str, str]:
+        """Return the definitions of a surface with its table of a method."""
+        table = {} if surface.table is None else tables[surface.table].packed.definitions
+        return {**surface.packed.definitions, **table}
+
+    def _surface(
+        self, surface: PackedSurface, definitions: Mapping[str, dict[str, str]]
+    ) -> dict[str, Any]:
+        """Return a surface's entry; numbers of programs and tables are indices of the header's.
+
+        `named` are its programs with one of the header's materials, empty where it cannot change.
+        """
+        coat = _coat(surface)
+        diffraction = surface.scene.material.diffraction
+        described = None if diffraction is None else diffraction.described
+        named = {} if coat is None else {m: {**d, **INDEXED} for m, d in definitions.items()}
+        return {
+            "name": surface.scene.name,
+            "emits": surface.scene.radiance is not None,
+            "height_scale": None if described is None else described.height_scale.number,
+            "table": surface.table or 0,
+            "programs": {m: self._program(m, d) for m, d in definitions.items()},
+            "named": {m: self._program(m, d) for m, d in named.items()},
+            "coat": 0 if coat is None else self._coats.index(coat),
+            "pigmented": described is not None and described.nested is not None,
+        }
+
+    def _program(self, method: str, definitions: Mapping[str, str]) -> int:
+        """Return the number of a shader's source, which lacks its main function.
+
+        The page replaces LIGHTS_LIT by its light's definitions and appends one of `mains`.
+        """
+        live = {**definitions, **self._around_definitions, "SHADOWED": "", "LIVE": ""}
+        source = _source(method, live)
+        if source not in self._sources:
+            self._sources.append(source)
+        return self._sources.index(source)
+
+
+def _coat(surface: PackedSurface) -> float | None:
+    """Return the index of a surface's coat, 1 without one; None if its material cannot change."""
+    diffraction = surface.scene.material.diffraction
+    if diffraction is None or not changeable(diffraction):
+        return None
+    return diffraction.described.coat or 1.0
+
+
+def _shaders(view: str) -> dict[str, Any]:
+    """Return the sources that do not depend on surfaces."""
     display = plain_source(
         "shown.frag", ("library.glsl", "formulas"), display_definitions(view), "web"
     )
-    header = {
-        "title": title,
-        "surfaces": entries,
-        "light": light,
-        "around": around,
-        "tables": stored_tables,
-        "methods": shown,
-        "omissions": _omissions(scene, emitters),
-        "background": _zenith(scene.lighting.sky),
+    return {
+        "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
+        "vertex": vertex_source("web"),
+        "shadow": plain_source("position.frag", dialect="web"),
+        "shown": {"vertex": vertex_source("web", "whole.vert"), "fragment": display},
+    }
+
+
+def _framed(scene: RealtimeScene) -> dict[str, Any]:
+    """Return camera, corners of the scene and of what diffracts, and radiance of the sky."""
+    return {
         "camera": {
             "to_world": scene.camera.to_world.tolist(),
             "fov": scene.camera.fov,
@@ -292,38 +317,13 @@ def _packed(
         },
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in scene.subject],
-        "programs": programs,
-        "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
-        "vertex": vertex_source("web"),
-        "shadow": plain_source("position.frag", dialect="web"),
-        "shown": {"vertex": vertex_source("web", "whole.vert"), "fragment": display},
-        "loss": losses,
-        "left_out": left_out,
-        "orders": [strongest_orders(table.described) for table in tables],
-        "sections": layouts,
-        "octaves": (OCTAVES[0], OCTAVES[-1]),
-        "energy_pages": len(OCTAVES),
-        "materials": materials,
+        "background": _zenith(scene.lighting.sky),
     }
-    return header, data
-
-
-def _coat(material: ShaderMaterial) -> float:
-    """Return the index of a surface's coat, 1 without one."""
-    diffraction = material.diffraction
-    return (diffraction and diffraction.described.coat) or 1.0
-
-
-def _common(surface: SceneSurface) -> Packed:
-    """Pack a surface without its table; energy conservation at all height scales of the slider."""
-    material = surface.material
-    packed = pack_surface(material) | pack_emission(surface.radiance)
-    return packed | pack_conservation(material, [2.0**n for n in OCTAVES])
 
 
 def _fitted(
     methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
-) -> tuple[list[str], Any, dict[str, str]]:
+) -> tuple[list[str], dict[str, list[WebTable]], dict[str, str]]:
     """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
     for method in methods:
@@ -333,11 +333,11 @@ def _fitted(
             shown.remove(method)
             left_out[method] = reason
     while shown:
-        packed = fitting_tables(shown, tables, room, progress)
-        if not isinstance(packed, int):
-            return shown, packed, left_out
+        rounded = fitting_tables(shown, tables, room, progress)
+        if not isinstance(rounded, int):
+            return shown, rounded, left_out
         left_out[shown.pop()] = (
-            f"{(packed - room) / 1e6:.1f} MB too large for a page of {MAX_BYTES / 1e6:.0f} MB"
+            f"{(rounded - room) / 1e6:.1f} MB too large for a page of {MAX_BYTES / 1e6:.0f} MB"
         )
     reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
     raise DiffractionError(
@@ -355,10 +355,11 @@ def _source(method: str, definitions: dict[str, str]) -> str:
     return "".join((*parts.values(), conditional))
 
 
-def _omissions(scene: RealtimeScene, emitters: Emitters | None) -> list[str]:
+def _omissions(packed: PackedScene) -> list[str]:
     """Return the parts of the scene that the page leaves out, in a few words each."""
+    scene = packed.scene
     omissions = [text for text in scene.omissions if text not in scene.lighting.omissions]
-    omissions += [] if emitters is None else emitters.omissions
+    omissions += [] if packed.emitters is None else packed.emitters.omissions
     return list(dict.fromkeys(omissions))
 
 

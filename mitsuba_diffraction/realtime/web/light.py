@@ -13,16 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
-from ..glsl.bounces import pack_bounces
-from ..glsl.emitters import Emitters
 from ..glsl.lights import Lamp
+from ..glsl.packed_scene import PackedScene
 from ..glsl.packing import WAVENUMBERS, pack_responses
-from ..glsl.progressive import pack_solid, pack_surroundings
-from ..glsl.scene import RealtimeScene
-from ..glsl.shader_materials import Diffracting
 from ..glsl.source import plain_source
-from ..glsl.surroundings import flat_shapes
-from ..glsl.texels import Packed, shortened
+from ..glsl.texels import shortened
 from .sections import Sections, converted, packed_array, packed_mesh, packed_parts
 
 #: Number of lights in the sequence; their mean is the scene's light.
@@ -32,16 +27,15 @@ _FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # wavelengths of monochromatic light, 
 _MIN_COSINE = float(np.cos(np.radians(3.0)))  # lights within this angle of a direction move with it
 
 
-def packed_light(
-    scene: RealtimeScene, emitters: Emitters | None, sections: Sections
-) -> dict[str, Any]:
+def packed_light(packed: PackedScene, sections: Sections) -> dict[str, Any]:
     """Return the page's data of light, as JSON types.
 
     `own` are the scene's lights without extent, which light the picture while something moves.
     `samples` is the sequence; each light has the number of the light in `own` that it moves with
     (−1: none).
     """
-    lights = scene.lighting.lights
+    lighting, emitters = packed.scene.lighting, packed.emitters
+    lights = lighting.lights
     sequence = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
     if len({(s.place.tobytes(), np.asarray(s.spectrum).tobytes()) for s in sequence}) == 1:
         sequence = sequence[:1]
@@ -55,7 +49,7 @@ def packed_light(
             | {"of": _owner(light, lights), "density": light.density}
             for n, light in enumerate(sequence)
         ],
-        "sky": scene.lighting.sky.ravel().tolist(),
+        "sky": lighting.sky.ravel().tolist(),
         "spectra": None if values is None else sections.add(packed_array(values)),
         "columns": 0 if values is None else values.shape[1],
         "channels": 3 if spectra and [*lights, *sequence][0].spectrum.ndim > 1 else 1,
@@ -92,62 +86,43 @@ def _monochrome() -> NDArray[np.float64]:
 
 
 def packed_surroundings(
-    mitsuba_scene: Any,
-    scene: RealtimeScene,
-    emitters: Emitters | None,
-    tables: Sequence[Diffracting],
-    sections: Sections,
-    bounces: bool,
+    packed: PackedScene, sections: Sections, bounces: bool
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
     """Return the page's data of surroundings, as JSON types, and definitions for the shaders.
 
-    tables : one surface of each table, for directions of its lobes.
     bounces : whether light between surfaces is added.
 
     The data is None for a scene without light, and without `bounces` for a scene without
     environment and without shapes that emit light.
     """
-    environment = None if emitters is None else emitters.environment
-    if emitters is None or not (scene.glows or environment or bounces):
+    if packed.emitters is None or not (packed.looks_up or bounces):
         return None, {}
-    flats = flat_shapes(mitsuba_scene)
-    packed, solid = pack_surroundings(scene, emitters, flats), pack_solid(scene, flats)
+    parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
     if bounces:
-        packed |= pack_bounces(mitsuba_scene, scene)
-    lobes = [_lobes(surface) for surface in tables]
-    definitions = {k: v for part in (packed, solid, *lobes) for k, v in part.definitions.items()}
+        parts |= packed.bounces
+    # rounding adds no bias: shaders divide by the rounded densities
+    digits: dict[str, Any] = {"lobe_places": np.float16, "lobe_densities": shortened}
+    lobes = [converted(part, digits) for part in packed.lobes]
     background = None
-    if environment is not None:
+    if packed.emitters.environment is not None:
         shared = ("library.glsl", "surroundings.glsl")
-        background = plain_source("background.frag", shared, packed.definitions, "web")
+        background = plain_source("background.frag", shared, packed.around.definitions, "web")
     return {
-        "parts": packed_parts(_coarser(packed | solid), sections),
+        "parts": packed_parts(parts, sections),
         "lobes": [packed_parts(part, sections) for part in lobes],
         "emitting": [
             {"mesh": packed_mesh(glow.vertices, sections), "radiance": glow.radiance.tolist()}
-            for glow in scene.emitting
+            for glow in packed.scene.emitting
         ],
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
-    }, definitions  # fmt: skip
+    }, {name: text for part in (parts, *lobes) for name, text in part.definitions.items()}
 
 
-def _coarser(packed: Packed) -> Packed:
+def _coarser(obstacles: NDArray[Any]) -> NDArray[np.uint8]:
     """Round distances to obstacles down to three binary digits, which take half the memory.
 
     Rays step by less than before, hence meet the same obstacles.
     """
-
-    def rounded(obstacles: NDArray[Any]) -> NDArray[np.uint8]:
-        steps = obstacles.astype(np.int64)
-        return (steps - steps % (1 << np.maximum(np.frexp(steps)[1] - 3, 0))).astype(np.uint8)
-
-    return converted(packed, {"obstacles": rounded})
-
-
-def _lobes(surface: Diffracting) -> Packed:
-    """Pack directions of lobes and their densities in fewer digits.
-
-    Rounding adds no bias: shaders divide by the rounded densities.
-    """
-    return converted(surface.lobes(), {"lobe_places": np.float16, "lobe_densities": shortened})
+    steps = obstacles.astype(np.int64)
+    return (steps - steps % (1 << np.maximum(np.frexp(steps)[1] - 3, 0))).astype(np.uint8)

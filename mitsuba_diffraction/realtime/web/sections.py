@@ -56,17 +56,18 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
     return Section(data, layout)
 
 
-def packed_series(rows: NDArray[np.float16 | np.uint32]) -> Section:
+def packed_series(rows: NDArray[np.float16 | np.float32]) -> Section:
     """Compress rows of numbers as integers, and the binary exponent of each row's step.
 
-    rows : (n, m) half floats, or words of two upper halves of floats each (`texels.paired`). Few
+    rows : (n, m) half floats, or floats that store two upper halves each (`texels.paired`). Few
         binary digits in a row make small integers.
     """
-    words = rows.dtype == np.uint32
+    words = rows.dtype == np.float32
     if words:
-        bits = rows.astype(np.uint32)
+        bits = rows.view(np.uint32)
         pairs = np.stack([bits << 16, bits & np.uint32(0xFFFF0000)], axis=-1)
-        values = pairs.reshape(len(rows), -1).view(np.float32)
+        values = pairs.reshape(len(rows), -1).view(np.float32).copy()
+        values[np.abs(values) < 1e-30] = 0.0
     else:
         values = rows.astype(np.float32)
     # frexp: |x| = m 2^e with 24-bit m; the step is the lowest bit that any number of a row has
@@ -215,8 +216,6 @@ def _texture(texture: Texture, sections: Sections, section: Section | None) -> d
         return entry | {"kind": "picture", "section": sections.add(picture)}
     data = texture.data
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
-    if data.dtype == np.uint32:
-        entry["kind"] = "words"
     section = section or packed_array(as_columns(data, channels))
     return entry | {"section": sections.add(section)}
 

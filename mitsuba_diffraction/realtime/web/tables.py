@@ -29,7 +29,7 @@ DIGITS = 9
 #: Smallest rounding step relative to a table's largest number: more digits are not visible.
 FLOOR = 2.0**-19
 
-_FEWER = range(4)  # digits that may be left out of tables that are too large for a page
+_FEWER = 4  # numbers of digits that are tried for tables that are too large for a page
 
 _ORDERS = 5  # largest number of orders that the page names
 _LARGE = 1 << 20  # least number of entries of rounded textures
@@ -44,6 +44,11 @@ class WebTable:
     packed: Packed  # textures, uniforms and definitions for the shader
     sections: dict[str, Section]  # compressed textures, by name
     loss: tuple[float, float]  # mean and 99th percentile of ΔE2000 from the exact table
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all sections."""
+        return sum(len(section.data) for section in self.sections.values())
 
 
 def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
@@ -141,27 +146,18 @@ def rounded(values: NDArray[np.floating], bits: int, floor: float = 0.0) -> NDAr
 
 def fitting_tables(
     methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
-) -> dict[tuple[str, int], WebTable] | int:
+) -> dict[str, list[WebTable]] | int:
     """Round tables for all methods to `DIGITS`, or to fewer if they exceed `room` bytes.
 
-    Returns the tables by method and number, or the number of bytes that is needed if none fit.
+    Returns the tables by method, or the number of bytes that is needed if none fit.
     """
     needed = 0
-    for fewer in _FEWER:
-        rounded_tables: dict[tuple[str, int], WebTable] = {}
-        for method in methods:
-            for number, table in enumerate(tables):
-                done = len(rounded_tables)
-                digits = DIGITS - fewer
-                progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
-                rounded_tables[method, number] = web_table(method, table, digits)
-        needed = sum(
-            len(section.data)
-            for web in rounded_tables.values()
-            for section in web.sections.values()
-        )
+    for digits in range(DIGITS, DIGITS - _FEWER, -1):
+        progress(0, 0, f"rounding tables to {digits} digits")
+        fitting = {m: [web_table(m, table, digits) for table in tables] for m in methods}
+        needed = sum(table.nbytes for rounded in fitting.values() for table in rounded)
         if needed <= room:
-            return rounded_tables
+            return fitting
     return needed
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,6 +13,12 @@ from ...errors import DiffractionError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+#: Angle (rad) between the sides of an edge from which on it is sharp, if the sides have vertices of
+#: their own there, as a box has where its texture is cut.
+CREASE = math.radians(60.0)
+#: Vertices at one place with which others share their normals: a sphere's pole has some dozens.
+_MOST_AT_ONE_PLACE = 64
 
 
 @dataclass(frozen=True)
@@ -60,23 +67,38 @@ def across(corners: Floats) -> Floats:
 
 
 def vertex_normals(positions: Floats, faces: Ints) -> Floats:
-    """Return smooth unit normals (n, 3): the mean over the triangles at a vertex's place.
+    """Return smooth unit normals (n, 3): the mean over the triangles at a vertex.
 
     Triangles count by their angles there (Thürmer and Wüthrich 1998, *Computing vertex normals from
     polygonal facets*), so that it does not matter how a polygon is cut. Vertices at one place, as
-    along seams of the texture, have one normal.
+    along seams of the texture, share their normals where these differ by less than `CREASE`.
     """
-    places, welded = np.unique(positions, axis=0, return_inverse=True)
-    corners = positions[faces]
-    total = np.zeros_like(places)
+    corners, own = positions[faces], np.zeros_like(positions)
     with np.errstate(invalid="ignore", over="ignore"):  # readers refuse what is not finite
         front = unit(across(corners))
         for n in range(3):
             one, other = (unit(corners[:, (n + k) % 3] - corners[:, n]) for k in (1, 2))
             angle = np.arccos(np.clip((one * other).sum(axis=1, keepdims=True), -1.0, 1.0))
-            np.add.at(total, welded.reshape(-1)[faces[:, n]], angle * front)
-    normals = np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
-    return np.asarray(normals[welded.reshape(-1)])
+            np.add.at(own, faces[:, n], angle * front)
+    total = _shared(own, np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1))
+    return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
+
+
+def _shared(normals: Floats, places: Ints) -> Floats:
+    """Return the sum of the normals at each vertex's place that are within `CREASE` of its own."""
+    order = np.argsort(places, kind="stable")
+    counts = np.bincount(places)
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(order)) - first[places[order]]
+    total = np.where(ranks[:, None] < _MOST_AT_ONE_PLACE, 0.0, normals)
+    directions = unit(normals)
+    for rank in range(min(int(counts.max()), _MOST_AT_ONE_PLACE)):
+        (here,) = np.nonzero(counts[places] > rank)
+        there = order[first[places[here]] + rank]
+        near = (directions[here] * directions[there]).sum(axis=1) > math.cos(CREASE)
+        total[here] += np.where(near[:, None], normals[there], 0.0)
+    return total
 
 
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:

@@ -58,7 +58,7 @@ def plate_scene(table_file: Path, width: int = 160, **parts: Any) -> Any:
 def truth(renderer: Renderer, spp: int) -> NDArray[np.float64]:
     """Direct light by the path tracer, a pixel the mean over its square."""
     sensor, integrator = box_sensor(renderer.camera), mi.load_dict({"type": "direct"})
-    image = mi.render(renderer.mitsuba_scene, sensor=sensor, integrator=integrator, spp=spp)
+    image = mi.render(renderer.packed.mitsuba_scene, sensor=sensor, integrator=integrator, spp=spp)
     return np.array(image, np.float64)
 
 

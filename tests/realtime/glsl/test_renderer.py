@@ -118,13 +118,12 @@ def path_traced(scene: Any, spp: int, seed: int) -> NDArray[np.float64]:
 def renderer(gl: Any, some_variant: str, table_file: Path, tmp_path: Path) -> Any:
     scene = mi.load_dict(several_surfaces(table_file, tmp_path))
     made = Renderer(scene, context=gl)
-    made.mitsuba_scene = scene
     yield made
     made.release()
 
 
 def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
-    scene = with_lights(renderer.mitsuba_scene, renderer.camera, renderer.lights)
+    scene = with_lights(renderer.packed.mitsuba_scene, renderer.camera, renderer.lights)
     halves = [path_traced(scene, 1024, seed) for seed in (1, 2)]
     reference = 0.5 * (halves[0] + halves[1])
     every = np.ones(len(scene.shapes()), bool)

@@ -1,15 +1,9 @@
 // `fast`: colours under daylight, summed over all wavelengths in advance, like plugin/rgb.py. Bins
 // lie on rings even in ln r, each with its number of azimuths; a bin is a series of five terms in z.
 
-#ifdef FLOAT_TEXTURES            // float textures, which every loader supports
-uniform sampler2D colours;      // four texels per bin
-uniform sampler2D rings;        // first bin of a ring, its azimuths, azimuths of the next ring
-uniform sampler2D glossy;       // order 0, radii × zs
-#else
-uniform usampler2D colours;     // two texels per bin: term t of channel c is number 5c + t
-uniform usampler2D rings;       // first bin of a ring; azimuths of the ring and the next one
-uniform usampler2D glossy;      // order 0, radii × zs: colours of this z and the next
-#endif
+uniform sampler2D colours;      // two texels per bin: term t of channel c is number 5c + t
+uniform sampler2D rings;        // first bin of a ring; azimuths of the ring and the next one
+uniform sampler2D glossy;       // order 0, radii × zs: colours of this z and the next
 uniform int bins;               // number of bins in one interval of z
 uniform int last_ring;
 uniform float smallest_radius;
@@ -23,19 +17,12 @@ uniform float sigma_0;          // of order 0's window, µm
 
 void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
 {
-#ifdef FLOAT_TEXTURES
-    a += weight * entry(colours, 2 * bin);
-    b += weight * entry(colours, 2 * bin + 1);
-    c += weight * entry(colours, 2 * bin + 2);
-    d += weight * entry(colours, 2 * bin + 3);
-#else
-    uvec4 low = entry(colours, bin);
-    uvec4 high = entry(colours, bin + 1);
+    vec4 low = entry(colours, bin);
+    vec4 high = entry(colours, bin + 1);
     a += weight * vec4(upper_halves(low.x), upper_halves(low.y));
     b += weight * vec4(upper_halves(low.z), upper_halves(low.w));
     c += weight * vec4(upper_halves(high.x), upper_halves(high.y));
     d += weight * vec4(upper_halves(high.z), upper_halves(high.w));
-#endif
 }
 
 void add_azimuth(int start, float azimuths, float turn, float share,
@@ -71,22 +58,17 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     float share = min(ring - lower, 1.0);
     float turn = turn_of(uv);
 
-#ifdef FLOAT_TEXTURES
-    uvec3 ring_bins = uvec3(entry(rings, int(lower)).xyz);
-    uvec2 pair = uvec2(ring_bins.x, ring_bins.y | ring_bins.z << 16);
-#else
-    uvec2 pair = entry(rings, int(lower)).xy;
-#endif
-    uint azimuths = pair.y & 0xffffu;
-    int start = interval * bins + int(pair.x);
+    vec3 ring_bins = entry(rings, int(lower)).xyz;
+    float azimuths = ring_bins.y;
+    int start = interval * bins + int(ring_bins.x);
     vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0);
     int next = start + int(azimuths) + 1;  // a ring repeats its first bin at its end
 #ifdef GLANCE  // the nearest alone: a picture that is gone at once
-    float count = float(share > 0.5 ? pair.y >> 16 : azimuths);
+    float count = share > 0.5 ? ring_bins.z : azimuths;
     add_bin(2 * ((share > 0.5 ? next : start) + int(turn * count + 0.5)), 1.0, a, b, c, d);
 #else
-    add_azimuth(start, float(azimuths), turn, 1.0 - share, a, b, c, d);
-    add_azimuth(next, float(pair.y >> 16), turn, share, a, b, c, d);
+    add_azimuth(start, azimuths, turn, 1.0 - share, a, b, c, d);
+    add_azimuth(next, ring_bins.z, turn, share, a, b, c, d);
 #endif
     vec4 first = vec4(1.0, t, t2, t3);
     vec3 sum = vec3(dot(a, first) + b.x * t4,
@@ -98,13 +80,9 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
 // Interpolate order 0 between an entry and that of the next z.
 vec3 glossy_between(int index, float t)
 {
-#ifdef FLOAT_TEXTURES
-    return mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t);
-#else
-    uvec4 pair = entry(glossy, index);
+    vec4 pair = entry(glossy, index);
     vec2 middle = upper_halves(pair.y);
     return mix(vec3(upper_halves(pair.x), middle.x), vec3(middle.y, upper_halves(pair.z)), t);
-#endif
 }
 
 // Order 0, whose lobe is about a degree wide.

@@ -8,20 +8,12 @@ vec4 entry(sampler2D list, int i)
     return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
 }
 
-#ifndef FLOAT_TEXTURES
-
-uvec4 entry(usampler2D list, int i)
+// Two numbers whose upper halves a float stores.
+vec2 upper_halves(float stored)
 {
-    return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
-}
-
-// Two floats whose upper halves a word stores.
-vec2 upper_halves(uint word)
-{
+    uint word = floatBitsToUint(stored);
     return uintBitsToFloat(uvec2(word << 16, word & 0xffff0000u));
 }
-
-#endif
 
 // Interpolate along a row of a texture; share: from 0 in its first column to 1 in its last one.
 vec4 in_row(sampler2D table, float share, int row)

@@ -30,8 +30,8 @@ function restored(planes, layout) {
   return array;
 }
 
-// Decode integers with the exponent of their step in the last column: floats, or words of the upper
-// halves of two.
+// Decode integers with the exponent of their step in the last column: floats, or floats that store
+// the upper halves of two.
 function seriesOf(array, { rows, columns, series }) {
   const floats = new Float32Array(rows * (columns - 1));
   let to = 0;
@@ -41,7 +41,8 @@ function seriesOf(array, { rows, columns, series }) {
   }
   if (series === "half") return floats;
   const bits = new Uint32Array(floats.buffer);
-  return Uint32Array.from({ length: bits.length / 2 }, (_, n) => (bits[2 * n] >>> 16) | (bits[2 * n + 1] & 0xffff0000));
+  const words = Uint32Array.from({ length: bits.length / 2 }, (_, n) => (bits[2 * n] >>> 16) | (bits[2 * n + 1] & 0xffff0000 || 0x800000));
+  return new Float32Array(words.buffer);
 }
 
 class Data {

@@ -96,10 +96,8 @@ async function uploadTexture(gl, data, entry) {
       bytes: { internal: [gl.R8, gl.RG8, gl.RGBA8], type: gl.UNSIGNED_BYTE },
       half: { internal: [gl.R16F, gl.RG16F, gl.RGBA16F], type: gl.HALF_FLOAT },
       single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
-      words: { internal: [gl.R32UI, gl.RG32UI, gl.RGBA32UI], type: gl.UNSIGNED_INT },
     }[entry.kind];
-    const words = [gl.RED_INTEGER, gl.RG_INTEGER, gl.RGBA_INTEGER];
-    const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
+    const format = [gl.RED, gl.RG, gl.RGBA][n];
     const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     const kind = numbers instanceof Float32Array ? gl.FLOAT : type; // half floats may come as floats

@@ -1,0 +1,95 @@
+"""`mitsuba-diffraction scatter`: power spectrum and scatter of a rough mirror."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from . import options
+from .console import Bar
+from .report import Figures, check_outputs, output_name, save_figure
+
+#: He-Ne laser, nm.
+_WAVELENGTH = 632.8
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "scatter", run, "power spectrum and scatter of a rough mirror",
+        "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
+        "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
+        "an ABg model, at normal incidence and over the reflectance.",
+        options.SOURCE,
+        ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
+         "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
+        ("--wavelength NM", "wavelengths in vacuum", options.numbers, (_WAVELENGTH,),
+         {"dest": "wavelengths"}),
+    )  # fmt: skip
+    options.add_table(parser, ("coherence_width",))
+    options.add_json(parser)
+    options.add_heights(parser)
+
+
+def run(args: argparse.Namespace) -> Figures:
+    """Write the spectrum, and return the figures."""
+
+    def files(output: Path) -> list[Path]:
+        return [output, output.with_suffix(".png")]
+
+    output = output_name(args.output, Path(f"{args.source.stem}-scatter.csv"), files)
+    check_outputs(files(output))
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    from ..atomic import atomic_path
+    from ..heights.scatter import abg_model, power_spectrum, rayleigh_rice_scatter
+    from ..settings import TableSettings
+    from ..tables.build.build import build_with
+    from ..tables.powers import order_0_power
+
+    field, settings = options.load_patch(args)
+    spectrum = power_spectrum(field)
+    ends = min(args.wavelengths) - 1.0, max(args.wavelengths) + 1.0
+    with Bar(args) as bar:
+        table = build_with(field, TableSettings(**settings | {"wavelength_range": ends}), bar)
+    rows: list[dict[str, Any]] = []
+    for wavelength in args.wavelengths:
+        model = abg_model(spectrum, wavelength)
+        kappa = 4e3 * np.pi / wavelength
+        rows.append({
+            "wavelength": wavelength,
+            "tis_rayleigh_rice": rayleigh_rice_scatter(field, wavelength),
+            "tis_table": 1.0 - float(order_0_power(table, kappa)),
+            **model._asdict(),
+        })  # fmt: skip
+    with atomic_path(output) as temporary:
+        np.savetxt(
+            temporary, np.column_stack([spectrum.frequency, spectrum.density]), "%.7g", ",",
+            header="frequency_per_um,psd_um4", comments="", encoding="utf-8",
+        )  # fmt: skip
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    axes.loglog(spectrum.frequency, spectrum.density, label="heights")
+    lam = 1e-3 * rows[0]["wavelength"]
+    beta = np.geomspace(rows[0]["range"][0], rows[0]["range"][1], 64)
+    fitted = rows[0]["a"] / (rows[0]["b"] + beta ** rows[0]["g"])
+    axes.loglog(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
+    axes.set(xlabel="spatial frequency, 1/µm", ylabel="power spectral density, µm⁴")
+    axes.legend()
+    save_figure(output.with_suffix(".png"), figure)
+    short, long = spectrum.band
+    print(f"{args.source} -> {output}, {output.with_suffix('.png')}")
+    print(
+        f"  heights   {1e3 * spectrum.rms:.3g} nm RMS, slope {spectrum.slope:.3g}, spatial "
+        f"wavelengths {short:.3g} to {long:.3g} µm"
+    )
+    for row in rows:
+        print(
+            f"  {row['wavelength']:g} nm  TIS {row['tis_rayleigh_rice']:.3g} by Rayleigh-Rice, "
+            f"{row['tis_table']:.3g} of the table; A {row['a']:.3g} 1/sr, B {row['b']:.3g}, g "
+            f"{row['g']:.3g} for |β − β₀| {row['range'][0]:.2g} to {row['range'][1]:.2g}, within "
+            f"{row['error']:.0%}"
+        )
+    return {"rms_um": spectrum.rms, "slope": spectrum.slope, "band_um": list(spectrum.band),
+            "wavelengths": rows}  # fmt: skip

@@ -1,0 +1,37 @@
+"""`scatter`: spectrum, scatter and ABg model of a rough mirror."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.columns import read_columns
+
+pytestmark = pytest.mark.thorough
+
+RECIPE = """generator = "rough"
+[arguments]
+extent = 40.0
+pixels = 192
+rms = 0.003
+slope = 1.0
+"""
+
+
+def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mirror.toml").write_text(RECIPE)
+    ran = run("scatter", "mirror.toml", "--wavelength", "500,632.8", "--json", "figures.json")
+    assert ran.code == 0, ran.err
+    assert "Rayleigh-Rice" in ran.out
+    columns = read_columns("mirror-scatter.csv").of(("frequency_per_um", "psd_um4"))
+    assert (np.diff(columns[:, 0]) > 0).all()
+    assert (tmp_path / "mirror-scatter.png").stat().st_size > 1000
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["rms_um"] == pytest.approx(0.003, rel=0.05)
+    for row in figures["wavelengths"]:
+        # the table is scalar: without cosines, and with what roughness below λ scatters
+        assert 1.0 < row["tis_table"] / row["tis_rayleigh_rice"] < 1.5
+        assert row["g"] == pytest.approx(2.0, abs=0.3)

@@ -1,0 +1,44 @@
+"""Rough mirrors: their spectrum, RMS and band."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError, gratings
+from mitsuba_diffraction.heights.scatter import power_spectrum
+
+
+def test_heights_have_the_rms_that_is_asked_for_and_a_k_correlation_spectrum():
+    field = gratings.rough(40.0, 256, 3, rms=0.004, correlation=1.5, slope=1.6)
+    # heights are rounded to a picometre
+    assert field.heights.std() == pytest.approx(0.004, abs=1e-6)
+    found = power_spectrum(field)
+    model = (1.0 + (2.0 * np.pi * 1.5 * found.frequency) ** 2) ** -1.3
+    ratio = found.density / model
+    # rings above 1/µm have 600 independent modes and more, which scatter by 4 %; the last is cut
+    wide = (found.frequency > 1.0) & (found.frequency < found.frequency[-1])
+    assert ratio[wide].std() / ratio[wide].mean() < 0.06
+
+
+def test_a_fractal_falls_as_a_power_of_the_frequency():
+    found = power_spectrum(gratings.rough(40.0, 256, 1, correlation=1e4, slope=1.2))
+    wide = found.frequency > 0.2
+    exponent = np.polyfit(np.log(found.frequency[wide]), np.log(found.density[wide]), 1)[0]
+    assert exponent == pytest.approx(-2.2, abs=0.05)
+
+
+def test_a_band_holds_all_of_the_power():
+    field = gratings.rough(40.0, 256, rms=0.004, band=(1.0, 8.0))
+    power = np.abs(np.fft.fft2(field.heights)) ** 2
+    axis = np.fft.fftfreq(256, 40.0 / 256)
+    radius = np.hypot(axis, axis[:, None])
+    inside = (radius >= 1 / 8.0) & (radius <= 1.0)
+    # but for rounding to a picometre
+    assert power[inside].sum() > (1 - 1e-5) * power.sum()
+
+
+@pytest.mark.parametrize("wrong", [{"slope": 9.0}, {"rms": -1.0}, {"band": (0.01, 0.02)}])
+def test_what_the_patch_cannot_hold_is_refused(wrong):
+    with pytest.raises(DiffractionError, match=f"rough: {next(iter(wrong))}"):
+        gratings.rough(40.0, 64, **wrong)
