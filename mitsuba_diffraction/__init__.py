@@ -24,7 +24,7 @@ spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
 hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
-preset             a dictionary for `mi.load_dict` of a named look, e.g. preset("cd")
+preset             a dictionary for `mi.load_dict` of a preset, e.g. preset("cd")
 DiffractionError   error of every bad input, in one line
 
 Importing the package and Mitsuba, in either order, registers the BSDF plugin `diffraction` in the
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from .analysis.spectra import spectrum
     from .heights import HeightField, gratings
     from .orders import OrderTable
-    from .orders.listed import read_orders
+    from .orders.imported import read_orders
     from .orders.solve import profiles
     from .orders.solve.crossed import solve_crossed
     from .orders.solve.orders import solve_orders
@@ -122,7 +122,7 @@ _NAMES = {
     "bsdf_dict": "plugin.dictionary",
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
-    "read_orders": "orders.listed",
+    "read_orders": "orders.imported",
     "solve_crossed": "orders.solve.crossed",
     "solve_orders": "orders.solve.orders",
     "spectrum": "analysis.spectra",

@@ -152,7 +152,7 @@ class TableSettings:
     """
 
     coherence_width: str | float = _setting(
-        "auto", _width, "µm over which the light is coherent, 4σ of its window; auto is 65",
+        "auto", _width, "coherence width, µm, 4σ of its window; auto is 65",
         f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
         metavar="auto|W", type=str,
     )  # fmt: skip
@@ -186,8 +186,8 @@ class TableSettings:
         None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
     )
     windows: str | float = _setting(
-        "auto", _windows, "µm, width of the windows of a scan, whose powers are averaged; auto: "
-        "the scan's smaller side up to 32 µm, or half the side", "auto, or a positive number of µm",
+        "auto", _windows, "width of the windows of a scan, µm; auto: the smaller side up to 32 µm, "
+        "or half the side", "auto, or a positive number of µm",
         metavar="auto|W", type=str,
     )  # fmt: skip
     window_width: float | None = _setting(

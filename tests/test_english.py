@@ -12,8 +12,6 @@ from tests.support.docstrings import Docstring, docstrings
 
 # Part of all docstrings, private code included, that may begin vaguely.
 ALLOWED = 0.02
-# Phrases such as "those of" or "what is" in docstrings and messages avoid the noun; 143 today.
-MOST_PHRASES = 150
 
 
 @pytest.fixture(scope="module")

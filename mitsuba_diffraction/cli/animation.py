@@ -14,11 +14,11 @@ from .options import number_between, whole_number
 #: The number of frames and the parameters that change.
 ANIMATION = (
     ("--frames N", "render N pictures, frame_0000.png", whole_number(1)),
-    ("--animate KEY=FROM:TO", "change a parameter of the scene from the first frame to the last, "
-     "e.g. sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
+    ("--animate KEY=FROM:TO", "parameter that changes from the first frame to the last, e.g. "
+     "sun_elevation=10:60 or camera=0,-9,3:4,-9,3; may be given several times",
      [scene_options.change]),
-    ("--turn KEY", "turn an angle of the scene, in degrees, once around from its value on, e.g. "
-     "sun_azimuth for the light or turn for the snake; may be given several times", [str]),
+    ("--turn KEY", "angle of the scene, degrees, that turns once around, e.g. sun_azimuth; may be "
+     "given several times", [str]),
     ("--exr", "write a linear EXR of each frame, too", bool),
     ("--fps N", "frames a second; default: 24", number_between(1, 100)),
 )  # fmt: skip

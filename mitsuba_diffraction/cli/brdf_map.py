@@ -39,23 +39,23 @@ _OF_THE_BSDF = (
 #: SOURCE or --preset; see `take_source`.
 SURFACE_SOURCE = (
     ("SOURCE", "table, recipe (.toml), or heights of any format", Path, None, {"nargs": "?"}),
-    ("--preset NAME", "instead of SOURCE: a named look, which 'mitsuba-diffraction presets' lists; "
+    ("--preset NAME", "instead of SOURCE: a preset, which 'mitsuba-diffraction presets' lists; "
      "options of the surface change it"),
 )  # fmt: skip
 #: Options of a surface's material and layers, by the plugin's names.
 MATERIAL = (
-    ("--material MATERIAL", f"{', '.join(TISSUES)}; an index, 1.56 or 1.56+0.05i; a conductor, "
-     "gold or Au; or none for a reflectance of 1; default: a dielectric of --int-ior"),
+    ("--material MATERIAL", f"{', '.join(TISSUES)}; index, 1.56 or 1.56+0.05i; conductor, gold; or "
+     "none (R = 1); default: --int-ior"),
     ("--int-ior N", "index of the dielectric at all wavelengths, or its name; default: 1.5, as in "
      "scenes"),
-    ("--ext-ior N", "index of the medium that light comes and goes in, or its name: water for an "
-     "animal under water; default: air"),
+    ("--ext-ior N", "refractive index of the surrounding medium, or its name: water for an animal "
+     "under water; default: air"),
     ("--coat-ior N", "index of a flat clear coat over the surface, or its name: water on a wet "
      "animal"),
     ("--layers TOML", "stack of thin layers on the surface; parameter layers in "
      "docs/parameters.md"),
-    ("--pigment COLOUR|CSV", "diffuse pigment beneath a clear material: a grey from 0 to 1, "
-     "'r,g,b', sienna, or a file of wavelengths (nm) and reflectances; default: none"),
+    ("--pigment COLOUR|CSV", "diffuse pigment beneath a clear material: grey, 'r,g,b', sienna, or "
+     "a file of wavelengths (nm) and reflectances; default: none"),
 )  # fmt: skip
 #: See `gain_of`.
 RELATIVE = (
@@ -103,7 +103,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if no look has the name, the pigment is a picture, or an option for
+    Raises a DiffractionError if no preset has the name, the pigment is a picture, or an option for
     reading heights does not fit.
     """
     if (args.source is None) == (args.preset is None):

@@ -47,7 +47,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_options(
         group,
         ("--angles FIRST:LAST", "viewing angles, degrees, positive away from the light; default: "
-         "from where the order of the patch's own period ends, or -80, to the mirror direction",
+         "the order of the patch's own period, to the mirror direction",
          options.limits),
         ("--angle-step DEG", "", float, 0.1),
         ("--order M", "order that is followed", int, 1),

@@ -54,21 +54,19 @@ HEIGHTS: dict[str, tuple[str, str]] = {
     "channel": ("C", "name or index of the channel; default: the heights"),
     "crop": (
         "W[,H[,X,Y]]",
-        "µm, crop to a central region, or to one with the lower left corner X, Y; default: all of "
-        "the patch",
+        "size of the region to keep, µm, central or with the lower left corner X, Y; default: all",
     ),
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
     "level": (
         "METHOD",
-        "plane: subtract the best plane; quadratic: a scanner's arc as well; lines: also align the "
-        "scan lines; none; default: plane if "
-        "the tilt of a file shows",
+        "surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then a plane) or "
+        "none; default: plane if a tilt shows",
     ),
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
     "periodic": (
         "METHOD",
-        "statement about the edges: exact, whole periods of a surface that repeats; open, a part "
-        "of a larger surface; default: open, of a file",
+        "edges: exact, whole periods of a surface that repeats; open, part of a larger surface; "
+        "default: open, of a file",
     ),
 }
 #: Settings of a table.
@@ -315,7 +313,7 @@ def table_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
     """Add the direction of the light in degrees; without `phi` it is across the patch's grooves."""
-    azimuth = "azimuth of the light, from the patch's x axis towards y"
+    azimuth = "azimuth of the light from x towards y, degrees"
     if phi is None:
         azimuth += "; default: across the grooves if there are any, or 0"
     add_options(

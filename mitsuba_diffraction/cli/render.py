@@ -47,15 +47,13 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "files while parameters of the scene change; existing frames with the same "
         "settings are kept, so an interrupted run can be continued.",
         *scene_options.SCENE,
-        ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: the scene's name "
-         "with .exr in the current folder. With --frames: a folder, or a film, .webp, .gif or "
-         ".mp4, whose frames go into a folder of its name; default: the folder SCENE_frames", Path),
+        ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
+         ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
         *options.samples(1, None),
         ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
         options.VIEW,
-        ("--denoise", "write a denoised picture, too, with _denoised in its name (extra denoise); "
-         "with --frames, denoise each frame, all of one seed; the film gets the box filter, which "
-         "the denoiser needs", bool),
+        ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
+         "--frames, denoise each frame", bool),
         ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
          bool),
         ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "

@@ -46,12 +46,12 @@ SCENE = (
      Path),
     ("--patch FILE", "surface of a mesh: heights, recipe or table; pixel_size, max_height, "
      "material, up, turn and the lamp are set by -D", Path),
-    ("--preset [ID=]NAME[,NAME=VALUE...]", "instead of --patch: a named look, e.g. cd or "
-     "snake,height_scale=0.7, which 'mitsuba-diffraction presets' lists; of a scene, the look of "
-     f"the BSDF or shape of this id; default of ID: {SURFACE}", [str], None, {"dest": "presets"}),
-    ("--assign ID=FILE[,NAME=VALUE...]", "put a surface on the BSDF or shape of this id, e.g. "
-     "mat-Skin=scale.exr,int_ior=1.56; the scene's BSDF there lies beneath it, unless `material` "
-     "names a conductor; may be given several times", [definition], None, {"dest": "materials"}),
+    ("--preset [ID=]NAME[,NAME=VALUE...]", "preset instead of --patch, e.g. cd or "
+     "snake,height_scale=0.7; of a scene, for the BSDF or shape of this id; default of ID: "
+     "surface", [str], None, {"dest": "presets"}),
+    ("--assign ID=FILE[,NAME=VALUE...]", "surface on the BSDF or shape of this id, e.g. "
+     "mat-Skin=scale.exr,int_ior=1.56; may be given several times",
+     [definition], None, {"dest": "materials"}),
     MODE,
     ("-D --define KEY=VALUE", "set a parameter of the scene; may be given several times",
      [definition], None, {"dest": "parameters"}),

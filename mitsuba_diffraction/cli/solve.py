@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> Figures:
     source = Path(args.source)
     output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
-        from ..orders.listed import read_orders
+        from ..orders.imported import read_orders
 
         _check_import(args)
         check_outputs([output])

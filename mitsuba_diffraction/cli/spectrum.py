@@ -57,10 +57,10 @@ def _group(text: str) -> tuple[str, str]:
 #: Options of the measurement.
 _SPECTROMETER = (
     ("--light DEG", "angle of the lamp from the normal", float, 30.0),
-    ("--light-azimuth --azimuth DEG", "azimuth of the lamp from the patch's x axis towards y, or "
-     "auto: across the grooves of each scan's strongest grating", azimuth, 0.0),
-    ("--detector DEG ...", "angles of the detectors from the normal, positive on the far side from "
-     "the lamp, or ranges FIRST:LAST:STEP; default: where a mirror reflects the lamp to", _angles),
+    ("--light-azimuth --azimuth DEG", "azimuth of the lamp from x towards y, degrees, or auto: "
+     "across the grooves of the strongest grating", azimuth, 0.0),
+    ("--detector DEG ...", "angles of the detectors from the normal, positive away from the lamp, "
+     "or ranges FIRST:LAST:STEP; default: the mirror direction", _angles),
     ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
     ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
      ("white", "mirror", "none"), "white"),
@@ -80,26 +80,23 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
         f"their mean, and a second file the standard errors. {options.LIMITS}",
         options.files("tables, also of orders, recipes or heights", "*"),
-        ("--group NAME=PATTERN", "scans of one species, in place of FILE, e.g. --group "
-         "corn='corn/*.spm'; may be given several times: each has its columns, mean and errors",
+        ("--group NAME=PATTERN", "scans of one species instead of FILE, e.g. corn='corn/*.spm'; "
+         "may be given several times",
          [_group], None, {"dest": "groups"}),
         ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
          "repeatability", whole_number(2)),
-        ("--observer ANIMAL|CSV", "also quantum catches and contrasts (JND) of an eye: avian_uv, "
-         "avian_v, lizard, snake, dog, bee, human, or a file of wavelengths (nm) and a column of "
-         "sensitivities for each receptor"),
-        ("--illuminant LIGHT|CSV", "light of --observer: ideal, the same number of quanta at all "
-         "wavelengths; d55, sun; d65, sun and sky; d75, sky in open shade; leaves, a model of "
-         "shade under leaves; or a file of wavelengths (nm) and photons; default: ideal"),
+        ("--observer ANIMAL|CSV", "eye for quantum catches and contrasts (JND): avian_uv, "
+         "avian_v, lizard, snake, dog, bee, human, or a CSV of sensitivities"),
+        ("--illuminant LIGHT|CSV", "light of --observer: ideal (equal quanta), d55, d65, d75, "
+         "leaves, or a file of wavelengths (nm) and photons; default: ideal"),
         ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
-         "first, which share the noise; default: the eye's, docs/seen.md", _ratios),
+         "first, which share the noise; default: the eye's, docs/seen.md", options.numbers),
         ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
-         "default: 0.1", _ratios),
+         "default: 0.1", options.numbers),
         ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
          number_between(1e-4, 1e2)),
         ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
-         "2019), fitted to lamps from 0 to 60 degrees and detectors between them, beside the "
-         "mirror direction", bool),
+         "2019)", bool),
         ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
          "the current folder", options.path_ending_in(".csv")),
     )  # fmt: skip
@@ -226,14 +223,6 @@ def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]
 
 def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}.csv")
-
-
-def _ratios(text: str) -> tuple[float, ...]:
-    """Return the numbers of a list with commas."""
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"expected numbers, e.g. 1,1,2, got {text!r}") from error
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:

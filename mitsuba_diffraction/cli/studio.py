@@ -39,18 +39,17 @@ def _angles(text: str) -> tuple[str, str]:
 #: Options of `render`; see `take_studio`.
 STUDIO_OPTIONS = (
     ("--env FILE", "panorama (HDR, EXR) that lights the scene instead of lamps"),
-    ("--sun AZ,EL", "sun at this azimuth and elevation in degrees, azimuth 0 to the right and 90 "
-     "away from the camera; with a clear sky, or beside --env", _angles),
-    ("--finish", "material of --patch: a metal, one under clear lacquer, or keratin over pigment; "
-     "default: metal, or skin with a --base that is a colour", tuple(LOOKS)),
-    ("--base COLOUR|FILE|METAL", "pigment of a skin: 'r,g,b', '#804020', sienna, a picture (by the "
-     "mesh's texture coordinates) or the mesh's .glb, for its base colour; or name of the metal, "
-     "e.g. gold"),
+    ("--sun AZ,EL", "azimuth (0 right, 90 away from the camera) and elevation of a sun, degrees; "
+     "with a clear sky, or beside --env", _angles),
+    ("--finish", "material of --patch: metal, metal under clear lacquer, keratin over pigment; "
+     "default: metal, or skin with a coloured --base", tuple(LOOKS)),
+    ("--base COLOUR|FILE|METAL", "pigment of a skin: 'r,g,b', '#804020', sienna, a picture, the "
+     "mesh's .glb; or the metal, e.g. gold"),
     ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
     ("--orbit", "let the camera go around the mesh, or the surfaces of a scene that diffract, in "
      f"--frames ({_FRAMES}) pictures", bool),
-    ("--clamp L", "limit each sample to L times white, against bright dots; 200 leaves most of the "
-     "streaks that a structure makes of the sun", number_between(1e-3, 1e6)),
+    ("--clamp L", "limit of a sample, times white, against bright dots; 200 keeps most of a sun's "
+     "streaks", number_between(1e-3, 1e6)),
 )  # fmt: skip
 
 

@@ -38,10 +38,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--theta DEG", "angle of the light from the normal, across the strongest grating",
          number_between(0, 89), 30.0),
         ("--resolution N", "pixels of a map a side", whole_number(8), 160),
-        ("--repeats", "which scans are of one sample: those whose names differ in their last "
-         "number, or those of one folder", ("name", "folder"), "name"),
-        ("--crops N", "measure N crops of 10 µm of each scan, or as many as fit: compares scans of "
-         "different sizes, and gives errors of single scans", whole_number(1)),
+        ("--repeats", "scans of one sample: names that differ in their last number, or files of "
+         "one folder", ("name", "folder"), "name"),
+        ("--crops N", "number of crops of 10 µm of each scan, or as many as fit: compares scans "
+         "of different sizes", whole_number(1)),
         options.MODE,
     )  # fmt: skip
     group = parser.add_argument_group("the surface, of maps and numbers")

@@ -27,13 +27,13 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "(a torus excepted) every field has singular points, around which the patch turns.",
         ("MESH", "mesh to read", Path),
         ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
-        ("--along", "smooth: the field that turns least; x, y, z: that axis, laid onto the "
-         "surface; body: from one end of the body to the other", _GUIDES, "smooth"),
-        ("--rotate DEGREES", "angle from the field to the patch's x axis, counter-clockwise seen "
-         "from outside, e.g. -90 to lay its y axis along the field",
+        ("--along", "field of directions: smooth, turns least; x, y, z, an axis laid onto the "
+         "surface; body, from end to end", _GUIDES, "smooth"),
+        ("--rotate DEGREES", "angle from the field to the x axis, counter-clockwise from outside; "
+         "-90 lays the y axis along the field",
          number_between(-360, 360), 0.0),
-        ("--smoothing S", "distance within which the field may leave an axis or the body's "
-         "direction to stay smooth, as a share of the mesh's size", number_between(1e-4, 1), 0.03),
+        ("--smoothing S", "distance within which the field may leave its guide to stay smooth, as "
+         "share of the mesh's size", number_between(1e-4, 1), 0.03),
     )  # fmt: skip
     options.add_json(parser, "quality of the field")
 

@@ -139,6 +139,29 @@ def cosine_within(cosine: Number, n: Number) -> Number:
     return xp.sqrt(xp.maximum(cosine * cosine + (n * n - 1.0), 1e-12)) / n
 
 
+def beneath_amplitudes(cosine: Number, n: Number, index: Index) -> tuple[Number, Number]:
+    """Return r_s and r_p of a flat structure under a coat, as seen from outside.
+
+    T r/√(1 − R ρ): for a flat structure the sum over reflections between both is exact.
+
+    cosine : of the angle outside; n : of the coat; index : of the structure relative to the coat.
+    """
+    within, face = cosine_within(cosine, n), crossing(cosine, n)
+    found = []
+    for t, back, r in zip(
+        face[:2], face[2:], amplitudes(within, 1.0 - within * within, index), strict=True
+    ):
+        bounces = of(back).maximum(1.0 - back * back * squared(r), 1e-7)
+        found.append(r * (t * of(bounces).reciprocal(of(bounces).sqrt(bounces))))
+    return found[0], found[1]
+
+
+def beneath_reflectance(cosine: Number, n: Number, index: Index) -> Number:
+    """Return the reflectance of a flat structure under a coat, without the face's own light."""
+    s, p = beneath_amplitudes(cosine, n, index)
+    return 0.5 * (squared(s) + squared(p))
+
+
 def coated_reflectance(face: Number, beneath: Number) -> Number:
     """Return 1 − T T/(1 − R R), the reflectance of a flat coated interface.
 

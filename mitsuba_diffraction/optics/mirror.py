@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from .arithmetic import Number, of
 from .boundary import Geometry, Jones, facets
+from .coat import beneath_amplitudes
 from .fresnel import Index, amplitudes
 
 #: Least cosθm: 1 − cos² is below 1 in single precision, where an index of 1 is to reflect nothing.
@@ -99,6 +100,14 @@ def correction_within(
     return xp.where((into < 0.0) & (out < 0.0) | (into >= 0.0) & (out >= 0.0), visible, 0.0)
 
 
-def mirror(geometry: Geometry, cosine: Number, index: Index) -> Jones:
-    """Return U(ωo) diag(r_s, r_p) U(ωi) of a level facet, with Fresnel's r at cosθm."""
+def mirror(geometry: Geometry, cosine: Number, index: Index, coat: Number | None = None) -> Jones:
+    """Return U(ωo) diag(r_s, r_p) U(ωi) of a level facet, with Fresnel's r at cosθm.
+
+    geometry : of the directions at the facet.
+    cosine : of θm, outside of a coat.
+    index : of the structure, relative to the coat if there is one.
+    coat : index of the coat; None without one.
+    """
+    if coat is not None:
+        return facets(geometry, *beneath_amplitudes(cosine, coat, index))
     return facets(geometry, *amplitudes(cosine, 1.0 - cosine * cosine, index))

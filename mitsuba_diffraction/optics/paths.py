@@ -19,9 +19,9 @@ import numpy as np
 from . import boundary, through
 from .blend import Real
 from .boundary import Direction, Heights, Jones
-from .coat import cosine_within, crossing, refracted, transmittances, transmitted
+from .coat import beneath_reflectance, crossing, refracted, transmittances, transmitted
 from .fresnel import Filmed, reflectance
-from .mirror import correction_within, horizon_correction, mirror, mirror_cosine, outside_square
+from .mirror import correction_within, horizon_correction, mirror_cosine, outside_square
 from .stack import Stacked
 
 
@@ -191,11 +191,8 @@ class Path:
             return visible * np.where(leaves, self._flat(cosine), 1.0), none
         n = np.asarray(self.came.at_structure)
         face = visible * reflectance(cosine, n)
-        inside = boundary.geometry(refracted(wi, n), refracted(wo, n))
-        ends = (crossing(direction[2], n) for direction in (wi, wo))
         assert self.index is not None
-        facet = mirror(inside, cosine_within(cosine, n), self.index)
-        share = visible * boundary.power(transmitted(facet, inside, self.index, *ends))
+        share = visible * beneath_reflectance(cosine, n, self.index)
         return share, face
 
     def _flat(self, cosine: Real) -> Real | float:

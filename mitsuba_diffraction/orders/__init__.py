@@ -13,7 +13,9 @@ daylight       the sum of an order's lobe over daylight, for RGB variants
 grid           records of a table that its look-up interpolates
 lookup         look-up of cells and blocks, in NumPy and in kernels
 listed_lookup  the same of listed light
-listed         `read_orders`: a table of listed light, such as another program's efficiencies
+response       elements of Mueller matrices over cells, or of listed light
+listed         tables of listed light
+imported       `read_orders`: of another program's efficiencies, or of a bench
 lists          files of efficiencies, CSV and NetCDF, and their conventions
 listing        `list_orders`: a table's efficiencies as such a file
 bsdf           the BSDF `diffraction_orders` in Dr.Jit
@@ -24,7 +26,8 @@ from __future__ import annotations
 
 from .efficiency import efficiency, groove_efficiency, jones, mueller, polarised_efficiency
 from .file import load_orders, save_orders
-from .table import Band, CellResponse, ListedResponse, OrderTable
+from .response import Band, CellResponse, ListedResponse
+from .table import OrderTable
 
 __all__ = ["Band", "CellResponse", "ListedResponse", "OrderTable"]
 

@@ -26,7 +26,8 @@ from ..optics.coat import face_transmittance
 from ..optics.orders import port_power
 from . import cells
 from .cells import Array
-from .table import Band, OrderTable
+from .response import Band
+from .table import OrderTable
 
 #: Least normal parts, within over n and above, from which on reduced efficiencies are known at a
 #: node; nearer to grazing, where solutions keep a distance, they have the next node's.

@@ -15,7 +15,8 @@ from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import nearest_jones, nearest_pure, s_and_p
-from .table import ALONG, LINEAR, UNPOLARISED, ListedResponse, OrderTable
+from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
+from .table import OrderTable
 
 #: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
 _IN_PLANE = 1e-7
@@ -283,13 +284,14 @@ def _placed(light: _Light) -> _Placed:
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
-) -> AnyLookup:
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
+    chances: bool = False,
+) -> AnyLookup:  # fmt: skip
     """Return the look-up of a table, with its grid in a memory.
 
-    coated, elements : as for `grid.grid_of`.
+    coated, elements, chances : as for `grid.grid_of`.
     """
-    grid = grid_of(table, coated=coated, elements=elements)
+    grid = grid_of(table, coated=coated, elements=elements, chances=chances)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
     if isinstance(table.response, ListedResponse) and not coated:

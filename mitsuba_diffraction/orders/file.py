@@ -34,7 +34,8 @@ from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES
 from ..tables.fields import mapping
-from .table import Band, CellResponse, ListedResponse, OrderTable
+from .response import Band, CellResponse, ListedResponse
+from .table import OrderTable
 
 #: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
 #: and crossed gratings, which have other lights now.

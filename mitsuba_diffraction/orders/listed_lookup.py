@@ -12,7 +12,8 @@ from .cells import Array
 from .grid import OrderGrid
 from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
 from .polarised import ODD
-from .table import ListedResponse, OrderTable
+from .response import ListedResponse
+from .table import OrderTable
 
 _DEGREE = 180.0 / np.pi
 #: Against division by 0 along the grooves.
@@ -49,7 +50,7 @@ class ListedLookup:
     count : number of orders.
     """
 
-    coated = False
+    coated = has_chances = False
 
     def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         response = table.response

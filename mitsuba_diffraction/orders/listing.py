@@ -19,7 +19,8 @@ from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import MIN_ANGLE
 from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
-from .table import ListedResponse, OrderTable, orders_between
+from .response import ListedResponse, orders_between
+from .table import OrderTable
 
 #: Columns of Jones matrices: real and imaginary part, named by leaving and incident polarisation.
 JONES = tuple(f"J_{pair}_{part}" for pair in ("ss", "sp", "ps", "pp") for part in ("re", "im"))

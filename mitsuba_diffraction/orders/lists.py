@@ -36,7 +36,8 @@ from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
 from .cells import Array as Real
-from .table import LARGEST_SUM, WAVELENGTHS
+from .response import LARGEST_SUM
+from .table import WAVELENGTHS
 
 AXES = ("wavelength", "theta", "phi", "order")
 REFLECTED, TRANSMITTED = ("R_s", "R_p"), ("T_s", "T_p")

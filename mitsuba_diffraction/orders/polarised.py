@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ..reference.boundary import mueller
 from . import cells
 from .cells import Array
-from .table import CellResponse, OrderTable
+from .response import CellResponse
+from .table import OrderTable
 
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1

@@ -18,7 +18,8 @@ from ..optics.coat import face_transmittance
 from ..optics.orders import least_c
 from . import cells
 from .cells import Array, Counts
-from .table import Band, CellResponse, ListedResponse, OrderTable
+from .response import Band, CellResponse, ListedResponse
+from .table import OrderTable
 
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
 #: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the

@@ -31,6 +31,7 @@ from ..optics.boundary import (
 )
 from ..optics.coat import (
     FaceCoefficients,
+    beneath_reflectance,
     coated_power,
     crossing,
     transmitted,
@@ -127,19 +128,23 @@ class Boundary:
 
         sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `factor`.
         """
-        visible = mi.UnpolarizedSpectrum([pair.visible(sigma_0, k) for k in wavenumbers])
+        outer, waves = pair.outer, self.material.wavenumbers(wavenumbers)
+        visible = mi.UnpolarizedSpectrum([outer.visible(sigma_0, k) for k in wavenumbers])
         if isinstance(self.material, Perfect):
             return mi.depolarizer(visible)
-        waves = self.material.wavenumbers(wavenumbers)
-        cosines = [pair.mirror_cosine(k * sigma_0) for k in waves]
-        light = LightPath.of(pair, mode)
-        channels = _side_by_side(indices, cosines)
-        if not (mi.is_polarized or light.passed):
-            powers = [reflectance(cosine, index) for index, cosine in channels]
+        channels = _side_by_side(indices, [outer.mirror_cosine(k * sigma_0) for k in waves])
+        coat = pair.n if isinstance(pair, CoatedPair) else None
+        if not mi.is_polarized:
+            powers = [
+                reflectance(cosine, index)
+                if coat is None
+                else beneath_reflectance(cosine, coat, index)
+                for index, cosine in channels
+            ]
             return self.material.channels(powers) * visible
-        matrices = [mirror(light.pair, cosine, index) for index, cosine in channels]
-        of_each = [index for index, _ in channels]
-        return mi.Spectrum(visible) * self._of_matrices(light, matrices, of_each)
+        light = LightPath.of(pair, mode)
+        matrices = [mirror(light.pair, cosine, index, coat) for index, cosine in channels]
+        return mi.Spectrum(visible) * light.mueller(matrices)
 
     def _of_matrices(
         self, light: LightPath, matrices: list[Jones], indices: list[Number]

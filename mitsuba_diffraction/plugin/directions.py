@@ -179,14 +179,6 @@ class CoatedPair(Pair):
         """The pair outside."""
         return self._outer
 
-    def visible(self, sigma_0: Float, k: Float) -> Float:
-        """See `Pair.visible`: of the pair outside."""
-        return self._outer.visible(sigma_0, k)
-
-    def mirror_cosine(self, sharpness: Float) -> Float:
-        """See `Pair.mirror_cosine`: of the pair outside, refracted."""
-        return cosine_within(self._outer.mirror_cosine(sharpness), self.n)
-
 
 class PairBelow(Pair):
     """Two directions below the surface, turned over: as if above a surface of negative heights."""

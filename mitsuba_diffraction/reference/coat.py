@@ -43,9 +43,8 @@ def reflected(
     inside = refracted_light(light, coat)
     ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
     others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
-    outside = mirror_cosine(light, sigma_0)
-    within = np.sqrt(np.maximum(outside**2 + coat**2 - 1.0, 0.0)) / coat
-    mirror = transmitted(model.facets(inside, index, within)[0], *ends)
+    beneath = beneath_amplitudes(mirror_cosine(light, sigma_0), coat, index)
+    mirror = model.facets_of(inside, *beneath)
     visible = horizon_correction(light, sigma_0)
     area = (light.wavelength * 1e-3) ** 2 * np.pi * sigma**2
     zeroth = (visible * powers[1] / area * measure(mirror).T).T
@@ -56,6 +55,20 @@ def reflected(
     face = np.full(len(flat), coat, complex)
     structure = interfering(others, zeroth, powers[2])
     return structure + model.mirrored(light, sigmas, flat, face, measure)
+
+
+def beneath_amplitudes(cosine: Real, n: float, index: Complex) -> tuple[Complex, Complex]:
+    """r_s and r_p (...) of a flat structure under a coat, as seen from outside.
+
+    cosine : (...) of the angle outside.
+    """
+    within = np.sqrt(np.maximum(cosine**2 + n**2 - 1.0, 0.0)) / n
+    found = []
+    for face, structure in zip(amplitudes(cosine, n), amplitudes(within, index), strict=True):
+        back = np.abs(face) ** 2
+        bounces = np.maximum(1.0 - back * np.abs(structure) ** 2, 1e-12)
+        found.append(structure * (1.0 - back) / np.sqrt(bounces))
+    return found[0], found[1]
 
 
 def refracted(direction: ArrayLike, n: float) -> Real:

@@ -175,16 +175,21 @@ def kirchhoff(light: Light, index: Complex) -> Complex:
 
 def facets(light: Light, index: Index, cosine: Real | None = None) -> tuple[Complex, Real]:
     """U(ωo) diag(r_s, r_p) U(ωi), (n, 2, 2), and 1 + ωi·ωo; r at the half vector or a cosine."""
-    wi, wo, _ = light
-    s_in, s_out = polarisation_axes(wi, wo)
-    axis, half = facet_axis(wi, wo, s_in), wi + wo
+    half = light.wi + light.wo
     # |ωi + ωo|²/2 = 1 + ωi·ωo, and cosθ at the half vector is √((1 + ωi·ωo)/2)
     one_plus_dot = 0.5 * np.sum(half * half, axis=1)
     if cosine is None:
         cosine = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
-    r_s, r_p = amplitudes(cosine, index)
+    return facets_of(light, *amplitudes(cosine, index)), one_plus_dot
+
+
+def facets_of(light: Light, r_s: Complex, r_p: Complex) -> Complex:
+    """U(ωo) diag(r_s, r_p) U(ωi), (n, 2, 2)."""
+    wi, wo, _ = light
+    s_in, s_out = polarisation_axes(wi, wo)
+    axis = facet_axis(wi, wo, s_in)
     facet = jones_matrix(ss=r_s, sp=0.0, ps=0.0, pp=r_p)
-    return turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi), one_plus_dot
+    return turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi)
 
 
 def small_slope(light: Light, index: Complex) -> Complex:

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 from ..optics.arithmetic import Number, of
 from ..optics.boundary import Direction, Geometry, Heights, Jones, geometry, power
-from ..optics.coat import coated_power, cosine_within, crossing
+from ..optics.coat import coated_power, crossing
 from ..optics.fresnel import Index
-from ..optics.mirror import mirror
 
 
 class Coat(NamedTuple):
@@ -70,13 +69,3 @@ def relative_power(
     # not 0 of opposite grazing directions
     edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
     return pair_power(jones, wi, wo, index, kappa, variance, coat) / (edge * edge)
-
-
-def coated_mirror(wi: Direction, wo: Direction, cosine: Number, index: Index, coat: Coat) -> Number:
-    """Return N_0 of eq. 10 of a level facet under a coat, as seen from outside.
-
-    wi, wo, index : within the coat; cosine : of θm outside.
-    """
-    pair = geometry(wi, wo)
-    came, left = crossing(coat.cos_i, coat.n), crossing(coat.cos_o, coat.n)
-    return coated_power(mirror(pair, cosine_within(cosine, coat.n), index), pair, index, came, left)

@@ -46,7 +46,7 @@ SLOW = [
     ("compare scale.xml -m llvm_ad_rgb -s 2 -o folder", "folder/compare.json"),
     ("tradeoff h.npy --pixel-size 0.1 --quick -o folder",
      "folder/tradeoff.json folder/tradeoff.csv folder/tradeoff.png folder/depth.png"),
-    ("export-viewer scale.xml page.html -m scalar_rgb", "page.html"),
+    ("export-viewer scale.xml -o page.html -m scalar_rgb", "page.html"),
     ("view scale.xml -m scalar_rgb -o page.html", "page.html"),
     ("export-osl h.npy --name skin -o folder " + HEIGHTS, "folder/skin.osl"),
 ]  # fmt: skip

@@ -7,7 +7,7 @@ from scipy.special import jv
 
 from mitsuba_diffraction.optics.orders import crossed_square
 from mitsuba_diffraction.orders import OrderTable
-from mitsuba_diffraction.orders.listed import imported_table
+from mitsuba_diffraction.orders.imported import imported_table
 from mitsuba_diffraction.orders.lists import Efficiencies
 from mitsuba_diffraction.orders.solve.crossed import most_orders
 

@@ -4,7 +4,7 @@ Contents
 --------
 pictures                pictures: heights and their light, BRDF maps, the scenes' snakes
 gallery                 a picture of every scene, and the pages that show them
-presets                 balls of all named looks
+presets                 balls of all presets
 tables                  tables of what `bench`, `tradeoff`, `plan` and `info --energy` measured
 realtime                tables of what `compare` measured
 evaluation, thesis      pages about the thesis' methods: the grating equation; a table, and sweeps

@@ -81,7 +81,8 @@ from ...plugin.types import (
     Vector3f,
 )
 from ..table import OrderTable
-from .lobes import DaylightLobes, Lobes, OrderLobe, SpectralLobes
+from .daylight_lobes import DaylightLobes
+from .lobes import Lobes, OrderLobe, SpectralLobes
 from .parameters import Parameters, read_parameters
 from .polarised_lobes import PolarisedLobes
 

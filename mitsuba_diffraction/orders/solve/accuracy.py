@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..polarised import mueller_of
-from ..table import UNPOLARISED, OrderTable
+from ..response import UNPOLARISED
+from ..table import OrderTable
 from .jobs import Jobs, Problem
 from .nodes import places_at
 from .stations import Complex, Real

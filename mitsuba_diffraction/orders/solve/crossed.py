@@ -22,7 +22,8 @@ from ...heights.field import HeightField
 from ...optics.orders import crossed_square
 from ...progress import Progress, silent
 from ..listed import Lights, listed_table
-from ..table import PERIODS, OrderTable, check_wavelengths, orders_between
+from ..response import orders_between
+from ..table import PERIODS, OrderTable, check_wavelengths
 from .accuracy import missed_shares
 from .grating_index import TabulatedIndex, material_of
 from .jobs import Jobs, Solved, digest_of

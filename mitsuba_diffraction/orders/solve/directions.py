@@ -18,7 +18,8 @@ from ...errors import DiffractionError
 from ..listed import Lights, listed_table, warn_of_gaps
 from ..lists import check_light
 from ..polarised import mueller_of
-from ..table import LINEAR, MUELLER, OrderTable, check_outline, orders_between
+from ..response import LINEAR, MUELLER, orders_between
+from ..table import OrderTable, check_outline
 from .accuracy import powers
 from .jobs import LEAST_COSINES, Jobs, Problem
 from .nodes import places_at

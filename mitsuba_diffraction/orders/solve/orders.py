@@ -14,16 +14,8 @@ from ...errors import DiffractionError, check_choice, quoted, warn
 from .. import cells
 from ..cells import Counts
 from ..polarised import mueller_of
-from ..table import (
-    ALONG,
-    MOST_NODES,
-    MUELLER,
-    UNPOLARISED,
-    Band,
-    CellResponse,
-    OrderTable,
-    check_outline,
-)
+from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
+from ..table import OrderTable, check_outline
 from .accuracy import WORST, measured_error, missed_tolerance, powers
 from .block import to_node
 from .directions import Directions, solve_directions

@@ -8,6 +8,7 @@ from typing import Any
 
 from ...optics.boundary import MODELS, Model
 from ...optics.coat import (
+    beneath_reflectance,
     coated_reflectance,
     cosine_within,
     face_transmittance,
@@ -30,7 +31,7 @@ from ...optics.orders import (
     wavenumber_step,
 )
 from ...shading.dialects import GLSL
-from ...shading.pair_power import Coat, coated_mirror, relative_power
+from ...shading.pair_power import Coat, relative_power
 from ...shading.programs import Program
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
@@ -74,8 +75,7 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
     if index is not None:
         program.add(reflectance, "float", index, name="interface_reflectance")
     if {"ORDER_0", "COATED"} <= names and index is not None:
-        over = Coat("float", "float", "float")
-        program.add(coated_mirror, "vector", "vector", "float", index, over)
+        program.add(beneath_reflectance, "float", "float", index)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add_staged(

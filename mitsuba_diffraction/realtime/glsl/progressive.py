@@ -182,18 +182,19 @@ class ProgressiveLight:
         """Draw one light with its shadows."""
         if not len(self._visible.places):
             return
-        uniforms = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
+        uniforms, each = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
         uniforms["light_density"] = light.density
         definitions = {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
         textures = {"shadow_map": self._map.texture}
-        self._draw_surfaces(light, camera, definitions, uniforms, textures)
+        self._draw_surfaces(light, camera, definitions, uniforms, each, textures)
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
         uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
-        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, {})
+        each: list[dict[str, Uniform]] = [{} for _ in self._visible.solid]
+        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
 
     def _draw_surfaces(
         self,
@@ -201,12 +202,16 @@ class ProgressiveLight:
         camera: Camera,
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
+        each: list[dict[str, Uniform]],
         textures: dict[str, Any],
     ) -> None:
         """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
+        for surface, solid in zip(each, self._visible.solid, strict=True):
+            surface["solid"] = solid
         self._draw(
-            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings, textures
-        )
+            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings, each,
+            textures,
+        )  # fmt: skip
 
     @property
     def image(self) -> NDArray[np.float32]:

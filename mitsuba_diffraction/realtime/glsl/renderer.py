@@ -197,6 +197,7 @@ class Renderer:
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
         extras: Sequence[Sequence[Bindings]] = (),
+        each: Sequence[dict[str, Uniform]] = (),
         textures: Mapping[str, Any] | None = None,
     ) -> None:
         """Draw some lights, or looked-up surroundings, into a framebuffer.
@@ -206,7 +207,7 @@ class Renderer:
         method, frame, camera : as in `draw`.
         lights : lights without extent.
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
-        extras : further bindings of each surface.
+        extras, each : further bindings, and uniforms, of each surface.
         """
         prepared = self.prepared(method)
         frame.use()
@@ -234,7 +235,7 @@ class Renderer:
             unit = 0
             for part in (self.bindings[n], prepared.tables[n], *further):
                 unit = part.use(program, unit)
-            unit = bind(program, {}, textures or {}, unit)
+            unit = bind(program, each[n] if each else {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)

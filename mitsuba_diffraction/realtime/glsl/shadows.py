@@ -30,7 +30,11 @@ from .texels import Uniform
 Array = NDArray[np.float64]
 
 _GLANCES = 192  # pixels along the longer side of the picture that determines the visible part
-_BIAS = 0.75  # depth bias, texels
+_SAME = 1e-6  # distance of points that are equal, relative to the scene's extent
+_BITS = 21  # bits of a coordinate in units of that distance
+# depth bias in texels, least and largest, and its ratio to the slope of a surface's normals within
+# a triangle, by which neighbouring triangles differ in depth
+_BIAS, _BENT = (0.05, 0.75), 8.0
 
 #: Texels a side of a shadow map.
 SIZE = 1024
@@ -45,6 +49,40 @@ class Visible:
 
     places: Array  # (n, 3) visible points, on a coarse grid of pixels
     outline: Array  # (m, 3) corners of their convex hull
+    solid: list[bool]  # for each surface, whether it is closed and seen from outside
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Extent, orientation and flatness of a surface's triangles."""
+
+    low: Array  # (3,) lowest corner of a box around the surface
+    high: Array  # (3,) highest corner
+    # 1: closed, and triangles are counter-clockwise from outside; −1: clockwise; 0: open
+    winding: int
+    # (4,) normal and offset of the plane that the surface lies in, if all of the scene is on the
+    # side of the normal; None for other surfaces
+    plane: Array | None
+    bias: float  # depth bias, texels
+
+    @classmethod
+    def analyse(cls, triangles: Array, normals: Array, corners: Array) -> Solid:
+        """Analyse triangles (n, 3, 3) of a scene.
+
+        normals : (n, 3, 3) shading normals.
+        corners : (m, 3) points whose convex hull contains the scene.
+        """
+        low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+        bias = float(np.clip(_BENT * _bend(triangles, normals), *_BIAS))
+        return cls(low, high, _winding(triangles), _plane(triangles, corners), bias)
+
+    def encloses(self, place: Array) -> bool:
+        """Return whether a point lies in the surface's box."""
+        return bool(np.all((place >= self.low) & (place <= self.high)))
+
+    def hides_nothing(self, light: Lamp) -> bool:
+        """Return whether the scene and the light lie on one side of the surface."""
+        return self.plane is not None and float(self.plane @ light.place) > 0.0
 
 
 class Casters:
@@ -65,9 +103,11 @@ class Casters:
         self.program = compile_plain(context, "surface.vert", "position.frag")
         self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
         self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
+        vertices = [s.vertices[:, :6].reshape(-1, 3, 6).astype(np.float64) for s in surfaces]
+        triangles = [v[..., :3] for v in vertices]
         self._shapes = [int(s.shape.ptr) for s in surfaces]
-        positions = [s.vertices[:, :3].astype(np.float64) for s in surfaces]
-        hulls = np.concatenate([outline(p) for p in positions])
+        hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
+        self.solids = [Solid.analyse(v[..., :3], v[..., 3:], hulls) for v in vertices]
         self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)  # corners of a box around all
         self.corners = box_corners(self.low, self.high)
 
@@ -78,16 +118,32 @@ class Casters:
         for array in self._arrays:
             array.render()
 
-    def draw_map(self, matrix: Array, light: Lamp) -> None:
-        """Draw a shadow map into the current framebuffer, without the light's own shape."""
-        self.context.enable_only(self.context.DEPTH_TEST)
+    def draw_map(self, matrix: Array, light: Lamp, visible: Visible) -> list[float]:
+        """Draw a shadow map into the current framebuffer.
+
+        Returns the depth bias of each surface in texels.
+        """
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
-        for array, shape in zip(self._arrays, self._shapes, strict=True):
-            if shape != light.shape:
-                array.render()
+        parts = [
+            "none" if shape == light.shape else _needed(solid, light, outside)
+            for solid, outside, shape in zip(self.solids, visible.solid, self._shapes, strict=True)
+        ]
+        for array, solid, part in zip(self._arrays, self.solids, parts, strict=True):
+            if part == "none":
+                continue
+            # the map looks along its z axis, which reverses the triangles' orientation
+            self.context.cull_face = "back" if solid.winding > 0 else "front"
+            culled = self.context.CULL_FACE if part == "away" else self.context.NOTHING
+            self.context.enable_only(self.context.DEPTH_TEST | culled)
+            array.render()
+        self.context.enable_only(self.context.DEPTH_TEST)
         if light.place[3] == 0.0:
             for array in self._emitting:
                 array.render()
+        return [
+            solid.bias if part == "all" else _BIAS[0]
+            for solid, part in zip(self.solids, parts, strict=True)
+        ]
 
     def visible(self, camera: Camera) -> Visible:
         """Determine the part of the scene that a camera sees."""
@@ -100,7 +156,8 @@ class Casters:
         pixels = target.read()[::-1].reshape(-1, 4).astype(float)
         target.release()
         places = np.asarray(pixels[pixels[:, 3] > 0.0, :3], np.float64)
-        return Visible(places, outline(places))
+        solid = [s.winding != 0 and not s.encloses(camera.eye) for s in self.solids]
+        return Visible(places, outline(places), solid)
 
     def release(self) -> None:
         for thing in (*self._arrays, *self._emitting, self.program):
@@ -113,6 +170,54 @@ def outline(places: Array) -> Array:
         return np.asarray(places[scipy.spatial.ConvexHull(places).vertices])
     except (scipy.spatial.QhullError, ValueError):
         return np.unique(places, axis=0)
+
+
+def _needed(solid: Solid, light: Lamp, from_outside: bool) -> str:
+    """Return the triangles that a map needs: "all", those facing "away" from the light, "none"."""
+    if solid.hides_nothing(light):
+        return "none"
+    inside = light.place[3] > 0.0 and solid.encloses(light.place[:3])
+    return "away" if from_outside and not inside else "all"
+
+
+def _bend(triangles: Array, normals: Array) -> float:
+    """Return the slope of normals relative to their triangle, the quantile 0.999."""
+    flat = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.abs(np.einsum("ni,nci->nc", flat, normals))
+    across = np.linalg.norm(np.cross(flat[:, None], normals), axis=2)
+    slopes = across / np.maximum(along, 1e-30)
+    return float(np.quantile(slopes[along.min(axis=1) > 0.0].ravel(), 0.999, method="higher"))
+
+
+def _winding(triangles: Array) -> int:
+    """Return `Solid.winding`: closed if each edge is traversed equally often in both directions."""
+    low = triangles.min(axis=(0, 1))
+    step = max(float(np.ptp(triangles, axis=(0, 1)).max()), 1e-30) * _SAME
+    x, y, z = np.rint((triangles - low) / step).astype(np.int64).transpose(2, 0, 1)
+    corner = np.unique((x << _BITS | y) << _BITS | z, return_inverse=True)[1].reshape(-1, 3)
+    start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+    start, end = start[start != end], end[start != end]
+    count = int(corner.max()) + 1
+    if not np.array_equal(np.sort(start * count + end), np.sort(end * count + start)):
+        return 0
+    a, b, c = (triangles - triangles.mean(axis=(0, 1))).transpose(1, 0, 2)
+    return int(np.sign(np.einsum("ni,ni->", a, np.cross(b, c))))
+
+
+def _plane(triangles: Array, corners: Array) -> Array | None:
+    """Return `Solid.plane`."""
+    places = triangles.reshape(-1, 3)
+    sides = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    largest = sides[np.linalg.norm(sides, axis=1).argmax()]
+    normal = largest / max(float(np.linalg.norm(largest)), 1e-300)
+    room = _SAME * float(np.ptp(corners, axis=0).max())
+    if np.abs((places - places[0]) @ normal).max() > room:
+        return None
+    above = (corners - places[0]) @ normal
+    for sign in (1.0, -1.0):
+        if (sign * above).min() >= -room:
+            return sign * np.append(normal, -normal @ places[0])
+    return None
 
 
 class ShadowMap:
@@ -129,11 +234,15 @@ class ShadowMap:
         self.texture.filter = (context.NEAREST, context.NEAREST)
         self._frame = context.framebuffer(depth_attachment=self.texture)
 
-    def draw(self, light: Lamp, visible: Visible, shift: tuple[float, float]) -> dict[str, Uniform]:
+    def draw(
+        self, light: Lamp, visible: Visible, shift: tuple[float, float]
+    ) -> tuple[dict[str, Uniform], list[dict[str, Uniform]]]:
         """Draw the map of a light, and return uniforms of shaders/shadow.glsl.
 
         visible : part of the scene that the map covers.
         shift : displacement of the map in texels, 0 to 1.
+
+        Returns uniforms of all surfaces, and uniforms of each surface.
         """
         if light.place[3] == 0.0:
             matrix, scale = parallel_view(
@@ -143,18 +252,18 @@ class ShadowMap:
             matrix, scale = self._perspective(light.place[:3], visible.places, shift)
         self._frame.use()
         self._frame.clear(depth=1.0)
-        self.casters.draw_map(matrix, light)
+        biases = self.casters.draw_map(matrix, light, visible)
         cone = (0.0, 0.0)
         if light.cone is not None:
             cone = light.cone[0], 1.0 / max(light.cone[0] - light.cone[1], 1e-6)
-        return {
+        shared: dict[str, Uniform] = {
             "light_axis": tuple(float(x) for x in light.axis),
             "light_cone": cone,
             "shadow_matrix": tuple(matrix.T.ravel().tolist()),
             "shadow_planes": tuple(np.linalg.inv(matrix).ravel().tolist()),
             "shadow_steepest": _STEEPEST * scale,
-            "shadow_bias": _BIAS * scale,
         }
+        return shared, [{"shadow_bias": bias * scale} for bias in biases]
 
     def _perspective(
         self, eye: Array, places: Array, shift: tuple[float, float]

@@ -5,8 +5,7 @@ vec2 mirror_ends = vec2(1.0);   // cosθi and cosθo
 float mirror_half = 1.0;        // cosθh
 float mirror_share = 1.0;       // of order 0
 #ifdef COATED
-vec3 mirror_wi, mirror_wo;   // directions within the coat
-float face_share;            // of the coat's face
+float face_share;               // of the coat's face
 #endif
 
 // σ₀ of the window on the surface.
@@ -42,20 +41,12 @@ vec3 face(float sigma_0)
 
 #if SURFACE_KIND == CONDUCTOR
 
-#ifdef COATED
-float coated_power_of(vec2 index, float k, float sigma_0)
-{
-    return coated_mirror(mirror_wi, mirror_wo, mirrored(k, sigma_0), index, coat, mirror_ends.x,
-                         mirror_ends.y);
-}
-#endif
-
 // Factor of order 0 at one wavenumber, to be multiplied by `boundary_at_all`.
 float mirror_at(float cos_half, float k, float sigma_0)
 {
 #ifdef COATED
     vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
-    float reflected = coated_power_of(index, k, sigma_0);
+    float reflected = beneath_reflectance(mirrored(k, sigma_0), coat, index);
 #else
     float reflected = reflectance_at(mirrored(k, sigma_0), k);
 #endif
@@ -70,7 +61,7 @@ vec3 mirror(float cos_half, float sigma_0)
         found[n] = mirror_share * visible(channel_wavenumbers[n], sigma_0);
 #ifdef COATED
         vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] *= coated_power_of(index, channel_wavenumbers[n], sigma_0)
+        found[n] *= beneath_reflectance(mirrored(channel_wavenumbers[n], sigma_0), coat, index)
                     / max(interface_reflectance(cos_half, index), 1e-20);
 #else
         found[n] *= reflectance(mirrored(channel_wavenumbers[n], sigma_0))[n];
@@ -89,8 +80,7 @@ float mirror_at(float cos_half, float k, float sigma_0)
 {
     float share = mirror_share * visible(k, sigma_0);
 #if defined(COATED)
-    return share * coated_mirror(mirror_wi, mirror_wo, mirrored(k, sigma_0), eta, coat, mirror_ends.x,
-                                 mirror_ends.y);
+    return share * beneath_reflectance(mirrored(k, sigma_0), coat, eta);
 #elif SURFACE_KIND == PERFECT
     return share;
 #elif defined(BOUNDARY)

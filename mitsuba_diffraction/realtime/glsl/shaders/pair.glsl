@@ -37,8 +37,6 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     mirror_ends = outer;
     mirror_share = mirrored / outside;
 #ifdef COATED
-    mirror_wi = wi;
-    mirror_wo = wo;
     face_share = area * outer.y / outside;
 #endif
 #endif

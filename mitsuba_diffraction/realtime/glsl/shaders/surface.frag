@@ -25,6 +25,7 @@ uniform mat3 normal_uv;
 uniform vec3 emission;            // radiance, on the side that the normal points to
 uniform mat3 pigment_in_light;    // from a pigment's colour to its colour under this light
 uniform float light_density;      // `lights.Light.density`
+uniform bool solid;               // closed surface, seen from outside: rays inwards are blocked
 
 out vec4 fragment;
 
@@ -164,7 +165,8 @@ void main()
 #ifdef LOBES
     vec3 wo = lobe_direction(wi, rotation, drawn_numbers());
     vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
-    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0) {
+    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0
+        && !(solid && dot(direction, flat_normal) <= 0.0)) {
         float distance;
         vec4 light = arriving(v_position, direction, distance);
         float density = lobe_density(wi, wo, rotation);
@@ -224,6 +226,7 @@ void main()
         if (light_place[i].w > 0.0) falloff /= square;
 #ifdef SHADOWED
         if (i == 0) falloff *= emitted(direction) * reached(v_position, flat_normal);
+        if (solid && dot(flat_normal, direction) <= 0.0) lit = false;
 #endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
