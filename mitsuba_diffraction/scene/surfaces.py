@@ -28,7 +28,7 @@ from .elements import own_id, surfaces_within
 
 #: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
 MATERIAL = "material:"
-#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+#: Beginning of a surface that is a preset: `preset:NAME[,parameter=value…]`.
 PRESET = "preset:"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
@@ -294,10 +294,10 @@ def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
-    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a preset.
 
-    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
-    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    A preset has its own BSDF. A file has the BSDF `diffraction`; `diffraction_orders` if it is a
+    table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
     another diffracting surface it keeps that surface's orientation and what lies beneath that one.
     """
     file, *parameters = _COMMA.split(text)
