@@ -36,6 +36,7 @@ COMMANDS = [
     (f"sweep light-angle h.npy {HEIGHTS} --resolution 8 --step 100", ".png .csv"),
     ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
     ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
+    ("scatter h.npy --pixel-size 0.1 --coherence-width 2", ".csv .png"),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
     ("scatter h.npy --pixel-size 0.1", ".csv .png"),
     ("export-osl t.exr --name t --material Al", ""),
@@ -47,10 +48,11 @@ SLOW = [
     ("tradeoff h.npy --pixel-size 0.1 --quick -o folder",
      "folder/tradeoff.json folder/tradeoff.csv folder/tradeoff.png folder/depth.png"),
     ("export-viewer scale.xml -o page.html -m scalar_rgb", "page.html"),
+    ("view scale.xml -m scalar_rgb -o page.html", "page.html"),
     ("export-osl h.npy --name skin -o folder " + HEIGHTS, "folder/skin.osl"),
 ]  # fmt: skip
 #: Commands without a file as their output.
-NONE = {"info", "presets", "view"}
+NONE = {"info", "presets"}
 
 
 @pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])
