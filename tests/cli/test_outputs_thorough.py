@@ -38,7 +38,6 @@ COMMANDS = [
     ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
     ("scatter h.npy --pixel-size 0.1 --coherence-width 2", ".csv .png"),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
-    ("scatter h.npy --pixel-size 0.1", ".csv .png"),
     ("export-osl t.exr --name t --material Al", ""),
     ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500:500 --material Al", ".nc"),
 ]  # fmt: skip
