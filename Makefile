@@ -86,8 +86,9 @@ plan: setup  ## plan the snake's scene: docs/performance.md
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
 	@$(PYTHON3) -m docs.make.figures.tables plan out/plan.json
 
-parameters: setup  ## make docs/parameters.md from the plugin's docstring
+parameters: setup  ## make docs/parameters.md, commands.md and python.md of the code
 	@$(PYTHON3) -m docs.make.figures.parameters -o docs/parameters.md
+	@$(PYTHON3) -m docs.make.figures.interfaces -o docs
 
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks

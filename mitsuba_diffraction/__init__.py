@@ -24,7 +24,7 @@ spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
 hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
-preset             a dictionary for `mi.load_dict` of a named look, e.g. preset("cd")
+preset             a dictionary for `mi.load_dict` of a preset, e.g. preset("cd")
 DiffractionError   error of every bad input, in one line
 
 Importing the package and Mitsuba, in either order, registers the BSDF plugin `diffraction` in the

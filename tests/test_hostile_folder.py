@@ -48,12 +48,12 @@ DONE = [
     ["export-osl", *_TABLE, *_METAL, "-o", "out/osl"],
     ["export-bsdf", *_TABLE, *_METAL, "--format", "zemax", "--wavelength", "550", "-o",
      "out/a.bsdf"],
-    ["export-viewer", "scene.xml", "out/page.html", "-m", "llvm_ad_rgb", "--method", "exact"],
+    ["export-viewer", "scene.xml", "-o", "out/page.html", "-m", "llvm_ad_rgb", "--method", "exact"],
     ["export-osl", "--addon", "out/addon.zip", "--with", "out/osl"],
 ]  # fmt: skip
 _OF_SCENES = {
     "plan": ["-o", "out/refused.toml"], "compare": ["-o", "out/refused"], "view": [],
-    "export-viewer": ["out/refused.html"],
+    "export-viewer": ["-o", "out/refused.html"],
 }  # fmt: skip
 _SOME_SCENES = ["plugin.xml", "nested.xml", "recipe.xml"]
 _SOME_HEIGHTS = ["pipe.npy", "pipe_in.toml"]

@@ -9,7 +9,7 @@ tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
 solve_crossed          orders of a crossed grating, for `solve`
 orders                 efficiencies of solved orders as a CSV
-presets                the named looks of --preset
+presets                the presets of --preset
 hologram               a logo as textures and a scene
 plan                   recipes of smaller tables, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes

@@ -39,7 +39,7 @@ _OF_THE_BSDF = (
 #: SOURCE or --preset; see `take_source`.
 SURFACE_SOURCE = (
     ("SOURCE", "table, recipe (.toml), or heights of any format", Path, None, {"nargs": "?"}),
-    ("--preset NAME", "instead of SOURCE: a named look, which 'mitsuba-diffraction presets' lists; "
+    ("--preset NAME", "instead of SOURCE: a preset, which 'mitsuba-diffraction presets' lists; "
      "options of the surface change it"),
 )  # fmt: skip
 #: Options of a surface's material and layers, by the plugin's names.
@@ -103,7 +103,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def take_source(args: argparse.Namespace) -> None:
     """Set `args.source` to the patch of --preset, and refuse contradictory materials.
 
-    Raises a DiffractionError if no look has the name, the pigment is a picture, or an option for
+    Raises a DiffractionError if no preset has the name, the pigment is a picture, or an option for
     reading heights does not fit.
     """
     if (args.source is None) == (args.preset is None):

@@ -21,10 +21,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "write a surface as a shader for Blender's Cycles (OSL)",
         "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
         "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
-        "all named looks, as an add-on that Blender installs.",
+        "all presets, as an add-on that Blender installs.",
         *SURFACE_SOURCE,
         ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
-         "folder; without SOURCE and --preset it has all named looks that the shaders show",
+         "folder; without SOURCE and --preset it has all presets that the shaders show",
          path_ending_in(".zip")),
         ("--with FOLDER", "exported folder that the add-on has, too; may be given several times",
          [Path], None, {"dest": "folders"}),
@@ -95,7 +95,7 @@ def _addon(args: argparse.Namespace) -> Figures:
 
 
 def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
-    """Export all named looks that the shaders show; say in a line which they do not."""
+    """Export all presets that the shaders show; say in a line which they do not."""
     import mitsuba as mi
 
     from ..osl import export

@@ -1,4 +1,4 @@
-"""`mitsuba-diffraction presets`: the named looks that --preset takes."""
+"""`mitsuba-diffraction presets`: the presets that --preset takes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .report import Figures
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
-        subparsers, "presets", run, "list the named looks",
+        subparsers, "presets", run, "list the presets",
         "List the presets, which --preset uses in place of a patch: docs/gallery.md.",
     )  # fmt: skip
     options.add_json(parser, "the looks")

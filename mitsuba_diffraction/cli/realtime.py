@@ -134,7 +134,8 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
         "as fit; the resulting ΔE2000 is printed, and shown on the page.",
         *scene_options.SCENE,
-        ("OUT", "the page to write", path_ending_in(".html"), None, {"dest": "output"}),
+        ("-o --output OUT", "page; default: the scene's name with .html in the current folder",
+         path_ending_in(".html")),
         ("--method", "method on the page; all leaves out those that do not suit the scene",
          (*WEB_METHODS, "all"), "all"),
         options.VIEW,
@@ -146,6 +147,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
 def export_viewer(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     scene_options.put_on_stage(args)
+    args.output = output_name(args.output, Path(f"{args.name.stem}.html"), lambda page: [page])
     return _write_page(args, WEB_METHODS if args.method == "all" else (args.method,), args.title)
 
 

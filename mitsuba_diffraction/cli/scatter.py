@@ -23,7 +23,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         options.SOURCE,
         ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
          "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
-        ("--wavelength NM", "wavelengths in vacuum", options.numbers, (_WAVELENGTH,),
+        ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
          {"dest": "wavelengths"}),
     )  # fmt: skip
     options.add_table(parser, ("coherence_width",))

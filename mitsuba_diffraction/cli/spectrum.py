@@ -90,9 +90,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--illuminant LIGHT|CSV", "light of --observer: ideal (equal quanta), d55, d65, d75, "
          "leaves, or a file of wavelengths (nm) and photons; default: ideal"),
         ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
-         "first, which share the noise; default: the eye's, docs/seen.md", _ratios),
+         "first, which share the noise; default: the eye's, docs/seen.md", options.numbers),
         ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
-         "default: 0.1", _ratios),
+         "default: 0.1", options.numbers),
         ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
          number_between(1e-4, 1e2)),
         ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
@@ -223,14 +223,6 @@ def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]
 
 def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}.csv")
-
-
-def _ratios(text: str) -> tuple[float, ...]:
-    """Return the numbers of a list with commas."""
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"expected numbers, e.g. 1,1,2, got {text!r}") from error
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:

@@ -11,6 +11,8 @@ from .console import say
 #: Options whose values are a range FIRST:LAST, and were two numbers or "FIRST,LAST".
 _RANGES = ("--wavelength-range", "--angles")
 _COMMA = re.compile(r"([-+\d.eE]+),([-+\d.eE]+)$")
+# The page of `export-viewer` was an argument.
+_OUTPUT = ("-o", "--output")
 # Commands that put surfaces on the ids of a scene.
 _SCENES = ("render", "plan", "view", "compare", "export-viewer")
 #: Names of options by their earlier names, with the commands that they are renamed in.
@@ -36,6 +38,9 @@ def current(argv: Sequence[str]) -> list[str]:
         elif name in NAMES and command in NAMES[name][1]:
             words.append(f"{NAMES[name][0]}{equals}{value}")
             say(f"{name} is now {NAMES[name][0]}")
+        elif command == "export-viewer" and word.endswith(".html") and words[-1] not in _OUTPUT:
+            words += ["-o", word]
+            say(f"'{word}' is now '-o {word}'")
         else:
             words.append(word)
     return words

@@ -284,13 +284,14 @@ def _placed(light: _Light) -> _Placed:
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
-) -> AnyLookup:
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
+    chances: bool = False,
+) -> AnyLookup:  # fmt: skip
     """Return the look-up of a table, with its grid in a memory.
 
-    coated, elements : as for `grid.grid_of`.
+    coated, elements, chances : as for `grid.grid_of`.
     """
-    grid = grid_of(table, coated=coated, elements=elements)
+    grid = grid_of(table, coated=coated, elements=elements, chances=chances)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
     if isinstance(table.response, ListedResponse) and not coated:

@@ -40,6 +40,10 @@ class OrderGrid(NamedTuple):
         pair of ports; over cells the odd ones over y. None without polarisation.
     element_starts : as `starts`, of `elements`.
     scale : factor from stored numbers to efficiencies.
+    chances : (records, 8) float32, to draw an order at a node: of each node and port that light
+        comes through the chances of all ports side by side, filled up with zeros to whole records.
+        None where nothing is drawn, of blocks and of listed light.
+    chance_starts : as `starts`, of `chances`.
     """
 
     cells: Counts
@@ -48,6 +52,8 @@ class OrderGrid(NamedTuple):
     elements: NDArray[np.float32] | None
     element_starts: NDArray[np.uint32]
     scale: float
+    chances: NDArray[np.float32] | None = None
+    chance_starts: NDArray[np.uint32] | None = None
 
     @property
     def parts(self) -> int:
@@ -55,12 +61,13 @@ class OrderGrid(NamedTuple):
         return self.corners.shape[1] // 8
 
 
-def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
+def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -> OrderGrid:
     """Return the records of a table.
 
     coated : whether the reflections between the flat face of its superstrate and the grating are
         in the efficiencies; otherwise these are of the grating alone.
     elements : whether the grid has elements of Mueller matrices, where the table has any.
+    chances : whether the grid has chances of orders at nodes, where its corners mix linearly.
     """
     response = table.response
     if isinstance(response, ListedResponse) and not (coated and table.superstrate != 1.0):
@@ -70,11 +77,15 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
     if table.block:
         counts = Counts(*(n - 1 for n in table.bands[0].counts))
 
+    at_nodes: list[Array] = []
+
     def records(of: Kind) -> Array:
         if table.block:
             return corner_records(blocks.reduced(table, table.bands[of.band], of.kind))
         of_kind = rows(table, of, counts, coated=coated)
         parts = of_kind if coated and table.superstrate != 1.0 else of_kind[:1]
+        missing = -parts[-1].shape[-1] % 8
+        at_nodes.append(np.pad(parts[-1], [(0, 0)] * 4 + [(0, missing)]).reshape(-1, 8))
         return np.concatenate([corner_records(part) for part in parts], axis=-1)
 
     def nodes(of: Kind) -> Array:
@@ -87,7 +98,12 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
     matrices, element_starts = None, starts
     if elements and table.response.elements > 1:
         element_starts, matrices = _stacked(table, nodes)
-    return _scaled(counts, starts, corners, matrices, element_starts)
+    grid = _scaled(counts, starts, corners, matrices, element_starts)
+    if not chances or table.block:
+        return grid
+    chance_starts, values = _joined(at_nodes)
+    stored = (values / grid.scale).astype(np.float32)
+    return grid._replace(chances=stored, chance_starts=chance_starts)
 
 
 def _listed(response: ListedResponse, elements: bool) -> OrderGrid:
@@ -131,7 +147,11 @@ def _stacked(
     table: OrderTable, records: Callable[[Kind], Array]
 ) -> tuple[NDArray[np.uint32], Array]:
     """Return the first record of each kind of each band, and all records."""
-    parts = [records(of) for of in kinds_of(table)]
+    return _joined([records(of) for of in kinds_of(table)])
+
+
+def _joined(parts: list[Array]) -> tuple[NDArray[np.uint32], Array]:
+    """Return the first record of each kind of each band, and all records of the kinds."""
     parts[1:1] = [parts[0][:0]]  # kind B of band 0 has none
     starts = np.cumsum([0, *map(len, parts[:-1])])
     return starts.astype(np.uint32), np.concatenate(parts)

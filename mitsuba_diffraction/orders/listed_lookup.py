@@ -50,7 +50,7 @@ class ListedLookup:
     count : number of orders.
     """
 
-    coated = False
+    coated = has_chances = False
 
     def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         response = table.response

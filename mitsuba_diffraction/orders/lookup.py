@@ -133,6 +133,7 @@ class Lookup:
         self.memory, self.sides = memory, table.sides
         self._cells, self._scale, self._parts = grid.cells, grid.scale, grid.parts
         self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
+        self.has_chances = grid.chances is not None
         self._period, self._last = 1e3 * table.optical_period, float(table.last_band)
         self._ends, self._reach = table.wavelengths, table.reach
         self._step = 1e-3 / table.period
@@ -234,16 +235,26 @@ class Lookup:
         port, active = self.port(row, order, active & row.lit, below)
         ports = self.ports(row)
         first = self.memory.start("element_starts", row.kind) + row.entered * ports + port
-        n_rho, n_w = self._cells.rho, self._cells.w
-        tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
         totals: list[Number] = [0.0 * row.wavelength] * self.numbers
-        for weight, (a, b, c) in zip(row.weights, itertools.product((0, 1), repeat=3), strict=True):
-            node = ((tau + a) * (n_rho + 1) + rho + b) * (n_w + 1) + w + c
+        for weight, node in zip(row.weights, self.nodes(row), strict=True):
             index = first + node * ports * ports
             record = self.memory.read("elements", index, self.numbers, active)
             totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
         odd = ODD.ravel()[: self.numbers]
         return [x * y if is_odd else x for x, is_odd in zip(totals, odd, strict=True)]
+
+    def nodes(self, row: Row) -> list[Index]:
+        """Return the numbers of the nodes at a cell's corners, 000, 001, 010 … 111."""
+        n_rho, n_w = self._cells.rho, self._cells.w
+        tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
+        first = (tau * (n_rho + 1) + rho) * (n_w + 1) + w
+        corners = itertools.product((0, 1), repeat=3)
+        return [first + (a * (n_rho + 1) + b) * (n_w + 1) + c for a, b, c in corners]
+
+    def totals(self, row: Row) -> Sequence[Number]:
+        """Return the sums of chances at the corners of a cell, over the grid's scale."""
+        record = (row.start + self.ports(row)) * self._parts + self._parts - 1
+        return self.memory.read("corners", record, 8, row.lit)
 
     def at_port(self, row: Row, port: Index, part: int, active: Mask) -> Number:
         """Interpolate a port between the corners of a cell; 0 where the table has no light."""

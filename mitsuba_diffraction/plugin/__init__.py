@@ -15,7 +15,7 @@ varying         numbers over a surface: one for all, a texture or a mesh attribu
 textures        orientation that varies, and checks of textures
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         table of a scene's heights, recipe or file, built once
-presets         named looks: a patch with its material and layers, by name
+presets         presets: a patch with its material and layers, by name
 registration    registration of the plugins in every variant
 installed       Mitsuba's own plugins and tables, before files of the same names beside a scene
 dictionary      `bsdf_dict`: from arrays

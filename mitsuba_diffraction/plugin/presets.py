@@ -1,4 +1,4 @@
-"""Named looks: a patch with its material and layers, one record each in `presets.toml`.
+"""Presets: a patch with its material and layers, one record each in `presets.toml`.
 
 The BSDF plugin `diffraction_preset` and `preset` turn a record into the BSDF that it names.
 """
@@ -31,7 +31,7 @@ MATERIALS = ("material", "int_ior", "eta", "k")
 
 @dataclass(frozen=True)
 class Preset:
-    """A named look.
+    """A preset.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Preset:
 
 @cache
 def presets() -> Mapping[str, Preset]:
-    """Return all named looks by name, in the order of the file."""
+    """Return all presets by name, in the order of the file."""
     content = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
     return {name: _of_record(name, dict(record)) for name, record in content.items()}
 
@@ -70,7 +70,7 @@ def _of_record(name: str, record: dict[str, Any]) -> Preset:
 
 
 def find_preset(name: str) -> Preset:
-    """Return the look of this name.
+    """Return the preset of this name.
 
     Raises a DiffractionError if the name is unknown; the text names the nearest.
     """
@@ -85,13 +85,13 @@ def find_preset(name: str) -> Preset:
 
 
 def preset(name: str, **changes: Any) -> dict[str, Any]:
-    """Return the dictionary of a named look's BSDF for `mi.load_dict`.
+    """Return the dictionary of a preset's BSDF for `mi.load_dict`.
 
-    Raises a DiffractionError if the look is unknown; the text names the nearest.
+    Raises a DiffractionError if the preset is unknown; the text names the nearest.
 
     Parameters
     ----------
-    name : a look that `mitsuba-diffraction presets` lists, e.g. "cd".
+    name : a preset that `mitsuba-diffraction presets` lists, e.g. "cd".
     changes : parameters of the BSDF in place of the record's, e.g. orientation=90; None is the
         same as leaving it out.
     """
@@ -100,9 +100,9 @@ def preset(name: str, **changes: Any) -> dict[str, Any]:
 
 
 def diffraction_preset(props: Properties) -> BSDF:
-    """Return the BSDF of the look that the parameter `preset` names, with further parameters.
+    """Return the BSDF of the preset that the parameter `preset` names, with further parameters.
 
-    Raises a DiffractionError if the look is unknown, or a parameter does not fit its BSDF.
+    Raises a DiffractionError if the preset is unknown, or a parameter does not fit its BSDF.
     """
     if PARAMETER not in props:
         raise DiffractionError(f"{PLUGIN}: the parameter {PARAMETER} is missing; e.g. cd")

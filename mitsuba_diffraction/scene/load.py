@@ -151,13 +151,16 @@ def _check_parameters_act(
     """Refuse values other than the defaults that the surfaces put on ids leave without effect."""
     import mitsuba as mi
 
-    from .surfaces import check_parameters_act, put_materials
+    from .surfaces import check_parameters_act, effective, put_materials
 
-    def state(without: str = "") -> Any:
+    def state(without: str = "", *, covered: bool = True) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
+        # without `light`, its file's own parameters have no use
+        config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
-        put_materials(parsed, values.materials)
+        if covered:
+            put_materials(parsed, values.materials)
         return parsed
 
     changed = [
@@ -166,7 +169,10 @@ def _check_parameters_act(
         if (default := defaults.get(name)) is not None and not _same(str(value), default)
     ]
     if values.materials and changed:
-        plain = {name: state(name) for name in changed}
+        # a value may be the default in other words, such as the whole path of a file
+        whole = effective(state(covered=False))
+        acting = [n for n in changed if effective(state(n, covered=False)) != whole]
+        plain = {name: state(name) for name in acting}
         check_parameters_act(state(), plain, values.parameters, values.materials)
 
 

@@ -28,7 +28,7 @@ from .elements import own_id, surfaces_within
 
 #: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
 MATERIAL = "material:"
-#: Beginning of a surface that is a named look: `preset:NAME[,parameter=value…]`.
+#: Beginning of a surface that is a preset: `preset:NAME[,parameter=value…]`.
 PRESET = "preset:"
 
 _COMMA = re.compile(r",(?=\s*\w+=)")
@@ -154,9 +154,9 @@ def check_parameters_act(
 
     Raises a DiffractionError that names the parameter.
     """
-    expected = _effective(edited)
+    expected = effective(edited)
     for name, state in plain.items():
-        if _effective(state) == expected:
+        if effective(state) == expected:
             raise DiffractionError(
                 f"{name}={values[name]} changes nothing: the scene uses it in a BSDF that the "
                 f"surface on {', '.join(materials)} replaces; give that surface the parameter "
@@ -164,7 +164,7 @@ def check_parameters_act(
             )
 
 
-def _effective(state: Any) -> list[str]:
+def effective(state: Any) -> list[str]:
     """Return the properties of all nodes but those of BSDFs that no shape uses."""
     hidden = (mi.ObjectType.BSDF, mi.ObjectType.Texture, mi.ObjectType.Scene)
     waiting = [n for n, node in enumerate(state.nodes) if node.type not in hidden]
@@ -294,10 +294,10 @@ def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
-    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a named look.
+    """Return the properties of a BSDF for `FILE[,parameter=value…]`, or a preset.
 
-    The BSDF of a look is the look's. A file has the BSDF `diffraction`; `diffraction_orders` if it
-    is a table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
+    A preset has its own BSDF. A file has the BSDF `diffraction`; `diffraction_orders` if it is a
+    table of orders; or `diffraction_dielectric` if the parameter `thin` is set. In place of
     another diffracting surface it keeps that surface's orientation and what lies beneath that one.
     """
     file, *parameters = _COMMA.split(text)

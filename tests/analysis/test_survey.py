@@ -305,7 +305,6 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
         assert (index > above * chance) == (field is grating), (index, chance)
 
 
-@pytest.mark.thorough
 def test_a_grating_ranks_alike_at_any_angle_and_number_of_periods():
     x = 0.08 * np.arange(128)
     ranks = []

@@ -55,7 +55,7 @@ def alarm():
         (".xml", "render -m scalar_rgb {}"),
         (".xml", "plan {}"),
         (".xml", "compare {}"),
-        (".xml", "export-viewer {} a.html"),
+        (".xml", "export-viewer {} -o a.html"),
     ],
     ids=str,
 )
@@ -141,7 +141,7 @@ MISSPELT = """<shape type="sphere"><bsdf type="twosided">
 @pytest.mark.parametrize(
     "command",
     ["render {} -m scalar_rgb", "render {} -m llvm_ad_rgb", "plan {}", "compare {}",
-     "export-viewer {} a.html"],
+     "export-viewer {} -o a.html"],
 )  # fmt: skip
 def test_a_misspelt_parameter_of_a_scene_is_one_line(run, here, command):
     Path("a.xml").write_text(SCENE.format(MISSPELT))

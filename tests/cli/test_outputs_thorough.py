@@ -25,7 +25,7 @@ COMMANDS = [
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
      "--material keratin", ".exr .png"),
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),
-    ("evaluate recipe.toml --windows 0 --step 50 --angle-step 5", ".png .csv .npz"),
+    ("evaluate recipe.toml --positions 0 --step 50 --angle-step 5", ".png .csv .npz"),
     ("spectrum t.exr --material keratin --pigment pigment.csv --step 50", ".csv .png"),
     ("spectrum recipe.toml --step 100", ".csv .png"), ("spectrum orders.nc --step 100", ".csv"),
     ("spectrum h.npy --treatments treatments.toml --step 100 " + SMALL, ".csv"),
@@ -36,20 +36,22 @@ COMMANDS = [
     (f"sweep light-angle h.npy {HEIGHTS} --resolution 8 --step 100", ".png .csv"),
     ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".json .brdf"),
     ("export-shader t.exr --method fast -m scalar_rgb", ""), ("hologram logo.png", ""),
+    ("scatter h.npy --pixel-size 0.1 --coherence-width 2", ".csv .png"),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
     ("export-osl t.exr --name t --material Al", ""),
-    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500,500 --material Al", ".nc"),
+    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500:500 --material Al", ".nc"),
 ]  # fmt: skip
 #: Commands that take long, and outputs of theirs.
 SLOW = [
     ("compare scale.xml -m llvm_ad_rgb -s 2 -o folder", "folder/compare.json"),
     ("tradeoff h.npy --pixel-size 0.1 --quick -o folder",
      "folder/tradeoff.json folder/tradeoff.csv folder/tradeoff.png folder/depth.png"),
-    ("export-viewer scale.xml page.html -m scalar_rgb", "page.html"),
+    ("export-viewer scale.xml -o page.html -m scalar_rgb", "page.html"),
+    ("view scale.xml -m scalar_rgb -o page.html", "page.html"),
     ("export-osl h.npy --name skin -o folder " + HEIGHTS, "folder/skin.osl"),
 ]  # fmt: skip
 #: Commands without a file as their output.
-NONE = {"info", "presets", "view"}
+NONE = {"info", "presets"}
 
 
 @pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])

@@ -42,6 +42,7 @@ def test_a_current_command_line_is_kept_without_a_word(line, capsys):
         ("evaluate a.npy --windows 2", "--positions"),
         ("tangents a.ply --turn 90", "--rotate"),
         ("render a.xml --material ball=t.exr", "--assign"),
+        ("export-viewer a.xml page.html", "-o"),
     ],
 )
 def test_an_old_name_is_the_current_one_where_it_was_renamed(old, new, capsys):
@@ -50,7 +51,13 @@ def test_an_old_name_is_the_current_one_where_it_was_renamed(old, new, capsys):
 
 
 @pytest.mark.parametrize(
-    "line", ["precompute a.npy --windows 5", "brdf-map a.exr --material gold", "render --turn sun"]
+    "line",
+    [
+        "precompute a.npy --windows 5",
+        "brdf-map a.exr --material gold",
+        "render --turn sun",
+        "export-viewer a.xml -o page.html",
+    ],
 )
 def test_the_same_name_elsewhere_is_kept(line, capsys):
     assert current(line.split()) == line.split()

@@ -178,3 +178,21 @@ def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
     load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
         load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "2"})
+
+
+def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surface):
+    (surface / "lit.xml").write_text(
+        """<scene version="3.0.0"><default name="power" value="1"/>
+        <emitter type="constant"><float name="radiance" value="$power"/></emitter></scene>"""
+    )
+    (surface / "dark.xml").write_text('<scene version="3.0.0"/>')
+    (surface / "scene.xml").write_text(
+        """<scene version="3.0.0"><default name="light" value="dark.xml"/>
+        <bsdf type="diffuse" id="skin"/><shape type="sphere"><ref id="skin"/></shape>
+        <include filename="$light"/></scene>"""
+    )
+    values = {"material:skin": "preset:dvd", "light": str(surface / "lit.xml"), "power": "2"}
+    assert len(load_scene(surface / "scene.xml", values).emitters()) == 1
+    # the default in other words
+    values = {"material:skin": "preset:dvd", "light": str(surface / "dark.xml")}
+    assert not load_scene(surface / "scene.xml", values).emitters()

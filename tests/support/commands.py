@@ -98,7 +98,7 @@ def run(words: list[str]) -> None:
     if "--preset" in rest:
         at = rest.index("--preset") + 1
         rest[at] = small_look(command, rest[at])
-    if "--addon" in rest and "--with" not in rest:  # all named looks take minutes
+    if "--addon" in rest and "--with" not in rest:  # all presets take minutes
         rest += ["--with", "cd-osl"]
     if command == "render" and {"--frames", "--orbit"} & set(rest):
         rest += ["--frames", "2"]

@@ -4,7 +4,10 @@ Contents
 --------
 pictures                pictures: heights and their light, BRDF maps, the scenes' snakes
 gallery                 a picture of every scene, and the pages that show them
-presets                 balls of all named looks
+geometry                drawing of angles, axes, grooves and window in docs/concepts.md
+interfaces              docs/commands.md and docs/python.md, of the parser and the public names
+long_tables             long tables of pages as CSV files beside them
+presets                 balls of all presets
 tables                  tables of what `bench`, `tradeoff`, `plan` and `info --energy` measured
 realtime                tables of what `compare` measured
 evaluation, thesis      pages about the thesis' methods: the grating equation; a table, and sweeps

@@ -42,7 +42,7 @@ def _side(axes: Axes) -> None:
     axes.fill_between(x, heights, -0.16, color=_PATCH, lw=0)
     axes.plot(x, heights, color=_INK, lw=0.8)
     axes.annotate("", (0.0, 1.12), (0.0, 0.04), arrowprops={"arrowstyle": "-", "ls": ":"})
-    axes.text(0.02, 0.7, "normal, z", fontsize=8, rotation=90)
+    axes.text(0.03, 1.08, "normal, z", fontsize=8)
     axes.annotate("", (1.2, -0.24), (0.55, -0.24), arrowprops={"arrowstyle": "->"})
     axes.text(1.2, -0.33, "x of the patch", ha="right", fontsize=8)
     axes.annotate("", (-0.465, -0.24), (-0.235, -0.24), arrowprops={"arrowstyle": "<->"})
@@ -56,7 +56,7 @@ def _side(axes: Axes) -> None:
     axes.text(*(1.05 * start), "light, ωi", color=_LIGHT, fontsize=9)
     axes.add_patch(Arc((0, 0), 0.8, 0.8, theta1=90.0 - THETA, theta2=90.0, color=_LIGHT))
     axes.text(0.13, 0.43, "θ", color=_LIGHT, fontsize=10)
-    for order in (-1, 0, 1, 2):
+    for order in (-1, 0, 1):
         # the light leaves with x = mλ/d − sinθ
         leaves = order * RATIO - sine
         if abs(leaves) >= 1.0:
@@ -71,7 +71,7 @@ def _side(axes: Axes) -> None:
         name = "mirror, m = 0" if order == 0 else f"m = {order}".replace("-", "−")
         text = f"{name}\ndetector {angle:+.0f}°".replace("-", "−")
         axes.text(
-            *(1.07 * end), text, color=_ORDER, fontsize=8,
+            *((1.18 if order == 1 else 1.07) * end), text, color=_ORDER, fontsize=8,
             ha="right" if leaves < 0.0 else "left", va="bottom",
         )  # fmt: skip
     axes.set_xlim(-1.75, 1.45)

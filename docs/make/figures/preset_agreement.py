@@ -1,4 +1,4 @@
-"""Balls of all named looks by Mitsuba, by the shaders of window and page, and by Cycles: ΔE2000.
+"""Balls of all presets by Mitsuba, by the shaders of window and page, and by Cycles: ΔE2000.
 
 python -m docs.make.figures.preset_agreement
 

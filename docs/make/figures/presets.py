@@ -1,4 +1,4 @@
-"""Balls of all named looks: docs/gallery.md.
+"""Balls of all presets: docs/gallery.md.
 
 python -m docs.make.figures.presets -o docs
 """

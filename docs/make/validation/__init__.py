@@ -29,6 +29,8 @@ closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them
 published        solvers beside printed efficiencies
+scans            hues of gratings and crops of a rough surface, through windows
+tapers           width of lobes against colours, for tapers of these windows
 statistics       checks with random surfaces, and windows at random places
 pages            writers of docs/validation.md and docs/validation/
 """

@@ -28,6 +28,8 @@ _STEP = 2.0  # nm
 _FINEST = 0.2  # µm: a pixel that resolves the orders of all wavelengths
 #: Angle from the mirror, side of a crop and pixels of the whole: crops of 10 µm of 133 µm.
 _CROP, _WHOLE, _PIXEL = 77, 1024, 0.13
+#: Width of a crop, µm, and the wavelengths, nm, at which crops are compared.
+WIDTH, WAVELENGTHS = _CROP * _PIXEL, np.arange(430.0, 801.0, 20.0)
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,14 @@ class Beside:
     ratio : of the mean over crops and wavelengths.
     worst : largest ratio of the mean over crops at a wavelength, or its inverse.
     scatter : standard deviation of one crop's light over the mean.
+    error : standard error of the ratio.
     """
 
     degrees: float
     ratio: float
     worst: float
     scatter: float
+    error: float
 
 
 def random_hues(count: int = 300, seed: int = 0) -> list[Hue]:
@@ -122,43 +126,65 @@ def _peak(lam: Real, value: Real) -> tuple[float, float, float]:
     return mean, 0.1 * (last - first), float(fine[top])
 
 
+#: RMS heights, µm, of roughness and ridges.
+_ROUGH, _RIDGES = 0.008, 0.012
+
+
+def _spectra(qx: Real, qy: Real) -> tuple[Real, Real]:
+    """Power spectra of roughness and of ridges 0.9 µm apart, on grids of rad/µm, in any unit."""
+    rough = (1 + np.square(0.8 * np.hypot(qx, qy))) ** -1.5
+    return rough, np.exp(-(((np.abs(qx) - 2 * np.pi / 0.9) / 0.5) ** 2) - qy**2)
+
+
+def spectrum(qx: Real, qy: Real) -> Real:
+    """Power spectrum of the ridged surface."""
+    rough, ridges = _spectra(qx, qy)
+    return _ROUGH**2 * rough / rough.sum() + _RIDGES**2 * ridges / ridges.sum()
+
+
 def rough_ridges(rng: np.random.Generator) -> Real:
     """Heights, µm, of ridges 0.9 µm apart on a rough surface that tiles the plane."""
     q = 2 * np.pi * np.fft.fftfreq(_WHOLE, _PIXEL)
-    x, y = np.meshgrid(q, q)
 
     def noise(power: Real) -> Real:
         waves = np.fft.fft2(rng.normal(size=(_WHOLE, _WHOLE))) * np.sqrt(power)
         heights = np.fft.ifft2(waves).real
         return heights / heights.std()
 
-    rough = noise((1 + np.square(0.8 * np.hypot(x, y))) ** -1.5)
-    ridges = noise(np.exp(-(((np.abs(x) - 2 * np.pi / 0.9) / 0.5) ** 2) - y**2))
-    return 0.008 * rough + 0.012 * ridges
+    rough, ridges = map(noise, _spectra(*np.meshgrid(q, q)))
+    return _ROUGH * rough + _RIDGES * ridges
 
 
 def crops(
-    count: int = 120, degrees: Sequence[float] = BESIDE, wavelengths: Real | None = None
-) -> list[Beside]:
-    """Compare levelled crops of 10 µm with the whole, 133 µm, under one window."""
+    count: int = 240, degrees: Sequence[float] = BESIDE, wavelengths: Real | None = None,
+    surfaces: int = 4,
+) -> list[Beside]:  # fmt: skip
+    """Compare levelled crops of 10 µm with the wholes, 133 µm, under one window.
+
+    Crops of one surface share its strong waves: `count` crops are of several `surfaces`.
+    """
     rng = np.random.default_rng(5)
-    heights, parts = rough_ridges(rng), []
-    for _ in range(count):
-        top, left = rng.integers(0, _WHOLE - _CROP, 2)
-        cut = heights[top : top + _CROP, left : left + _CROP]
-        parts.append(HeightField(cut, _PIXEL, cut_out=True).treated(level="plane"))
-    whole, width = HeightField(heights, _PIXEL, periodic=True), _CROP * _PIXEL
-    lam = np.arange(430.0, 801.0, 20.0) if wavelengths is None else wavelengths
+    parts, wholes = [], []
+    for _ in range(surfaces):
+        heights = rough_ridges(rng)
+        wholes.append(HeightField(heights, _PIXEL, periodic=True))
+        for _ in range(count // surfaces):
+            top, left = rng.integers(0, _WHOLE - _CROP, 2)
+            cut = heights[top : top + _CROP, left : left + _CROP]
+            parts.append(HeightField(cut, _PIXEL, cut_out=True).treated(level="plane"))
+    lam = WAVELENGTHS if wavelengths is None else wavelengths
     incident, results = np.radians(30.0), []
     wi = [np.sin(incident), 0.0, np.cos(incident)]
     for off in degrees:
         out = np.radians(30.0 - off)
         wo = [-np.sin(out), 0.0, np.cos(out)]
-        exact, *cuts = (
-            reference.brdf(field, wi, wo, lam, coherence_width=width) for field in (whole, *parts)
-        )
+        values = [
+            reference.brdf(field, wi, wo, lam, coherence_width=WIDTH) for field in (*wholes, *parts)
+        ]
+        exact, cuts = np.mean(values[:surfaces], axis=0), np.array(values[surfaces:])
         mean = np.mean(cuts, axis=0)
         worst = float(np.exp(np.abs(np.log(mean / exact)).max()))
         scatter = float(np.std(np.mean(cuts, axis=1)) / exact.mean())
-        results.append(Beside(off, float(mean.mean() / exact.mean()), worst, scatter))
+        error = scatter / np.sqrt(len(parts))
+        results.append(Beside(off, float(mean.mean() / exact.mean()), worst, scatter, error))
     return results

@@ -227,21 +227,16 @@ def laid(
         group = lights[first : first + together]
         wo, widths = zip(*(nodes.directions(wi, p, q) for wi in group), strict=True)
         solid = [area * part * (out[:, 2] > 0.0) for part, out in zip(widths, wo, strict=True)]
-        lit = [np.flatnonzero(part) for part in solid]
         if orders is not None:
             light = [orders.on(nodes, wi, grid.wavelengths, step) for wi in group]
         else:
-            wi = np.repeat(group, [len(part) for part in lit], axis=0)
-            out = np.concatenate([part[of] for part, of in zip(wo, lit, strict=True)])
-            shift = (number[np.concatenate(lit)] - 0.5) * step
-            values = np.split(
-                _evaluated(bsdf, wi, out, grid.wavelengths, shift),
-                np.cumsum([len(part) for part in lit])[:-1],
-            )
-            light = [
-                hats[:, of] @ (part * areas[of, None])
-                for of, part, areas in zip(lit, values, solid, strict=True)
-            ]
+            lit = np.concatenate(solid) > 0.0
+            shift = (np.tile(number, len(group))[lit] - 0.5) * step
+            pairs = np.repeat(group, len(p), axis=0)[lit], np.concatenate(wo)[lit]
+            values = np.zeros((len(lit), len(grid.wavelengths)))
+            values[lit] = _evaluated(bsdf, *pairs, grid.wavelengths, shift)
+            parts = zip(np.split(values, len(group)), solid, strict=True)
+            light = [hats @ (part * areas[:, None]) for part, areas in parts]
         for part, areas, out in zip(light, solid, wo, strict=True):
             yield _values(nodes, part, hats @ (areas if nodes.cosine else areas * out[:, 2]))
     progress(1, 1, "evaluating")

@@ -14,7 +14,11 @@ from ...plugin.memory import once_a_table, read, read_record, upload
 from ...plugin.types import Buffer, Float, Index, Mask
 from ..efficiency import AnyLookup, lookup_in
 from ..grid import OrderGrid
+from ..lookup import RAISED, Lookup
 from ..table import OrderTable
+
+#: Against division by 0, in single precision.
+_MIN_DIVISOR, _SMALLEST = 1e-7, 2.0**-126
 
 
 class Device:
@@ -44,7 +48,8 @@ class Device:
 @once_a_table
 def order_lookup(table: OrderTable) -> AnyLookup:
     """Return the look-up of a table in the current variant."""
-    return lookup_in(table, Device, coated=True, elements=mi.is_polarized and table.polarised)
+    elements = mi.is_polarized and table.polarised
+    return lookup_in(table, Device, coated=True, elements=elements, chances=True)
 
 
 class Drawn(NamedTuple):
@@ -57,6 +62,9 @@ class Drawn(NamedTuple):
 
 def draw(lookup: AnyLookup, row: Any, sample: Float) -> Drawn:
     """Return an order drawn by its efficiency over `Lookup.total`."""
+    if lookup.has_chances:
+        assert isinstance(lookup, Lookup)
+        return _drawn_at_a_corner(lookup, row, sample)
     target, ports = sample * lookup.total(row), mi.UInt32(lookup.ports(row))
 
     def body(port: Index, reached: Float) -> tuple[Index, Float]:
@@ -70,3 +78,42 @@ def draw(lookup: AnyLookup, row: Any, sample: Float) -> Drawn:
     port, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
     # of listed light, the last port's order may not propagate: no light
     return Drawn(*lookup.order_at(row, dr.select(port > 0, port - 1, 0)), reached > target)
+
+
+def _drawn_at_a_corner(lookup: Lookup, row: Any, sample: Float) -> Drawn:
+    """Draw a corner of a cell by its part of the sum, then an order by the chances at that node.
+
+    Interpolation mixes the corners, so that both draws have the interpolated chances; and the
+    orders of a node lie side by side in memory.
+    """
+    target, mirrored = sample * lookup.total(row), mi.Mask(False)
+    if lookup.coated:  # the face's mirror direction comes first
+        mirrored = target < row.face * RAISED
+        target = (target - row.face * RAISED) * dr.rcp(dr.maximum(1.0 - row.face, _MIN_DIVISOR))
+    node, rest, found, before = mi.UInt32(0), mi.Float(0.0), mi.Mask(False), mi.Float(0.0)
+    corners = zip(lookup.nodes(row), row.weights, lookup.totals(row), strict=True)
+    for corner, weight, total in corners:
+        raised = weight * RAISED
+        after = dr.fma(raised, total, before)
+        here = (target >= before) & (target < after)
+        node = dr.select(here, corner, node)
+        rest = dr.select(here, (target - before) * dr.rcp(dr.maximum(raised, _SMALLEST)), rest)
+        found, before = found | here, after
+    ports = mi.UInt32(lookup.ports(row))
+    records = (ports + 7) >> 3
+    first = lookup.memory.start("chance_starts", row.kind) + (node * ports + row.entered) * records
+
+    def body(n: Index, port: Index, reached: Float) -> tuple[Index, Index, Float]:
+        for i, chance in enumerate(lookup.memory.read("chances", first + n, 8, row.lit)):
+            port = dr.select(reached <= rest, n * 8 + i, port)
+            reached = reached + chance
+        return n + 1, port, reached
+
+    def further(n: Index, port: Index, reached: Float) -> Mask:
+        return (reached <= rest) & (n < records)
+
+    state = mi.UInt32(0), mi.UInt32(0), mi.Float(0.0)
+    _, port, reached = dr.while_loop(state, further, body)
+    order, below = lookup.order_at(row, port)
+    valid = found & (reached > rest)
+    return Drawn(dr.select(mirrored, 0.0, order), mi.Mask(below) & ~mirrored, valid | mirrored)

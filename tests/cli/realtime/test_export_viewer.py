@@ -21,7 +21,16 @@ def test_a_page_is_written_and_its_loss_is_named(
 ) -> None:
     out = tmp_path / "plate.html"
     report = tmp_path / "page.json"
-    command = ["export-viewer", str(scene), str(out), "--method", "fast", "--json", str(report)]
+    command = [
+        "export-viewer",
+        str(scene),
+        "-o",
+        str(out),
+        "--method",
+        "fast",
+        "--json",
+        str(report),
+    ]
     assert main(command) == 0
     assert json.loads(report.read_text(encoding="utf-8"))["bytes"] == out.stat().st_size
     text = out.read_text(encoding="utf-8")
@@ -37,7 +46,7 @@ def test_a_page_is_written_and_its_loss_is_named(
 def test_a_title_is_text_in_the_page(scene: Path, tmp_path: Path, some_variant: str) -> None:
     named = scene.rename(tmp_path / "<!--<script>.xml")
     out = tmp_path / "plate.html"
-    assert main(["export-viewer", str(named), str(out), "--method", "fast"]) == 0
+    assert main(["export-viewer", str(named), "-o", str(out), "--method", "fast"]) == 0
     text = out.read_text(encoding="utf-8")
     assert "<!--<script" not in text
     assert r"\u003c!--\u003cscript>" in text
@@ -48,7 +57,7 @@ def test_variants_that_the_shaders_cannot_read_are_refused_in_one_line(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], variant: str
 ) -> None:
     for command in (
-        ["export-viewer", str(scene), str(tmp_path / "a.html")],
+        ["export-viewer", str(scene), "-o", str(tmp_path / "a.html")],
         ["compare", str(scene), "-o", str(tmp_path / "compared")],
     ):
         assert main([*command, "-m", variant]) == 1
@@ -64,7 +73,7 @@ def test_unwritable_pages_are_refused_in_one_line(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], out: str, words: str
 ) -> None:
     (tmp_path / "folder.html").mkdir()
-    assert main(["export-viewer", str(scene), str(tmp_path / out)]) == 1
+    assert main(["export-viewer", str(scene), "-o", str(tmp_path / out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
 
@@ -77,14 +86,14 @@ def test_an_environment_without_a_picture_is_refused_in_one_line(
     sky = f'<emitter type="envmap"><string name="filename" value="{name}"/></emitter></scene>'
     scene.write_text(scene.read_text().replace("</scene>", sky))
     out = tmp_path / "plate.html"
-    assert main(["export-viewer", str(scene), str(out)]) == 1
+    assert main(["export-viewer", str(scene), "-o", str(out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert name in line
     assert not out.exists()
 
 
 def test_other_endings_are_usage_errors(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export-viewer", str(scene), "page.pdf"]) == 2
+    assert main(["export-viewer", str(scene), "-o", "page.pdf"]) == 2
     assert ".html" in capsys.readouterr().err
 
 
@@ -94,7 +103,7 @@ def test_a_scene_without_diffraction_is_refused(
     file = tmp_path / "dull.xml"
     file.write_text(SCENE.format(bsdf='<bsdf type="diffuse"/>'))
     out = tmp_path / "dull.html"
-    assert main(["export-viewer", str(file), str(out)]) == 1
+    assert main(["export-viewer", str(file), "-o", str(out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "diffracts" in line
     assert not out.exists()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scans import BESIDE, LIGHT, crops, random_hues
+from ..scans import BESIDE, LIGHT, WAVELENGTHS, WIDTH, crops, random_hues, spectrum
+from ..tapers import TAPERS, lobe_widths, seen
 from .markdown import percent, table
 from .measurements import Measurements
 
@@ -38,23 +39,54 @@ values are of `md.reference.brdf`.
 
 Peaks are {percent(width.mean() - 1.0)} wider than through the light's window on average, 90 % of
 them {percent(low - 1.0)} to {percent(high - 1.0)}. Orders of a window of width W lie π/W apart;
-between them a look-up has ripples, which move the highest point, and the window ends where its
-taper is still 0.22."""
+between them a look-up has ripples, which move the highest point. The window ends where its taper is
+still 0.22, which widens lobes by {percent(lobe_widths(next(iter(TAPERS.values()))).mean() - 1.0)}
+([below](#choice-of-the-taper))."""
 
 
 def _crops(quick: bool) -> str:
-    few = {"count": 3, "degrees": (10.0,), "wavelengths": np.array([500.0, 600.0])}
+    few = {"count": 3, "degrees": (10.0,), "wavelengths": np.array([500.0, 600.0]), "surfaces": 1}
     found = crops(**few) if quick else crops(degrees=BESIDE)  # type: ignore[arg-type]
+    own = next(iter(TAPERS.values()))
+    lam = WAVELENGTHS[::9] if quick else WAVELENGTHS
+    expected = [seen(own, spectrum, WIDTH, one.degrees, lam) for one in found]
     rows = [
-        [f"{one.degrees:g}°", f"{one.ratio:.2f}", f"{one.worst:.2f}", f"{one.scatter:.2f}"]
-        for one in found
-    ]
+        [
+            f"{one.degrees:g}°", f"{one.ratio:.2f} ± {one.error:.2f}", f"{one.worst:.2f}",
+            f"{one.scatter:.2f}", f"{each.ratio:.2f}", f"{each.worst:.2f}",
+        ]
+        for one, each in zip(found, expected, strict=True)
+    ]  # fmt: skip
+    heads = ["from the mirror", "mean", "colour", "scatter", "mean expected", "colour expected"]
     return f"""## Crops of a rough surface
 
 Crops of 10 µm, levelled, of rough ridges over the whole, 133 µm, under the same window. Light from
-30°, 430 to 800 nm. *Mean* is over crops and wavelengths, *colour* the largest ratio of the mean
-crop at a wavelength, *scatter* the standard deviation of single crops.
+30°, 430 to 800 nm. *Mean* is over crops and wavelengths, with its standard error; *colour* the
+largest ratio of the mean crop at a wavelength; *scatter* the standard deviation of single crops.
+*Expected* is the closed form for low relief, the power spectrum convolved with the window's lobe:
+means of infinitely many crops.
 
-{table(["from the mirror", "mean", "colour", "scatter"], rows)}
+{table(heads, rows)}
 
-Light within 7° of the mirror is of waves longer than a crop."""
+Light within 7° of the mirror is of waves longer than a crop.
+
+## Choice of the taper
+
+A window of 4σ cannot have lobes as narrow as the light's Gaussian and none of the light of strong
+waves far away. *Width* is of a lobe over the light's, the mean and the range over places between
+orders; *colour expected* is as above.
+
+{_tapers(lam)}
+
+Narrower lobes cost colours: no taper here has both narrower lobes and truer colours than the
+package's, the first. Wider scans have both, since their windows are wider than 10 µm."""
+
+
+def _tapers(lam: np.ndarray) -> str:
+    rows = []
+    for name, taper in TAPERS.items():
+        widths = lobe_widths(taper)
+        colours = [f"{seen(taper, spectrum, WIDTH, d, lam).worst:.2f}" for d in (15.0, 20.0, 30.0)]
+        rows.append([name, f"{widths.mean():.2f}", f"{widths.min():.2f} to {widths.max():.2f}"])
+        rows[-1] += colours
+    return table(["taper", "width", "range", "colour at 15°", "at 20°", "at 30°"], rows)
