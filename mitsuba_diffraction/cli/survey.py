@@ -69,6 +69,7 @@ def run(args: argparse.Namespace) -> Figures:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
     failed = sum(bool(row["reason"]) for row in rows)
     from ..analysis.iridescence import WINDOW
+    from ..heights.coherence import ONE_WINDOW
 
     wide = sorted(row["width_um"] for row in rows if not row["reason"])
     if wide and wide[-1] > _SIZES * max(wide[0], WINDOW):
@@ -78,7 +79,7 @@ def run(args: argparse.Namespace) -> Figures:
         )
     scans = Counter(row["sample"] for row in rows if not row["reason"])
     alone = [r for r in rows if not r["reason"] and scans[r["sample"]] == 1]
-    if any(row.get("windows") == 1 for row in alone):
+    if any(row["width_um"] <= ONE_WINDOW for row in alone):
         say(
             "one index of a small scan is uncertain by some 15 %: its window sees one part of the "
             "surface; compare means of several scans of a sample (samples.csv)"

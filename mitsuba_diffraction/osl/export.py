@@ -220,13 +220,13 @@ def _patch(described: Surface, placed: Mapping[str, Any]) -> OslShader:
         "Eta": np.real(parts),
         "Absorption": np.imag(parts),
         "Statistic": statistic.nodes,
+        "Factors": textures.factors,
     }
     constants = patch_constants(table, textures, statistic)
     if described.coat is not None:
         constants["COAT"] = float(described.coat)
     files: dict[str, NDArray[Any]] = {
         "PowersFile": textures.powers,
-        "FactorsFile": textures.factors,
         "DrawsFile": textures.draws,
     }
     if (energy := energy_texture(described)) is not None:

@@ -27,6 +27,9 @@ _EVEN = 0.1
 _UNLIMITED = 1e9
 #: Largest probability in the texture of draws, near the largest half.
 _LARGEST = 3e4
+#: Phase over a cell of κ, rad: the error is its square over 8, 5e-4. Factors are an array of the
+#: shader, since reads of textures take most of the time.
+_CELL = 0.06
 #: Nodes of κ at which densities are the mean of an order's share, for each band.
 _NODES = 8
 
@@ -37,7 +40,7 @@ class PatchTextures(NamedTuple):
     Attributes
     ----------
     powers : (intervals · rows, columns · texels, 4) terms of each order, see `PackedPowers`.
-    factors : (intervals · (cells + 1), texels + 1, 4) float32.
+    factors : (intervals · (cells + 1) · (4 texels + 1),) factors of the terms, and order 0's power.
     draws : (BANDS · rows, columns, 4) half or single, cells of alias tables: threshold, probability
         of the order times `likelihood`, and the other order from the middle, along x and y.
     packed : the powers before they are laid out.
@@ -111,7 +114,7 @@ def mean_transmittance(
 
 def patch_textures(table: DiffractionTable) -> PatchTextures:
     """Lay out the powers of all orders, and tabulate densities to draw orders from."""
-    packed = pack_powers(table)
+    packed = pack_powers(table, _CELL)
     rows, columns = table.grid.shape
     # halves end at 65504
     factor = min(1.0, 6e4 / max(float(np.abs(packed.orders).max()), 1e-30))
@@ -131,7 +134,7 @@ def patch_textures(table: DiffractionTable) -> PatchTextures:
         cells[:, 1] = chance * (likelihood / len(other))
     return PatchTextures(
         half.reshape(-1, columns * packed.texels, 4),
-        packed.factors.reshape(-1, *packed.factors.shape[2:]),
+        packed.factors.reshape(*packed.factors.shape[:2], -1)[..., :-3].ravel(),
         draws.reshape(-1, columns, 4),
         packed,
         packed.scale * factor,
@@ -202,6 +205,7 @@ def patch_constants(
         "INTERVALS": textures.packed.expansion.intervals,
         "CELLS": textures.packed.cells,
         "TEXELS": textures.packed.texels,
+        "FACTORS": len(textures.factors),
         "SCALE": textures.scale,
         "LIKELIHOOD": textures.likelihood,
         "BANDS": BANDS,

@@ -12,9 +12,9 @@ from ..tables.layout import BinRecord, cells_of, functions_at
 from ..tables.powers import order_0_power, power_series
 from ..tables.table import DiffractionTable
 
-#: Phase over a cell of κ, within which functions are interpolated linearly; the error is its square
+#: Phase over a cell of κ, within which factors are interpolated linearly; the error is its square
 #: over 8, 1e-4.
-_CELL = 0.03
+CELL = 0.03
 
 
 class PackedPowers(NamedTuple):
@@ -47,12 +47,15 @@ class PackedPowers(NamedTuple):
         return self.factors.shape[1] - 1
 
 
-def pack_powers(table: DiffractionTable) -> PackedPowers:
-    """Pack the powers of an incoherent table; amplitudes are converted to powers."""
+def pack_powers(table: DiffractionTable, cell: float = CELL) -> PackedPowers:
+    """Pack the powers of an incoherent table; amplitudes are converted to powers.
+
+    cell : phase over a cell of κ, rad.
+    """
     series, _, scale, expansion = power_series(table)
     record = BinRecord.of(1, expansion.terms, unit=4)
     orders = record.pack(series[..., None, :]).reshape(*series.shape[:3], record.stored)
-    cells = cells_of(expansion, _CELL)
+    cells = cells_of(expansion, cell)
     share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
     kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share)
     factors = np.zeros((*kappa.shape, record.stored + 4), np.float32)

@@ -25,7 +25,7 @@ COMMANDS = [
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
      "--material keratin", ".exr .png"),
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),
-    ("evaluate recipe.toml --windows 0 --step 50 --angle-step 5", ".png .csv .npz"),
+    ("evaluate recipe.toml --positions 0 --step 50 --angle-step 5", ".png .csv .npz"),
     ("spectrum t.exr --material keratin --pigment pigment.csv --step 50", ".csv .png"),
     ("spectrum recipe.toml --step 100", ".csv .png"), ("spectrum orders.nc --step 100", ".csv"),
     ("spectrum h.npy --treatments treatments.toml --step 100 " + SMALL, ".csv"),
@@ -39,7 +39,7 @@ COMMANDS = [
     ("scatter h.npy --pixel-size 0.1 --coherence-width 2", ".csv .png"),
     ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", ""),
     ("export-osl t.exr --name t --material Al", ""),
-    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500,500 --material Al", ".nc"),
+    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500:500 --material Al", ".nc"),
 ]  # fmt: skip
 #: Commands that take long, and outputs of theirs.
 SLOW = [

@@ -48,8 +48,8 @@ TEXTURES = patch_textures(TABLE)
 def test_powers_are_those_of_the_table(share):
     kappa = share * TABLE.expansion.kappa_max
     exact = powers_at(TABLE, kappa)
-    # terms are halves, of 11 digits; factors are off by 0.03²/8 between the ends of a cell
-    assert np.abs(interpolated(TEXTURES, kappa) - exact).sum() < 1.2e-4
+    # terms are halves, of 11 digits; factors are off by 0.06²/8 between the ends of a cell
+    assert np.abs(interpolated(TEXTURES, kappa) - exact).sum() < 5e-4
 
 
 def test_draws_have_the_probabilities_that_weigh_them():
@@ -158,4 +158,4 @@ def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_varian
     assert values["Pigment"] == pytest.approx(colour, abs=0.01)
     coat = re.search(r"#define COAT (\S+)", exported.shader.read_text(encoding="utf-8"))
     assert float(coat[1]) == pytest.approx(1.25, abs=1e-3)
-    assert set(document["textures"]) == {"PowersFile", "FactorsFile", "DrawsFile"}
+    assert set(document["textures"]) == {"PowersFile", "DrawsFile"}

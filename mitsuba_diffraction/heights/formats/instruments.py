@@ -31,6 +31,8 @@ _NOT_HEIGHT = re.compile(
 _HEIGHT = re.compile(
     r"(?:^|[^a-z])(?:height\w*|topo\w*|z|surface|elevation)(?:$|[^a-z])[^/]*$", re.IGNORECASE
 )
+# Formats of arrays, which have no header that says how they lie.
+_ARRAYS = ("h5", "mat", "npz")
 _MICROMETRE = "µm"
 #: Relative difference up to which two statements of a size are one: rounding.
 _SAME_SIZE = 0.01
@@ -85,6 +87,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         try:
             chosen, note = _choose(list(reader.channels), channel, shown)
             raw = _read_channel(reader, chosen, shown, size)
+            if reader.format() in _ARRAYS:
+                note += "; the first index of the array runs along x, the second from the top down"
         except (DiffractionError, MemoryError):
             raise
         except Exception as error:

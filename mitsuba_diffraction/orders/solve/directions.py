@@ -98,8 +98,6 @@ def solve_directions(
     compared = every[:: max(len(every) // _COMPARED, 1)]
     announce_comparison(announce, problem, work, compared)
     chosen = resolved(problem, work, compared, how.tolerance / 2)
-    announce_stage(announce, "solving", chosen.problem, work, every)
-    solved = work.amplitudes(chosen.problem, every, "solving orders")
     first = int(min((cell.channel - cell.channels + 1).min() for cell in cell_of))
     last = int(max(cell.channel.max() for cell in cell_of))
     orders = orders_between((first, 0), (last, 0))
@@ -108,6 +106,8 @@ def solve_directions(
     if grating.thin and conical:  # without phases, which tell s from p
         elements = 1
     values = np.full((len(waves), sides, sides, len(orders), elements), np.nan)
+    announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
+    solved = work.amplitudes(chosen.problem, every, "solving orders")
     for came, (cell, of_side) in enumerate(zip(cell_of, places, strict=True)):
         for n, (place, j) in enumerate(zip(of_side, cell.channel.tolist(), strict=True)):
             size = int(cell.channels[n])

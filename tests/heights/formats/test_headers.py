@@ -159,6 +159,9 @@ def test_of_maps_without_units_the_one_called_height_is_read_or_all_are_listed(t
     field = HeightField.load(path, **lengths)
     assert field.range == pytest.approx(0.019)
     assert "Height_trace" in field.history[0]
+    # (5, 4): five along x, as the note says
+    assert field.shape == (4, 5)
+    assert "first index of the array runs along x" in field.history[0]
     with h5py.File(path, "w") as file:
         file["a"], file["b"] = first, second
     message = refusal(path, **lengths)

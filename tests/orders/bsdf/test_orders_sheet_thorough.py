@@ -94,7 +94,7 @@ def flat_sheet(index: float) -> OrderTable:
         lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, 0.4)
         light = cells.from_cell(k, kind, channels, tau, rho, lam, 0.4)
         cosine = np.sqrt(np.maximum(1.0 - light.x**2 - light.y**2, 0.0))
-        through = flat_transmittances(cosine, index, True, 0).mean(axis=0)
+        through = flat_transmittances(cosine, index, True).mean(axis=0)
         blocks = [[1.0 - through, through], [through, 1.0 - through]]
         each = [[part[..., None] * np.eye(len(channels)) for part in row] for row in blocks]
         values = np.block(each)

@@ -9,7 +9,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import problem_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import polygon, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import lamellar, polygon, sinusoidal
 from mitsuba_diffraction.orders.solve.resolution import coarsest
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
@@ -63,3 +63,17 @@ def test_one_direction_of_a_long_period_is_a_small_table(period, waves):
     assert waves * table.nbytes < 1e6
     shares = table.efficiency(-np.sin(np.radians(20.0)), 0.0, 550.0, table.response.orders[:, 0])
     assert shares.sum() == pytest.approx(0.915, abs=0.01)
+
+
+def test_a_slit_of_gold_is_that_of_lalanne_and_hugonin():
+    """J. Opt. Soc. Am. A 17, 1033 (2000), table: order −1 of s light 0.73428, order 0 of p 0.84848.
+
+    Order −1 there is order 1 here. s converges as N⁻², p more slowly.
+    """
+    slit = lamellar(1.0, 1.0)
+    settings = Settings(wavelengths=(1000.0, 1000.0), tolerance=2e-4)
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table = solve_orders(slit, "0.22+6.71i", theta=30.0, settings=settings)
+    light = -0.5, 0.0, 1000.0
+    assert table.polarised_efficiency(*light, 1)[0] == pytest.approx(0.73428, abs=1e-4)
+    assert table.polarised_efficiency(*light, 0)[1] == pytest.approx(0.84848, abs=1e-3)

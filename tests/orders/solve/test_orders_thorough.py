@@ -46,10 +46,12 @@ def test_an_interrupted_table_goes_on_and_is_the_same(tmp_path):
     assert digest_in_file(again, tmp_path) == digest_in_file(table, tmp_path)
 
 
-def test_a_tolerance_that_is_missed_is_warned_of():
-    coarse = Settings(wavelengths=RANGE, tolerance=1e-4, resolution=48)
-    with pytest.warns(md.DiffractionWarning, match="of the light in its orders on average"):
-        solve_orders(PROFILE, "none", settings=coarse)
+def test_a_tolerance_out_of_reach_is_refused_before_the_solution():
+    """The integral method's digits at 48 points end above it, at any number of nodes."""
+    coarse, stages = Settings(wavelengths=RANGE, tolerance=1e-4, resolution=48), []
+    with pytest.raises(md.DiffractionError, match="will not be reached"):
+        solve_orders(PROFILE, "none", settings=coarse, announce=lambda e: stages.append(e.stage))
+    assert "solving" not in stages
 
 
 def test_a_solution_is_the_same_in_this_process_and_another():

@@ -78,7 +78,7 @@ def test_a_flat_sheet_is_fresnel_s():
     light, powers = station(lamellar(0.8, 1e-7)), solved(lamellar(0.8, 1e-7))
     c = np.sqrt(1.0 - light.along[0] ** 2)
     cosines = c * np.sqrt(1.0 - light.sines**2)
-    through = flat_transmittances(cosines, INDEX, True, 0).mean(axis=0)
+    through = flat_transmittances(cosines, INDEX, True).mean(axis=0)
     back = 1.0 - through
     assert np.all(back > reflectance(cosines, INDEX))
     found = 0.5 * powers.sum(axis=(1, 3))
