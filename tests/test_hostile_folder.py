@@ -39,7 +39,7 @@ DONE = [
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
      "100", "--no-compiled", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],
-    ["scatter", *_TABLE, "-o", "out/scatter.csv"],
+    ["scatter", *_HEIGHTS, "-o", "out/scatter.csv"],
     ["solve", "lamellar", "--period", "0.6", "--depth", "0.1", "--resolution", "80",
      "--wavelength-range", "590:610", "--theta", "0", "--step", "20", *_METAL, "-o",
      "out/orders.nc"],

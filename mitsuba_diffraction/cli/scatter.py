@@ -26,7 +26,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
          {"dest": "wavelengths"}),
     )  # fmt: skip
-    options.add_table(parser, ("coherence_width",))
+    options.add_table(parser, ("coherence_width", "tolerance"))
     options.add_json(parser)
     options.add_heights(parser)
 

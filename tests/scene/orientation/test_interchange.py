@@ -147,7 +147,7 @@ SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [
 
 
 def write_cube(file: Path) -> None:
-    """Write a cube of four-sided polygons without normals; OBJ has a texture on each side."""
+    """Write a cube of four-sided polygons without normals."""
     if file.suffix == ".usda":
         listed = ", ".join(f"({x}, {y}, {z})" for x, y, z in CORNERS)
         text = (
@@ -156,22 +156,17 @@ def write_cube(file: Path) -> None:
             f"    int[] faceVertexIndices = {[corner for side in SIDES for corner in side]}\n"
             f"    point3f[] points = [{listed}]\n}}\n"
         )
-    elif file.suffix == ".ply":
+    else:
         head = ["ply", "format ascii 1.0", "element vertex 8"]
         head += [f"property float {axis}" for axis in "xyz"]
         head += ["element face 6", "property list uchar int vertex_indices", "end_header"]
         rows = [*CORNERS, *([4, *side] for side in SIDES)]
         text = "\n".join([*head, *(" ".join(map(str, row)) for row in rows), ""])
-    else:
-        lines = [f"v {x} {y} {z}" for x, y, z in CORNERS]
-        lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
-        lines += ["f " + " ".join(f"{c + 1}/{n + 1}" for n, c in enumerate(s)) for s in SIDES]
-        text = "\n".join([*lines, ""])
     file.write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("suffix", [".usda", ".ply", ".obj"])
-def test_meshes_without_normals_get_smooth_ones_over_all_seams(
+@pytest.mark.parametrize("suffix", [".usda", ".ply"])
+def test_meshes_without_normals_get_smooth_ones(
     tmp_path: Path, suffix: str, some_variant: str
 ) -> None:
     if suffix == ".usda":
@@ -180,8 +175,24 @@ def test_meshes_without_normals_get_smooth_ones_over_all_seams(
     write_cube(file)
     mesh = load_mesh(file)
     assert not has_own_normals(file)
-    assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, mesh.positions / np.sqrt(3.0), atol=1e-6)
+
+
+@pytest.mark.parametrize(("sides", "sharp"), [(5, True), (7, False)])
+def test_edges_of_sixty_degrees_between_parts_of_the_texture_are_sharp(
+    tmp_path: Path, sides: int, sharp: bool, some_variant: str
+) -> None:
+    """A tube of a few sides, with texture coordinates of its own on each."""
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    lines = [f"v {np.cos(a)} {np.sin(a)} {z}" for z in (0, 1) for a in angles]
+    lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
+    ends = [(n, (n + 1) % sides) for n in range(sides)]
+    corners = ((a, b, b + sides, a + sides) for a, b in ends)
+    lines += ["f " + " ".join(f"{c + 1}/{n + 1}" for n, c in enumerate(s)) for s in corners]
+    (tmp_path / "tube.obj").write_text("\n".join([*lines, ""]))
+    mesh = load_mesh(tmp_path / "tube.obj")
+    outwards = (mesh.normals * mesh.positions)[:, :2].sum(axis=1)  # of unit vectors
+    np.testing.assert_allclose(outwards, np.cos(np.pi / sides) if sharp else 1.0, atol=1e-6)
 
 
 def test_the_axis_of_a_stage_is_its_own(tmp_path: Path) -> None:
