@@ -211,8 +211,11 @@ class Lookup:
         leaves = propagates & (square > 0.0)
         through = self._through(xp.sqrt(xp.maximum(square, 0.0)))
         mirror = xp.where(order == 0.0, row.face, 0.0)
+        # of light that enters, and by reciprocity of light that leaves, no order has more than all:
+        # between corners of total reflection and others, a mirror would have hundreds of times that
+        most = through * xp.reciprocal(xp.maximum(through, xp.maximum(1.0 - row.face, 1e-6)))
         shares = (
-            self.at_port(row, port, 0, propagates) * through,
+            xp.minimum(self.at_port(row, port, 0, propagates) * through, most),
             self.at_port(row, port, 1, propagates),
         )
         return Share(*(xp.where(leaves, self._outside(row, s, mirror), 0.0) for s in shares))

@@ -45,6 +45,14 @@ def test_a_flat_mirror_keeps_its_light_up_to_the_horizon(some_variant):
     assert np.all(np.abs(mean - reflectance) < 4.0 * error + 3e-3), mean
 
 
+def test_a_perfect_mirror_under_a_layer_reflects_all_light(some_variant):
+    """Its look-up is between cells' corners beyond the critical angle, where reflections add up."""
+    table = OrderTable.mirror(PERIOD, 1.0, (360.0, 830.0), superstrate=1.5)
+    directions = np.array([polar(theta, 20.0) for theta in (0.0, 60.0, 80.0, 83.0, 85.0, 88.0)])
+    mean, error = furnace_in(load(table), directions, 1)
+    assert np.all(np.abs(mean - 1.0) < 4.0 * error + 5e-3), mean
+
+
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [

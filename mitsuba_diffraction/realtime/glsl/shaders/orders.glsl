@@ -75,8 +75,10 @@ float efficiency_of(float order)
     float out_x, square;
     order_direction(row_incident.x, row_incident.y, order, row_wavelength / period, out_x, square);
     if (square <= 0.0) return 0.0;
-    float twice = (1.0 - row_face) * face_transmittance(sqrt(square), superstrate);
-    return twice * efficiency_towards(q) + (order == 0.0 ? row_face : 0.0);
+    float through = face_transmittance(sqrt(square), superstrate), entering = 1.0 - row_face;
+    // no order has more than all light that enters, or leaves (orders/lookup.py)
+    float light = min(entering * through * efficiency_towards(q), min(entering, through));
+    return light + (order == 0.0 ? row_face : 0.0);
 #else
     return efficiency_towards(q);
 #endif
