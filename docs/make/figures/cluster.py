@@ -47,7 +47,7 @@ from .pages import exit_code
 
 VARIANT, SPP = "llvm_ad_rgb", 32
 FRAMES, RUNS = 16, 5
-WORKERS = (1, 100, 1000, 3000)
+WORKERS = (10, 100, 1000, 3000)
 FILM, STILL = Job(2000, 1024, 640, 1024), Job(1, 3840, 2160, 65_536)
 #: Network of every machine, in bytes a second, and the spread of the times of tasks: assumed.
 NETWORK, SPREAD = 1.25e8, 0.15
@@ -201,16 +201,17 @@ def scheduler_seconds(count: int = 1000) -> float:
 
 
 def scaling(costs: Costs) -> str:
-    """The table of simulated clusters."""
-    rows = []
-    for workers in WORKERS:
-        row = [f"{workers:,}"]
-        for job in (FILM, STILL):
-            seconds = Simulation(job, workers, costs).seconds()
-            ideal = job.work(costs) / workers
-            row += [f"{seconds / 3600:.3g} h", f"{ideal / seconds:.0%}"]
-        rows.append(tuple(row))
-    return pages.table(("workers", "animation", "of the ideal", "still", "of the ideal"), rows)
+    """The sentence on simulated clusters: their speed relative to the ideal."""
+    parts = []
+    for name, job in (("animation", FILM), ("still", STILL)):
+        shares = [
+            f"{job.work(costs) / workers / Simulation(job, workers, costs).seconds():.0%}"
+            for workers in WORKERS
+        ]
+        hours = job.work(costs) / 3600
+        parts.append(f"{name} {', '.join(shares)} ({hours:.0f} h on one worker)")
+    workers = ", ".join(f"{count:,}" for count in WORKERS)
+    return f"Speed of {workers} workers relative to the ideal: {'; '.join(parts)}."
 
 
 def film_text(times: FilmTimes) -> str:
@@ -234,15 +235,11 @@ def job_text(job: Job) -> str:
 
 
 def costs_text(costs: Costs) -> str:
-    """The measured and the assumed costs."""
-    seconds = costs.sample * 2**21
+    """What the simulation assumes."""
     return (
-        f"Measured: {seconds:.2g} s for a pass of the snake on two cores, {costs.load:.2g} s for a "
-        f"scene and its kernels, {1e3 * costs.scheduler:.2g} ms of client and scheduler for a "
-        f"task, {1e9 * costs.client:.2g} ns a byte for the client and "
-        f"{1e9 * costs.addition:.2g} ns for a worker to add a sum. Assumed: workers of two such "
-        f"cores, tasks that vary by {costs.spread:.0%}, {8e-9 / costs.network:g} Gbit/s, no "
-        f"failures. Animation: {job_text(FILM)}. Still: {job_text(STILL)}."
+        f"Assumed: workers of two cores ({costs.sample * 2**21:.2g} s for a pass of the snake), "
+        f"tasks that vary by {costs.spread:.0%}, {8e-9 / costs.network:g} Gbit/s, no failures. "
+        f"Animation: {job_text(FILM)}. Still: {job_text(STILL)}."
     )
 
 

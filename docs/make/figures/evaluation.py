@@ -137,7 +137,7 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
 
 
 def period_table(patches: Sequence[Periods]) -> str:
-    """Fitted periods, in nm, as a Markdown table, and a sentence with the largest residuals.
+    """Fitted periods, in nm, as a Markdown table.
 
     The last columns are the mean and standard deviation of single windows, and the period found by
     the procedure of the thesis.
@@ -152,17 +152,7 @@ def period_table(patches: Sequence[Periods]) -> str:
         windows = f"{mean:.5g} ± {f'{spread:.2g}' if spread >= 0.01 else '0'}"
         thesis = "" if np.isnan(patch.thesis) else f"{1e3 * patch.thesis:.5g}"
         rows.append((patch.name, nominal, *periods, windows, thesis))
-    residuals = ", ".join(
-        f"{_short(max(patch.by_method[name].fit.residual for patch in patches))}° (`{name}`)"
-        for name in names
-    )
-    text = f"Largest root mean square of a fit's residuals: {residuals}."
-    return f"{pages.table(header, rows)}\n\n{text}"
-
-
-def _short(value: float) -> str:
-    """Two digits, without a power of ten."""
-    return f"{value:.4f}" if value < 0.01 else f"{value:.2g}"
+    return pages.table(header, rows)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

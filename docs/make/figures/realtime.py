@@ -46,7 +46,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         text = _tables([folder / "compare.json" for folder in args.compared])
         sheet = args.output.parent / SHEET
         folder = args.sheet or args.compared[0]
-        text += _of_sheet(folder) if args.sheet else ""
         write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
         pages.update(args.output, {"realtime": text})
 
@@ -64,22 +63,6 @@ def _tables(files: Sequence[Path]) -> str:
     # links of `compare` start at the repository's root, those of the page in docs
     scenes = scenes_table(documents).replace("](scenes/", "](../scenes/")
     return f"{scenes}\n\n{summary(documents[0])}"
-
-
-def _of_sheet(folder: Path) -> str:
-    """Sentence with the measurements of the larger picture."""
-    document = from_json(
-        folder / "compare.json", lambda d: (d["methods"][_METHOD]["whole"], d)[1],
-        writer="compare", remedy=f"run compare with the method {_METHOD}",
-    )  # fmt: skip
-    whole = document["methods"][_METHOD]["whole"]
-    width, height = document["size"]
-    return (
-        f"\n\nThe picture above: `{_METHOD}`, {width} × {height} pixels, ΔE2000 "
-        f"{plain_number(whole['direct']['delta_e_mean'])}, of which noise: "
-        f"{plain_number(whole['noise']['delta_e_mean'])} of the shaders, "
-        f"{plain_number(document['whole_noise']['delta_e_mean'])} of the path tracer."
-    )
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:

@@ -128,13 +128,13 @@ def numbers(result: Sweep) -> str:
     """ΔE of every step, as a Markdown table."""
     rows: list[tuple[str, ...]] = []
     for step in result.steps:
-        cells = ["", ""]
+        cell = ""
         if step.label == result.reference:
-            cells = ["reference", ""]
+            cell = "reference"
         elif math.isfinite(step.difference.delta_e):
-            cells = [f"{step.difference.delta_e:.2g}", f"{step.difference.delta_e_95:.2g}"]
-        rows.append((step.label, *cells))
-    return pages.table(("value", "mean ΔE", "95th percentile"), rows)
+            cell = f"{step.difference.delta_e:.2g}"
+        rows.append((step.label, cell))
+    return pages.table(("value", "mean ΔE"), rows)
 
 
 def write_methods(args: argparse.Namespace, scale: HeightField | None) -> None:

@@ -73,11 +73,8 @@ def test_table_and_sheet_are_replaced(compared, page):
 def test_a_larger_picture_takes_the_sheets_place(compared, page, tmp_path):
     larger = tmp_path / "larger"
     larger.mkdir()
-    document = json.loads((compared / "compare.json").read_text("utf-8"))
-    (larger / "compare.json").write_text(json.dumps({**document, "size": [320, 200]}), "utf-8")
     Image.new("RGB", (320, 160), (10, 20, 30)).save(larger / "fast.png")
     assert realtime.main([str(compared), "--sheet", str(larger), "-o", str(page)]) == 0
-    assert "`fast`, 320 × 200 pixels, ΔE2000 0.46" in page.read_text("utf-8")
     with Image.open(page.parent / realtime.SHEET) as image:
         assert image.size == (1600, 800)
 
