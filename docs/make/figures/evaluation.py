@@ -65,7 +65,7 @@ class Periods:
     name: str  # of the patch
     by_method: dict[str, Evaluated]  # the methods' responses and fits
     nominal: float | None  # period that it is made with
-    windows: tuple[float, float, float, float]  # mean, spread, smallest, largest of single windows
+    windows: tuple[float, float]  # mean and standard deviation of single windows
     count: int  # number of those windows
     thesis: float  # period that the procedure of the thesis finds; NaN if none
 
@@ -105,9 +105,7 @@ def evaluate_patch(
     except DiffractionError:
         thesis = float("nan")
     return Periods(
-        patch.name, results, nominal,
-        (fits.mean, fits.spread, float(fits.periods.min()), float(fits.periods.max())),
-        windows, thesis,
+        patch.name, results, nominal, (fits.mean, fits.spread), windows, thesis
     )  # fmt: skip
 
 
@@ -139,50 +137,27 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
 
 
 def period_table(patches: Sequence[Periods]) -> str:
-    """Fitted periods, in nm, as a Markdown table."""
+    """Fitted periods, in nm, as a Markdown table, and a sentence with the largest residuals.
+
+    The last columns are the mean and standard deviation of single windows, and the period found by
+    the procedure of the thesis.
+    """
     names = list(patches[0].by_method)
-    header = ("patch", "nominal", *names)
+    header = ("patch", "nominal", *names, f"{patches[0].count} single windows", "thesis")
     rows = []
     for patch in patches:
         nominal = "" if patch.nominal is None else f"{1e3 * patch.nominal:.4g}"
-        fits = (patch.by_method[name].fit for name in names)
-        cells = [f"{1e3 * fit.period:.5g} ({_short(fit.residual)}°)" for fit in fits]
-        rows.append((patch.name, nominal, *cells))
-    return pages.table(header, rows)
-
-
-def difference_table(patches: Sequence[Periods]) -> str:
-    """Largest angle between ridge and grating equation, for patches of a known period."""
-    names = list(patches[0].by_method)
-    rows = []
-    for patch in patches:
-        if patch.nominal is None:
-            continue
-        cells = []
-        for name in names:
-            response, ridge = patch.by_method[name].response, patch.by_method[name].ridge
-            expected = response.beam.grating_angles(response.wavelengths, patch.nominal, 1)
-            cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
-        rows.append((patch.name, f"{1e3 * patch.nominal:.4g}", *cells))
-    return pages.table(("patch", "period, nm", *names), rows)
-
-
-def window_table(patches: Sequence[Periods]) -> str:
-    """Periods of single windows and of the procedure of the thesis, in nm, as a Markdown table."""
-    rows = []
-    for patch in patches:
-        mean, spread, least, most = (1e3 * value for value in patch.windows)
-        ensemble = 1e3 * patch.by_method["spectral"].fit.period
-        spread_text = f"± {spread:.2g}" if spread >= 0.01 else "± 0"
+        periods = [f"{1e3 * patch.by_method[name].fit.period:.5g}" for name in names]
+        mean, spread = (1e3 * value for value in patch.windows)
+        windows = f"{mean:.5g} ± {f'{spread:.2g}' if spread >= 0.01 else '0'}"
         thesis = "" if np.isnan(patch.thesis) else f"{1e3 * patch.thesis:.5g}"
-        ends = f"{least:.5g} – {most:.5g}"
-        rows.append((patch.name, f"{ensemble:.5g}", f"{mean:.5g} {spread_text}", ends, thesis))
-    count = patches[0].count
-    header = (
-        "patch", "ensemble", f"{count} single windows", "smallest – largest",
-        "procedure of the thesis",
-    )  # fmt: skip
-    return pages.table(header, rows)
+        rows.append((patch.name, nominal, *periods, windows, thesis))
+    residuals = ", ".join(
+        f"{_short(max(patch.by_method[name].fit.residual for patch in patches))}° (`{name}`)"
+        for name in names
+    )
+    text = f"Largest root mean square of a fit's residuals: {residuals}."
+    return f"{pages.table(header, rows)}\n\n{text}"
 
 
 def _short(value: float) -> str:
@@ -217,14 +192,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                     patch, nominal, wavelengths=wavelengths, angles=angles, windows=args.windows
                 )
             )
-        pages.update(
-            args.output,
-            {
-                "periods": period_table(results),
-                "differences": difference_table(results),
-                "windows": window_table(results),
-            },
-        )
+        pages.update(args.output, {"periods": period_table(results)})
         with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
             evaluation_figure(results).savefig(path, format="png")
 

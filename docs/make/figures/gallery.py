@@ -58,110 +58,97 @@ def _scene(name: str, title: str, text: str, options: str = "", scene: str = "")
 PICTURES = (
     _scene(
         "snake", "A corn snake",
-        "Scales of a look-alike of *Elaphe guttata*, in sun and clear sky.",
+        "A look-alike of *Elaphe guttata* in sun and clear sky.",
     ),
     _scene(
         "xenopeltis", "A sunbeam snake",
-        "*Xenopeltis unicolor*: few large smooth scales over dark pigment. A large light, here a "
-        "window, makes a sheen along the whole body.",
+        "*Xenopeltis unicolor* under a window, whose reflection covers the whole body.",
     ),
     _scene(
         "xenopeltis_sun", "The sunbeam snake in the sun",
-        "The same scales, lit from one direction: colours shrink to spots.",
+        "Under a small light, colours shrink to spots.",
         "-D light=daylight.xml", "xenopeltis",
     ),
     _scene(
         "snake_two", "A snake with two patches",
-        "The sunbeam snake's relief with rings of a wider one, whose colours stay close to the "
-        "window's mirror image (`diffraction_mix`).",
+        "Rings with a wider period, by `diffraction_mix`.",
         "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 64", "xenopeltis",
     ),
     Picture(
         "gallery", "turning", "The snake turns",
-        "Every frame is path-traced; tables are loaded once. `--turn sun_azimuth` turns the light "
-        "instead.",
+        "`--turn sun_azimuth` turns the light instead.",
         ("render scenes/snake.xml -D resx=240 -D resy=150 -s 24 --frames 16 --turn turn --fps 8 "
          "-o out/turning.webp",),
     ),
     _scene(
         "scales", "Some scales from close by",
-        "A small lamp: each scale shows its mirror image, white along the keel, and on both sides "
-        "the orders of the fingers.",
+        "Each scale shows the lamp's mirror image and, on both sides, the orders of its relief.",
     ),
     Picture(
         "gallery", "scales_macro", "The grain of a scale",
-        "Two millimetres of a scale; each place has its own coherence window "
-        "(`coherence=surface`). Colours break up into speckle, which moves with the lamp, here by "
-        "2°.",
+        "Speckle under a lamp that moves by 2° (`coherence=surface`).",
         ("render scenes/scales_macro.xml -D resx=300 -D resy=200 -s 48 --frames 10 "
          "--animate lamp_azimuth=112:114 --fps 8 -o out/scales_macro.webp",),
     ),
     _scene(
         "cd", "A compact disc under a lamp",
-        "Colours appear where the tracks run across the plane of lamp and camera. The tracks have "
-        "[solved orders](orders.md). `--denoise` writes the picture without grain, shown here, "
-        "beside the noisy one.",
+        "[Solved orders](orders.md), denoised.",
         "--denoise",
     ),
     _scene(
         "cd_window", "The disc under a window",
-        "The same disc: each pane spreads its own fan.",
+        "Each pane has a spectrum of its own.",
     ),
     _scene(
         "grating", "A blazed grating under a lamp",
-        "600 lines a millimetre, with [solved orders](orders.md): the first is the lamp's "
-        "spectrum.",
+        "600 lines per millimetre, with solved orders.",
     ),
     _scene(
         "grating_window", "The grating under a window",
-        "The spectra of the panes overlap; colours are pure beside the mullion and the frame only.",
+        "The spectra of the panes overlap.",
     ),
     _scene(
         "hologram", "A hologram on a box",
-        "Each area of the foil is a grating of its own direction and period; lamp and window light "
-        "different ones. See [holograms](holograms.md).",
+        "Each area is a grating of its own; see [holograms](holograms.md).",
     ),
     _scene(
         "film", "A diffraction film before lamps",
-        "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
-        "between its spectra.",
+        "A thin sheet (`diffraction_dielectric`).",
     ),
     _scene(
         "orders_on_wall", "Orders on a wall",
-        "The same grating before a wall, in a narrow beam. [A file of efficiencies]"
-        "(orders.md#efficiencies-from-another-program-or-measured) takes its place by one option.",
+        "The blazed grating in a narrow beam. [A file of efficiencies]"
+        "(orders.md#efficiencies-from-another-program-or-measured) can replace it.",
     ),
     _scene(
         "laser_through_plate", "A laser through a plate",
-        "The back of the plate is a [block](orders.md#blocks) with lines of 1 µm. Total reflection "
-        "guides other orders until they meet the grating again, and leave beside the first.",
+        "The back is a [block](orders.md#blocks) with a period of 1 µm.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",
-        "Lamp light through a slit and a clear grating onto a screen, traced from the lamp. The "
-        "grating has [solved orders](orders.md#thin-sheets).",
+        "Slit, clear grating and screen, traced from the lamp; see "
+        "[thin sheets](orders.md#thin-sheets).",
     ),
     _scene(
         "material_ball", "A ball of any material",
-        "The sunbeam snake's relief in aluminium. For a patch of your own: "
-        "`-D patch=\"$PWD/scale.exr\" -D material=Cr`.",
+        "Your own patch and metal: `-D patch=\"$PWD/scale.exr\" -D material=Cr`.",
     ),
     _scene(
         "material_ball_cd", "The tracks of a CD on gold",
-        "The same scene with another patch and metal.",
+        "Another patch and metal in this scene.",
         "-D patch=../precompute/cd.toml -D material=Au", "material_ball",
     ),
     _scene(
         "own_mesh", "A mesh of your own",
-        "A knot without texture coordinates of its own; see [meshes](meshes.md).",
+        "See [meshes](meshes.md).",
     ),
     _scene(
         "plate", "A flat sample",
-        "Five centimetres of corn snake's relief under a small lamp.",
+        "Five centimetres of the corn snake's relief.",
     ),
     _scene(
         "sphere", "A ball in the sun",
-        "The same relief around a ball of dark material.",
+        "The corn snake's relief on dark material.",
     ),
     Picture(
         "meshes", "snake_short", "",
@@ -200,11 +187,18 @@ def markdown(page: str) -> str:
             continue
         title = f"## {picture.title}\n\n" if picture.title else ""
         link = picture.file.as_posix()
-        label = picture.title or picture.text.rstrip(":")
-        commands = "\n".join(as_typed(command) for command in picture.commands)
+        # a heading above the picture already describes it
+        label = "" if picture.title else picture.text.rstrip(":")
         # a text that ends with a colon precedes its picture
-        inner = (picture.text, f"![{label}]({link})")
+        image = f"![{label}]({link})"
+        scene = f"scenes/{picture.name}.xml"
+        if picture.commands == (f"render {scene} -o out/{picture.name}.png",):
+            # the head of the page has the command for a scene without options
+            parts.append(f"{title}{image}\n\n{picture.text} [{scene}](../{scene})")
+            continue
+        inner = (picture.text, image)
         body = "\n\n".join(inner if picture.text.endswith(":") else inner[::-1])
+        commands = "\n".join(as_typed(command) for command in picture.commands)
         parts.append(f"{title}{body}\n\n```sh\n{commands}\n```")
     return "\n\n".join(parts)
 

@@ -1,4 +1,4 @@
-"""Balls of all presets: docs/gallery.md.
+"""Picture of all presets for docs/gallery.md.
 
 python -m docs.make.figures.presets -o docs
 """
@@ -17,7 +17,6 @@ from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.plugin.presets import presets
 
-from . import pages
 from .pages import exit_code, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
@@ -25,14 +24,8 @@ _COLUMNS, _SIZE, _LABEL = 5, (160, 147), 16
 _MOST = 160_000  # bytes of the picture
 
 
-def table() -> str:
-    """Return the table of the looks for the page."""
-    rows = [(f"`{look.name}`", look.about) for look in presets().values()]
-    return pages.table(("name", "surface"), rows)
-
-
 def draw(folder: Path, samples: int) -> Path:
-    """Render a ball of each look into a folder; return the picture of all."""
+    """Render a ball of each preset into a folder; return the picture of all."""
     width, height = _SIZE
     names = list(presets())
     rows = -(-len(names) // _COLUMNS)
@@ -55,9 +48,9 @@ def draw(folder: Path, samples: int) -> Path:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Render the balls and write the page; return the exit code."""
+    """Render the balls and write the picture; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.presets")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the pages")
     parser.add_argument("-s", "--samples", type=int, default=32, help="per pixel; default: 32")
     args = parser.parse_args(argv)
 
@@ -65,7 +58,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory() as folder:
             picture = draw(Path(folder), args.samples)
             write_jpeg(picture, args.output / PICTURE, most=_MOST)
-        pages.update(args.output / "gallery.md", {"presets": table()})
 
     return exit_code("presets", work)
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.shader_comparison.report import markdown, plain_number
+from mitsuba_diffraction.realtime.shader_comparison.report import plain_number
 
 from . import pages
 from .pages import exit_code, from_json, write_jpeg
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.realtime")
     parser.add_argument(
         "compared", metavar="FOLDER", type=Path, nargs="+",
-        help="written by compare; of the first the sheet and all methods are shown",
+        help="written by compare; the page shows the first one's sheet, times and textures",
     )  # fmt: skip
     parser.add_argument(
         "--sheet", metavar="FOLDER", type=Path,
@@ -63,7 +63,7 @@ def _tables(files: Sequence[Path]) -> str:
     ]  # fmt: skip
     # links of `compare` start at the repository's root, those of the page in docs
     scenes = scenes_table(documents).replace("](scenes/", "](../scenes/")
-    return f"{scenes}\n\n{markdown(documents[0])}"
+    return f"{scenes}\n\n{summary(documents[0])}"
 
 
 def _of_sheet(folder: Path) -> str:
@@ -83,29 +83,46 @@ def _of_sheet(folder: Path) -> str:
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
-    """Deviations of `fast` and `exact` in some scenes, over all pixels."""
-    head = "| scene |" + "".join(
-        f" `{m}`, ΔE2000 mean | 99 % | noise, mean | 99 % |" for m in _OURS
-    )
-    rows = [head + " noise of the path tracer, mean | 99 % |", "|---|" + 10 * "---|"]
+    """Deviations of `fast` and `exact` in some scenes, over all pixels, and the noise in them."""
+    header = ("scene", *(f"`{m}`" for m in _OURS), "noise of `exact`", "of the path tracer")
+    rows = []
+    high = 0.0
     for document in documents:
-        cells = [f"[{Path(document['scene']).stem}]({document['scene']})"]
-        for method in _OURS:
-            whole = document["methods"][method]["whole"]
-            cells += [
-                plain_number(whole["direct"]["delta_e_mean"]),
-                plain_number(whole["direct"]["delta_e_percentiles"]["99"]),
-                plain_number(whole["noise"]["delta_e_mean"]),
-                plain_number(whole["noise"]["delta_e_99"]),
-            ]
-        noise = document["whole_noise"]
-        cells += [plain_number(noise["delta_e_mean"]), plain_number(noise["delta_e_99"])]
-        rows.append(f"| {' | '.join(cells)} |")
-    return "\n".join(rows)
+        wholes = [document["methods"][method]["whole"] for method in _OURS]
+        values = [
+            *(whole["direct"]["delta_e_mean"] for whole in wholes),
+            wholes[-1]["noise"]["delta_e_mean"],
+            document["whole_noise"]["delta_e_mean"],
+        ]
+        high = max(high, *(w["direct"]["delta_e_percentiles"]["99"] for w in wholes))
+        link = f"[{Path(document['scene']).stem}]({document['scene']})"
+        rows.append((link, *map(plain_number, values)))
+    text = f"In each scene 99 % of the pixels have at most {plain_number(high)}."
+    return f"{pages.table(header, rows)}\n\n{text}"
+
+
+def summary(document: dict[str, Any]) -> str:
+    """Sentences with the frame times, texture sizes and look-up errors in one scene."""
+    fast, exact = (document["methods"][method] for method in _OURS)
+    time = exact["whole"]["frame_ms"] / fast["whole"]["frame_ms"]
+    share = 100 * fast["diffracting"]["share"]
+    sizes = [plain_number(entry["texture_bytes"] / 1e6) for entry in (fast, exact)]
+    errors = [
+        f"{plain_number(entry['diffracting']['delta_e_mean'])} (99 %: "
+        f"{plain_number(entry['diffracting']['delta_e_percentiles']['99'])}) by `{method}`"
+        for method, entry in zip(_OURS, (fast, exact), strict=True)
+    ]
+    return (
+        f"First scene: a frame by `exact` takes {plain_number(time)} times as long as by `fast`; "
+        f"textures have {sizes[0]} MB (`fast`) and {sizes[1]} MB (`exact`). With point lights and "
+        f"without shadows, over the {share:.0f} % of the pixels that diffract and are lit in both, "
+        f"the mean is {' and '.join(errors)}: the error of tables and look-ups, with "
+        f"{plain_number(document['noise_delta_e_mean'])} of noise."
+    )
 
 
 def _complete(document: dict[str, Any]) -> dict[str, Any]:
-    markdown(document), scenes_table([document])  # what is missing is missed here
+    summary(document), scenes_table([document])  # what is missing is missed here
     return document
 
 

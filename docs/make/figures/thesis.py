@@ -42,12 +42,11 @@ from .pages import add_measured, exit_code, measured_patch
 #: What each method leaves out.
 APPROXIMATES = {
     "spectral": "only its tolerance: short series in κ, summed 5 nm apart",
-    "flss": "the spectrum by samples 5 nm apart; Taylor series, which shallow surfaces allow",
-    "nmm": "the spectrum by the wavelengths that one period sends to the eye, all of one weight; "
-    "white around the mirror direction",
+    "flss": "the spectrum by samples 5 nm apart; Taylor series, for shallow surfaces",
+    "nmm": "the spectrum by the wavelengths that one period sends to the eye, equally weighted",
     "nmm, lobes": "the same, each wavelength weighted with its lobe's width",
     "pq": "the window by whole copies of the patch; linear between their orders",
-    "pq-sinc": "the window by whole copies of the patch; sinc between their orders",
+    "pq-sinc": "as `pq`, with sinc between the orders",
     "rainbow": "everything but the spacing: all orders equally bright",
 }
 
@@ -117,7 +116,7 @@ def table(measured: Measured) -> str:
     compiled = measured.compiled
     note = (
         f"One BRDF map, light at 30°, one window, against `flss` at {_FINE:g} nm: mean ΔE2000 of "
-        "the lit pixels.\nTimes are those of the NumPy evaluators. Compiled, with the whole "
+        "the lit pixels.\nTimes are measured with the NumPy evaluators. Compiled, with the whole "
         "spectrum at 5 nm, `spectral` (ensemble) takes\n"
         f"1/{compiled.ratio:.0f} of the time of `flss`, and as the RGB variants do it, without a "
         f"wavelength loop, 1/{compiled.colour_ratio:.0f}."
@@ -126,8 +125,7 @@ def table(measured: Measured) -> str:
 
 
 def numbers(result: Sweep) -> str:
-    """ΔE of every step, and for some sweeps its time, as a Markdown table."""
-    timed = result.kind == "wavelength-step"
+    """ΔE of every step, as a Markdown table."""
     rows: list[tuple[str, ...]] = []
     for step in result.steps:
         cells = ["", ""]
@@ -135,10 +133,8 @@ def numbers(result: Sweep) -> str:
             cells = ["reference", ""]
         elif math.isfinite(step.difference.delta_e):
             cells = [f"{step.difference.delta_e:.2g}", f"{step.difference.delta_e_95:.2g}"]
-        time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
-        rows.append((step.label, *cells, *time))
-    header = ("value", "mean ΔE", "95th percentile")
-    return pages.table((*header, "time (first = 1)") if timed else header, rows)
+        rows.append((step.label, *cells))
+    return pages.table(("value", "mean ΔE", "95th percentile"), rows)
 
 
 def write_methods(args: argparse.Namespace, scale: HeightField | None) -> None:

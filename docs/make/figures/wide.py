@@ -98,12 +98,12 @@ def report(whole: Run, windowed: Run, pixels: int) -> str:
     parts = agreement(windowed.table, whole.table)
     (near, near_error), (far, far_error) = parts["glossy"], parts["colours"]
     return (
-        f"A look-alike of {pixels:,}² points, {EXTENT:.0f} µm wide, coherence width 40 µm: as a "
-        f"whole it becomes a table in {whole.seconds:.0f} s and {whole.peak / 1e9:.2g} GB of "
-        f"memory, by {windows['number']} windows in {windowed.seconds:.0f} s and "
-        f"{windowed.peak / 1e9:.2g} GB. The tables differ by {far:.1%} of the light of the orders, "
-        f"where the windows' standard error is {far_error:.1%}, and by {near:.2%} of that near "
-        f"order 0, where it is {near_error:.2%}."
+        f"A look-alike of {pixels:,}² points, {EXTENT:.0f} µm wide, coherence width 40 µm: the "
+        f"whole scan needs {whole.seconds:.0f} s and {whole.peak / 1e9:.2g} GB, "
+        f"{windows['number']} windows need {windowed.seconds:.0f} s and "
+        f"{windowed.peak / 1e9:.2g} GB. The diffracted orders of the tables differ by {far:.1%} "
+        f"(standard error of the windows: {far_error:.1%}), light near order 0 by {near:.2%} "
+        f"({near_error:.2%})."
     )
 
 

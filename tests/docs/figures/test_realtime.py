@@ -31,7 +31,12 @@ def compared(tmp_path):
         "spp": 4096, "clipped": 0.0104,
         "methods": {
             "fast": entry,
-            "exact": {**entry, "whole": {**whole, "direct": {**found, "delta_e_mean": 0.321}}},
+            "exact": {
+                **entry, "texture_bytes": 4.2e7, "diffracting": {**found, "delta_e_mean": 0.789},
+                "whole": {
+                    **whole, "direct": {**found, "delta_e_mean": 0.321}, "frame_ms": 500.0,
+                },
+            },
             "flss": {**entry, "fragment_ns": 35200.0},
         },
     }  # fmt: skip
@@ -53,13 +58,13 @@ def page(tmp_path):
 def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
-    assert "| `fast` | 0.46 | 3.21 | 0.021 |  | 1.00 | 1.00 | 1000 | 0.35 | 21.0 |" in text
-    fast, exact = "0.46 | 3.21 | 0.28 | 1.50", "0.32 | 3.21 | 0.28 | 1.50"
-    assert f"| [plate](../scenes/plate.xml) | {fast} | {exact} | 0.28 | 1.50 |" in text
-    assert "All 64 × 40 pixels" in text
-    assert "512 frames of 4 samples a pixel, against 4096" in text
-    assert "1.0 % of the pixels are clipped" in text
+    assert "| [plate](../scenes/plate.xml) | 0.46 | 0.32 | 0.28 | 0.28 |" in text
+    assert "of the pixels have at most 3.21" in text
+    assert "`exact` takes 2.00 times as long" in text
+    assert "21.0 MB (`fast`) and 42.0 MB (`exact`)" in text
     assert "25 % of the pixels" in text
+    assert "0.46 (99 %: 3.21) by `fast` and 0.79 (99 %: 3.21) by `exact`" in text
+    assert "0.29 of noise" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
         assert image.size == (1600, 400)
