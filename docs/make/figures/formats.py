@@ -21,8 +21,13 @@ def tables() -> str:
     """Return the tables with their titles as headings."""
     parts = []
     for title, rows in sections().items():
-        cells = [(f"**{r['format']}**", f"`{r['suffixes']}`", *list(r.values())[2:]) for r in rows]
-        parts += [f"## {title.capitalize()}", pages.table(tuple(rows[0]), cells)]
+        columns = [c for c in rows[0] if any(row[c] != "none" for row in rows)]
+        marks = {"format": "**", "suffixes": "`"}
+        cells = [
+            tuple(f"{(m := marks.get(c, ''))}{r[c]}{m}".replace("none", "") for c in columns)
+            for r in rows
+        ]
+        parts += [f"## {title.capitalize()}", pages.table(tuple(columns), cells)]
     return re.sub(r"(--[a-z][a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
 
 

@@ -17,7 +17,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from .pages import exit_code
 
 #: Rows from which a table is a file.
-LONG = 8
+LONG = 6
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
 # A heading, or the name of a generated part.
 _TITLE = re.compile(r"^(?:#+ |<!-- begin )(.*?)(?: -->)?$", re.M)

@@ -53,7 +53,7 @@ FIGURES = (
            "{:.2f}", 0),
     Figure("eval", "principled, metal", "`principled` / `roughconductor`", _ROUGH, "{:.1f}"),
     Figure("eval", "measured", "`measured` / `roughconductor`", _ROUGH, "{:.0f}"),
-    Figure("eval", _DEFAULT, "`eval` / bare gathers of its memory", "× gathers", "{:.2f}", 1),
+    Figure("eval", _DEFAULT, "`eval` / bare gathers, which only read", "× gathers", "{:.2f}", 1),
     Figure("eval", "thesis", "the thesis' look-up / `eval`", "× defaults", "{:.0f}", 0),
     Figure("sample", _DEFAULT, "`sample` / `roughconductor` (Al)", _ROUGH, "{:.1f}"),
     Figure("snake", "the skin", "the snake's scene / with `roughconductor`", _ROUGH, "{:.1f}", 0),
@@ -156,7 +156,7 @@ def _spectral(spectral: dict[str, Any]) -> str:
 
 
 def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
-    """`planned` in a sentence, `plan` in full."""
+    """Needs and memory of a plan beside the whole table."""
     table = report["tables"][0]
     whole, planned = table["whole"], table["planned"]
     asked, needs = table["asked for"], table["needs"]
@@ -172,8 +172,6 @@ def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
     change = f"and {100 * missing:.2g} % of the light from the skin is missing"
     less = table["times less memory"]
     return {
-        "planned": f"The snake's table shrinks from {whole['memory_mb']:.1f} to "
-        f"{planned['memory_mb']:.1f} MB, to 1/{less:.1f}, {change}.",
         "plan": f"{pages.table(('', 'whole table', 'planned'), rows)}\n\n"
         f"{less:.1f} times less memory, {change}.",
     }

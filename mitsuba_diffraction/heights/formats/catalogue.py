@@ -85,13 +85,13 @@ OPTICAL = (
            "TrueMap, FRT, Mahr, OmniSurf3D"),
 )  # fmt: skip
 ARRAYS = (
-    Known("HDF5", (".h5",), "any program; the data set called height, else --channel", _UNITS),
+    Known("HDF5", (".h5",), "any program", _UNITS),
     Known("MATLAB", (".mat",), "MATLAB, Octave", _UNITS),
     Known("NetCDF", (".nc",), "SurfaceTopography"),
     Known("NPZ", (".npz",), "Python", _UNITS),
 )  # fmt: skip
 
-_GWYDDION = "open it in Gwyddion and save it as .gwy"
+_GWYDDION = "save as .gwy in Gwyddion"
 
 #: Formats that are not read.
 UNREAD = (
@@ -104,9 +104,9 @@ UNREAD = (
     Unread("PeakForce capture", (".pfc",), "Bruker", (),
            "save the height channel as .spm in NanoScope Analysis"),
     Unread("LIF, LSM or CZI image", (".lif", ".lsm", ".czi"), "Leica, Zeiss", (),
-           "export the map of heights as .x3p or text from the instrument's program"),
+           "export the map of heights as .x3p or text"),
     Unread("JPEG", (".jpg", ".jpeg"), "any program", (b"\xff\xd8\xff",),
-           "its compression changes heights; export PNG or TIFF (8- or 16-bit grey) or numbers"),
+           "its compression changes heights; export PNG, TIFF or numbers"),
 )  # fmt: skip
 
 

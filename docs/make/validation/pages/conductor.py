@@ -13,7 +13,7 @@ def write(measured: Measurements) -> str:
     """Write the page."""
     return f"""# Gratings of a perfect conductor
 
-A perfect conductor (`material="none"`) has Kirchhoff's model without polarisation.
+`material="none"` uses Kirchhoff's model without polarisation.
 
 {_probe(measured)}
 
@@ -40,9 +40,8 @@ def _probe(measured: Measurements) -> str:
     return f"""## A gentle sinusoid
 
 Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {rms_slope(grating):.3f},
-unpolarised light. At normal incidence the orders −2 to 2 are within {percent(to_550)} of their own
-power up to 550 nm, and within {percent(from_450)} from 450 to {wavelength.max():g} nm. The error
-grows with the angle:
+unpolarised light. At normal incidence the relative error of the orders −2 to 2 is at most
+{percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to {wavelength.max():g} nm.
 
 {table(header, rows)}
 
@@ -62,7 +61,6 @@ def _polarisation(measured: Measurements) -> str:
             rows.append([str(grating), light.upper(), *map(percent, values)])
     return f"""## Polarised light
 
-Deviation of all orders of the model, a mean over polarisations, from one polarisation at a time
-(TE: the electric field along the grooves):
+Deviation of all orders of the unpolarised model from each polarisation:
 
 {table(["grating", "light", *map(angle, angles)], rows)}"""

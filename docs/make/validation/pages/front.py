@@ -6,7 +6,6 @@ import numpy as np
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from .. import goals
 from ..compare import GRAZING, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope
 from ..models import ANGLES, of_colours
@@ -28,7 +27,7 @@ _LOW = 0.08
 
 def write(measured: Measurements) -> str:
     """Write the page."""
-    parts = [_surfaces(measured), _goals(measured), _layers(measured), _numerics(), _tables()]
+    parts = [_surfaces(measured), _layers(measured), _numerics(), _tables()]
     return "\n\n".join(parts)
 
 
@@ -37,22 +36,22 @@ def _surfaces(measured: Measurements) -> str:
     header = ["surface", "cases", "Kirchhoff, 60°", "default, 60°", "0°", "30°"]
     return f"""# How far the model holds
 
-The model beside rigorous solutions, closed forms and statistics. `make validation` computes every
-number.
+`make validation` compares the model with rigorous solutions, closed forms and statistics, and
+writes these pages.
 
 - Gentle surfaces: up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than
   {percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in light up to
   {STEEPEST_LIGHT:g}° from the normal. The package warns beyond both slopes.
-- Vertical walls deviate more at any depth, most of all on metals and in oblique light.
-  [Solved orders](validation/orders.md) have no such error, on grooves that repeat along a line.
+- Vertical walls deviate more at any depth, most of all on metals and in oblique light. For
+  periodic grooves, [solved orders](validation/orders.md) have no such error.
 - `model="small_slope"`, the default, is better than `model="kirchhoff"`, most of all in oblique
   light and in polarised light.
-- Light that the surface diffracts twice is left out. That costs most where all structures are alike
-  and light is oblique, as on the pits of a dielectric disc.
+- The model ignores light that is diffracted twice. The error is largest where all structures are
+  alike and light is oblique, as on the pits of a dielectric disc.
 
 ## Deviation by surface
 
-Light from 60°, mean and worst of the cases; then the default's mean for light from 0° and 30°.
+Mean and worst case for light from 60°; mean of the default for 0° and 30°.
 
 {table(header, rows)}
 
@@ -60,15 +59,15 @@ Light from 60°, mean and worst of the cases; then the default's mean for light 
 
 ### What the figures are
 
-The deviation of *colours* is, over the wavelengths and over all orders but order 0 that leave
-within {GRAZING:g}° of the normal,
+The deviation of *colours* is a sum over wavelengths and over the diffracted orders within
+{GRAZING:g}° of the normal:
 
 $$
 \\frac{{\\sum |\\eta - \\eta_{{\\mathrm{{rigorous}}}}|}}{{\\sum \\eta_{{\\mathrm{{rigorous}}}}}} ,
 $$
 
-where η is the power of an order for unpolarised light, before energy is conserved. Keratin has the
-index 1.56. Gratings are periodic along x, and light falls across their grooves."""
+where η is the power of an order for unpolarised light, before energy is conserved. The index of
+keratin is 1.56. Light is incident across the grooves of gratings."""
 
 
 def _gratings(measured: Measurements) -> list[list[object]]:
@@ -128,43 +127,6 @@ def _mean_and_worst(values: np.ndarray) -> str:
     return f"{percent(float(np.nanmean(values)))}, {percent(float(np.nanmax(values)))}"
 
 
-def _goals(measured: Measurements) -> str:
-    rows = [
-        [
-            f"keratin, {goal.profile}, depth/period {goal.band[0]:g} to {goal.band[1]:g}",
-            *map(percent, (goal.goal, goal.kirchhoff)),
-            _reached(goal.default, goal.goal),
-        ]
-        for goal in goals.keratin_goals(measured.by_model)
-    ]
-    kirchhoff, default = (
-        goals.cuts_of_scales(measured.cells, model) for model in ("kirchhoff", "small_slope")
-    )
-    for n, (name, most) in enumerate((("mean", 0.07), ("worst", 0.1))):
-        if kirchhoff and default:
-            cells = [percent(most), percent(kirchhoff[n]), _reached(default[n], most)]
-            rows.append([f"keratin, cuts of scales, slope 0.2, 0° to 60°, {name}", *cells])
-    worse = goals.much_worse(measured.by_model, "keratin")
-    against = goals.against_kirchhoff(measured.by_model, "aluminium")
-    least = -100 * min(case.gain for case in against.every)
-    names = ["goal", "Kirchhoff", "default"]
-    return f"""## Goals
-
-Deviation of colours for light from 60°, and of cuts of scales also from 0° and 30°:
-
-{table(["surface", *names], rows)}
-
-On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more than a tenth (goal: 0).
-On aluminium {len(against.better)} of {len(against.every)} are better than Kirchhoff and
-{len(against.worse)} worse, at most by {least:.1f} points
-([table](validation/gratings.md#aluminium-blend-against-kirchhoff))."""
-
-
-def _reached(deviation: float, goal: float) -> str:
-    missed = "" if deviation <= goal else "**missed:** "
-    return f"{missed}{percent(deviation)}"
-
-
 def _layers(measured: Measurements) -> str:
     gentle = [
         deviation for deviation in measured.coats if deviation.grating.profile == "sinusoidal"
@@ -172,43 +134,32 @@ def _layers(measured: Measurements) -> str:
     coat = (max(getattr(deviation, name) for deviation in gentle) for name in ("single", "bounced"))
     film = max(float(deviation.default.max()) for deviation in measured.films)
     passage, bounced = map(percent, coat)
-    rows = [
-        ["coat on sinusoids of aluminium, light diffracted once", passage],
-        ["coat on sinusoids of aluminium, with bounces", bounced],
-        ["film of up to 700 nm on slopes up to 0.1", percent(film)],
-    ]
     return f"""## Coats, films, transmitted light
 
 Largest deviation of colours in light up to 60°:
 
-{table(["layer", "worst"], rows)}
-
-[transmission.md](validation/transmission.md) has transmitted orders, and R + T of several
-surfaces."""
+- coat on sinusoids of aluminium: {passage} for light diffracted once, {bounced} with bounces.
+- film of up to 700 nm on slopes up to 0.1: {percent(film)}."""
 
 
 def _numerics() -> str:
     return """## Numerical errors
 
 Order powers of ideal gratings agree with closed forms to 5e-6 in `md.reference.brdf` and to 1e-5 in
-tables ([numerics.md](validation/numerics.md)). The rigorous solutions change by less than 5e-3 of
-the incident light in their last refinement, most by 1e-5
-([solutions.md](validation/solutions.md))."""
+tables. The rigorous solutions change by less than 5e-3 of the incident light in their last
+refinement, most by 1e-5."""
 
 
 def _tables() -> str:
-    rows = [
-        ["[gratings](validation/gratings.md)", "by slope, depth, profile and polarisation"],
-        ["[surfaces](validation/surfaces.md)", "crossed gratings, scales and discs, any plane"],
-        ["[coats and films](validation/layers.md)", "with bounces in the coat, thick films"],
-        ["[transmission](validation/transmission.md)", "interfaces and thin sheets; R + T"],
-        ["[solved orders](validation/orders.md)", "beside other solvers and print"],
-        ["[measured gratings](validation/measured.md)", "model and solved orders beside benches"],
-        ["[perfect conductor](validation/conductor.md)", "Kirchhoff's model alone"],
-        ["[numerics](validation/numerics.md)", "closed forms, random surfaces"],
-        ["[rigorous solutions](validation/solutions.md)", "solvers, convergence, agreement"],
-        ["[scans](validation/scans.md)", "hues of scanned gratings, crops of a rough surface"],
-    ]
-    return f"""## The tables
+    return """## The tables
 
-{table(["page", "holds"], rows).replace("---:", "---")}"""
+- [Gratings](validation/gratings.md) by slope, depth, profile and polarisation, with our goals
+- [Surfaces](validation/surfaces.md): crossed gratings, scales and discs, in any plane of incidence
+- [Coats and films](validation/layers.md)
+- [Transmission](validation/transmission.md): interfaces and thin sheets, and R + T
+- [Solved orders](validation/orders.md) beside other solvers and published figures
+- [Measured gratings](validation/measured.md) beside the model and solved orders
+- [Perfect conductor](validation/conductor.md)
+- [Closed forms and random surfaces](validation/numerics.md)
+- [Rigorous solutions](validation/solutions.md) and their convergence
+- [Scans](validation/scans.md): hues of gratings, and crops of a rough surface"""

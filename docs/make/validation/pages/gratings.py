@@ -18,7 +18,7 @@ from .measurements import Measurements
 def write(measured: Measurements) -> str:
     """Write the page."""
     parts = [_introduction(), _bands(measured), _slopes(measured), _edges(measured)]
-    return "\n\n".join([*parts, _aluminium(measured)])
+    return "\n\n".join([*parts, _aluminium(measured), _goals(measured)])
 
 
 def _introduction() -> str:
@@ -31,7 +31,7 @@ Deviation of colours of three models from rigorous solutions
 - *Small slope*: first-order small slope alone, which the plugin does not offer.
 - *Blend*: `model="small_slope"`.
 
-Light falls across the grooves. Keratin has the index 1.56."""
+Light is incident across the grooves."""
 
 
 def _bands(measured: Measurements) -> str:
@@ -41,8 +41,8 @@ Mean over the gratings, as Kirchhoff / small slope / blend.
 
 {_groups(measured.by_model)}
 
-In unpolarised light the errors of the two polarisations partly cancel. For one polarisation, as
-Kirchhoff / blend (TE: the electric field along the grooves):
+For one polarisation, whose errors partly cancel in unpolarised light, as Kirchhoff / blend (TE: the
+electric field along the grooves):
 
 {_polarised_groups(measured.by_model)}"""
 
@@ -137,8 +137,8 @@ def _edges(measured: Measurements) -> str:
     parts = [
         """## Walls
 
-Light that vertical walls reflect is missing in the model. Period/depth, Kirchhoff / blend. Light
-from positive angles falls on the steps of blazed gratings, light from negative angles on the
+The model ignores light reflected by vertical walls. Period/depth, Kirchhoff / blend. On blazed
+gratings, light from positive angles is incident on the steps, light from negative angles on the
 facets."""
     ]
     for profile in ("lamellar", "blazed"):
@@ -170,14 +170,46 @@ def _aluminium(measured: Measurements) -> str:
 
 Of {len(against.every)} gratings and angles the blend is better in {len(against.better)}, at best by
 {max(gains):.1f} points, and worse in {len(against.worse)}, at most by {-min(gains):.2f} points.
-Differences below the last refinement of the solver (*change*) do not count. Ranges of depth/period
-that are worse on average, then gratings:
+Differences below the last refinement of the solver (*change*) do not count. Worse on average:
 
 {table(header, rows)}
 
 *Best share* is the share of small slope, equal for all orders, with the least deviation; *bound* is
 the deviation if every order had its own. Where the best share is 0, Kirchhoff's errors cancel: both
 matrices lack light that is diffracted twice, and Kirchhoff's is brighter."""
+
+
+def _goals(measured: Measurements) -> str:
+    rows = [
+        [
+            f"keratin, {goal.profile}, depth/period {goal.band[0]:g} to {goal.band[1]:g}",
+            *map(percent, (goal.goal, goal.kirchhoff)),
+            _reached(goal.default, goal.goal),
+        ]
+        for goal in goals.keratin_goals(measured.by_model)
+    ]
+    kirchhoff, default = (
+        goals.cuts_of_scales(measured.cells, model) for model in ("kirchhoff", "small_slope")
+    )
+    for n, (name, most) in enumerate((("mean", 0.07), ("worst", 0.1))):
+        if kirchhoff and default:
+            cells = [percent(most), percent(kirchhoff[n]), _reached(default[n], most)]
+            rows.append([f"keratin, cuts of scales, slope 0.2, 0° to 60°, {name}", *cells])
+    worse = goals.much_worse(measured.by_model, "keratin")
+    names = ["goal", "Kirchhoff", "default"]
+    return f"""## Goals
+
+Light from 60°, on cuts of scales also from 0° and 30°:
+
+{table(["surface", *names], rows)}
+
+On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more than a tenth (goal:
+0)."""
+
+
+def _reached(deviation: float, goal: float) -> str:
+    missed = "" if deviation <= goal else "**missed:** "
+    return f"{missed}{percent(deviation)}"
 
 
 def _side_by_side(

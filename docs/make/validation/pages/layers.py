@@ -30,17 +30,16 @@ def _coat(measured: Measurements) -> str:
     return f"""## Under a coat
 
 Aluminium under polycarbonate (`coat_ior` {COAT:g}). Rigorous solutions are matrices between all
-orders inside the coat, whose faces transmit and return their powers. Deviation of colours of the
+orders inside the coat, whose face transmits and reflects their powers. Deviation of colours of the
 default:
 
-- *one passage*: light that is diffracted once, compared with the model without bounces.
-- *with bounces*: the whole series, with light that the face reflects totally.
-- *share of the bounces*: part of the rigorous colours that the face has returned.
+- *one passage*: light that is diffracted once.
+- *with bounces*: the whole series, with total reflection at the face.
+- *share of the bounces*: part of the rigorous colours that the face reflected.
 
 {table(header, rows)}
 
-Walls deviate as without a coat. The model lacks light that is diffracted twice, much of it beyond
-the critical angle."""
+Much of the light diffracted twice, which the model ignores, is beyond the critical angle."""
 
 
 def _film(measured: Measurements) -> str:
@@ -63,9 +62,8 @@ Deviation of colours as Kirchhoff / the default:
 
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 
-The default deviates by at most {percent(float(worst))}: in a thick film, light that the rough
-faces diffract twice meets another part of the fringes, which the model leaves out. Thicker films
-and deeper gratings deviate more; the plugin warns of thick films on rough metals.
+The default deviates by at most {percent(float(worst))} ([why](../theory/layers.md#films)). Thicker
+films and deeper gratings deviate more; the plugin warns of thick films on rough metals.
 Lacquer at {angle(ANGLES[-1])}:
 
 {table(["`film_thickness`", "sinusoid", "deviation"], thick)}"""

@@ -35,7 +35,7 @@ def _closed_forms(measured: Measurements) -> str:
     sizes = " or ".join(f"{g.period:g} and {g.depth:g}" for g in measured.ideal)
     return f"""## Gratings in closed form
 
-Largest absolute error of an order's power |a_m|²; all orders together have the power 1. Light and
+Largest absolute error of an order's power |a_m|², with a sum of 1 over all orders. Light and
 orders up to {ANGLES[-1]:g}° from the normal, 410 to 760 nm, period and depth {sizes} µm, 512 pixels
 a period. The errors of lamellar and blazed gratings come from sampling.
 
@@ -58,17 +58,16 @@ def _random_surfaces(measured: Measurements) -> str:
     lobes.append(["mean of patches", *_distances(offsets.patches.distance(offsets.ensemble))])
     return f"""## Random surfaces
 
-Gaussian heights with the autocorrelation rms²·exp(−r²/T²). Left: mean power of order 0; the closed
-form is exp(−(κ·rms)²) plus scattered light in the same bin. Middle: scattered lobe of
-`md.reference.brdf` and Beckmann and Spizzichino's series (lines). Right: `patch`, averaged over
-windows at {offsets.count} random places of one surface, over `ensemble`.
+Gaussian heights with the autocorrelation rms²·exp(−r²/T²), beside exp(−(κ·rms)²) with scattered
+light in the bin (order 0, left), the series of Beckmann and Spizzichino (lobes, middle) and
+`ensemble` (mean of `patch` at {offsets.count} random places, right).
 
 ![Specular loss, scattered lobes, and the mean of patches](../images/validation_statistics.png)
 
 {table(["κ·rms", f"mean of {specular.surfaces} surfaces", "exact", "in standard errors"], rows)}
 
-Distances of scattered lobes from the closed form, and of the mean of patches from the ensemble, in
-standard errors; the expected root-mean-square is 1.
+Differences of lobes and of the mean of patches, in standard errors; the expected root-mean-square
+is 1.
 
 {table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
 

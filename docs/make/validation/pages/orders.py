@@ -10,16 +10,6 @@ from .measurements import Measurements
 
 def write(measured: Measurements) -> str:
     """Write the page."""
-    facts = [
-        [
-            case.name,
-            str(case.table.header["profile"]),
-            percent(case.table.header["error_mean"]),
-            percent(case.table.header["error_worst"]),
-            percent(case.table.header["reciprocity_error"]),
-        ]
-        for case in measured.solved_orders
-    ]
     diffuse = [
         [case.name, row.light, *map(percent, row[1:])]
         for case in measured.solved_orders
@@ -37,8 +27,8 @@ The shipped tables of `diffraction_orders` and the default model, beside indepen
 {", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. [Colours](../validation.md) are all orders
 but 0 within 75°; *sum* is the largest deviation of the sum over all orders.
 
-The tables come from a boundary integral method. The other solvers are coupled waves (`cd`, `dvd`)
-and Chandezon's method (`blazed`, `sinusoidal`).
+The tables are solved by a boundary integral method, the independent solutions by coupled waves
+(`cd`, `dvd`) and Chandezon's method (`blazed`, `sinusoidal`).
 
 ## Side by side
 
@@ -50,19 +40,18 @@ Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpo
 
 The tables beside their own solver, at {measured.diffuse_samples}
 random directions of diffuse light and wavelengths.
-*Absorbed* is the share of light in no order, *bias* the relative deviation
-of its mean, followed by its deviation as a share of the incident light.
+*Absorbed* is the share of light in no order, *bias* the relative deviation of its mean. The last
+three columns are the deviation of *absorbed* as a share of the incident light.
 
 {table(header, diffuse)}
 
 The largest deviations lie beside surface plasmons, which are narrower than the distance of nodes.
-Errors that the tables state, of colours in all light within the layer:
-
-{table(["table", "profile", "error, mean", "error, 95 %", "reciprocity"], facts)}
+[orders.md](../orders.md#profiles-materials-and-accuracy) has the errors that the tables state.
 
 ## Published efficiencies
 
-Numbers in print: s and p across the grooves, u unpolarised. The tolerance is the rounding of the
+Efficiencies from Johnson 2005 (for Li 1993), Granet and Guizal 1996, Lalanne and Hugonin 2000 and
+RETICOLO V10: s and p across the grooves, u unpolarised. The tolerance is the rounding of the
 printed digits, or the error of the printed method.
 
 {_published(measured.published)}
@@ -99,19 +88,15 @@ def _side_by_side(measured: Measurements) -> str:
 
 
 def _published(cases: tuple[Published, ...]) -> str:
-    parts = []
+    rows = []
     for case in cases:
         solved = [(solver.name, case.solved(solver)) for solver in case.solvers()]
-        rows = [
-            [f"{m}, {name}".replace("-", "−"), f"{printed:g}"]
-            + [f"{values[m, name]:.5f}" for _, values in solved]
-            for (m, name), printed in case.printed.items()
-        ]
-        header = ["order", "printed", *(name for name, _ in solved)]
-        parts.append(
-            f"{case.source}: {case.grating}; tolerance {case.tolerance:g}.\n\n{table(header, rows)}"
-        )
-    return "\n\n".join(parts)
+        for (m, name), printed in case.printed.items():
+            order = f"{m}, {name}".replace("-", "−")
+            known = (case.source, case.grating, f"{case.tolerance:g}", order, f"{printed:g}")
+            rows += [[*known, solver, f"{values[m, name]:.5f}"] for solver, values in solved]
+    header = ["source", "grating", "tolerance", "order", "printed", "solver", "solved"]
+    return table(header, rows)
 
 
 def _stacks(measured: Measurements) -> str:

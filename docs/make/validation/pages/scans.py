@@ -26,9 +26,8 @@ def _hues(count: int) -> str:
     low, high = np.quantile(width, [0.05, 0.95])
     return f"""# Scans
 
-A scan is a part of a larger surface. The package sees it through windows that fade towards their
-edges ([theory.md](../theory.md#scans)). Two surfaces whose light is known show what that costs;
-values are of `md.reference.brdf`.
+Errors of the windows through which a scan is evaluated ([theory.md](../theory.md#scans)), for
+`md.reference.brdf`.
 
 ## Hues of gratings
 
@@ -38,10 +37,8 @@ values are of `md.reference.brdf`.
 {table(["", "95 % are below", "largest"], rows)}
 
 Peaks are {percent(width.mean() - 1.0)} wider than through the light's window on average, 90 % of
-them {percent(low - 1.0)} to {percent(high - 1.0)}. Orders of a window of width W lie π/W apart;
-between them a look-up has ripples, which move the highest point. The window ends where its taper is
-still 0.22, which widens lobes by {percent(lobe_widths(next(iter(TAPERS.values()))).mean() - 1.0)}
-([below](#choice-of-the-taper))."""
+them {percent(low - 1.0)} to {percent(high - 1.0)}. Ripples of the look-up between orders
+move the highest point. Lobes are wider because the window ends where its taper is still 0.22."""
 
 
 def _crops(quick: bool) -> str:
@@ -60,26 +57,25 @@ def _crops(quick: bool) -> str:
     heads = ["from the mirror", "mean", "colour", "scatter", "mean expected", "colour expected"]
     return f"""## Crops of a rough surface
 
-Crops of 10 µm, levelled, of rough ridges over the whole, 133 µm, under the same window. Light from
-30°, 430 to 800 nm. *Mean* is over crops and wavelengths, with its standard error; *colour* the
-largest ratio of the mean crop at a wavelength; *scatter* the standard deviation of single crops.
-*Expected* is the closed form for low relief, the power spectrum convolved with the window's lobe:
-means of infinitely many crops.
+Light from levelled crops of 10 µm over light from the whole, 133 µm of rough ridges, under the same
+window. Light from 30°, 430 to 800 nm. *Mean* is over crops and wavelengths, with its
+standard error; *colour* is the largest ratio of the mean crop at a wavelength; *scatter* is the
+standard deviation of single crops. *Expected* is the closed form for low relief: the power spectrum
+convolved with the window's lobe.
 
 {table(heads, rows)}
 
-Light within 7° of the mirror is of waves longer than a crop.
+Within 7° of the mirror direction, light is diffracted by waves longer than a crop.
 
 ## Choice of the taper
 
-A window of 4σ cannot have lobes as narrow as the light's Gaussian and none of the light of strong
-waves far away. *Width* is of a lobe over the light's, the mean and the range over places between
-orders; *colour expected* is as above.
+*Width* is that of a lobe over the light's: the mean, and the range over places between orders.
+*Colour* is the expected value, as above.
 
 {_tapers(lam)}
 
-Narrower lobes cost colours: no taper here has both narrower lobes and truer colours than the
-package's, the first. Wider scans have both, since their windows are wider than 10 µm."""
+The package uses the first. None of the others has both narrower lobes and truer colours. Windows of
+wider scans are wider than 10 µm, with smaller errors of both."""
 
 
 def _tapers(lam: np.ndarray) -> str:

@@ -36,7 +36,7 @@ with N of [theory.md](../theory.md). Comparisons have $\eta_m$ from `md.referenc
 centre of the lobe, before energy is conserved.
 
 `python -m docs.make.validation solve`, `patches`, `coated` and `films` (extra `validation`) compute
-the solutions, stored in docs/make/validation/data with solver and settings."""
+the solutions in docs/make/validation/data."""
 
 
 def _gratings() -> str:
@@ -64,11 +64,9 @@ Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} 
 0.4 µm, light from 0° to 75° in both polarisations, on blazed gratings from both sides. Solver:
 {shipped("perfect").about["solver"]}.
 
-Each grating was solved on two meshes, the second twice as fine (1.4 times where light in the metal
-is short), with a third where an order changed by more than {CONVERGED:g}.
-*Change* is the last change of an efficiency.
-*Energy missed* is the deviation of orders and absorption from 1. Solutions with an
-order that still changed by more than {CONVERGED:g} are left out.
+*Change* is the last change of an efficiency when the mesh is refined. *Energy missed* is the
+deviation of orders and absorption from 1. Solutions whose change is above {CONVERGED:g} are left
+out.
 
 {table(header, rows)}
 
@@ -87,10 +85,9 @@ def _two_solvers() -> str:
     ]
     return f"""## Two solvers on gratings
 
-The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. On a staircase they
-do not converge for TM light on metal: there the comparison is of TE light, and of both
-polarisations on lamellar gratings. Absolute differences of efficiencies, and the second solver's
-change when its orders and layers doubled:
+The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. On slopes of metal they
+do not converge for TM light, which is left out. Differences of efficiencies, and the second
+solver's change when its orders and layers doubled:
 
 {table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}"""
 
@@ -112,13 +109,11 @@ def _cells() -> str:
     return f"""## Two solvers in two dimensions
 
 Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the
-deviation of colours of one from the other. *Change* is what each solution still changed from
-{coarse} to {fine} and from {first} to {second} harmonics. All figures are the largest of all
-directions.
+deviation of colours, *change* that of each solution from {coarse} to {fine} and from {first} to
+{second} harmonics: the largest of all directions.
 
 {table(header, rows)}
 
 On aluminium coupled waves do not converge. There Rayleigh's expansion agrees with the integral
-method on sinusoids within 3e-5 of an efficiency, up to a depth/period of 0.09. On keratin
-transmitted and reflected light add up to 1 within 1e-6 (crossed grating) and 1e-3 (the CD's low
-pits)."""
+method within 3e-5 of an efficiency on sinusoids of depth/period up to 0.09. On keratin R + T is 1
+within 1e-6 (crossed grating) and 1e-3 (low pits of a CD)."""

@@ -24,7 +24,7 @@ def write(measured: Measurements) -> str:
 Deviation of colours on small periodic cells: sinusoids in conical mounts, a crossed grating, and
 cuts of 2.6 µm of a measured scale (*Elaphe*), of its look-alike, and of 3.2 µm of a CD. The cuts
 are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's expansion, which
-does not converge on steeper metals than these.
+does not converge on steeper metals.
 
 ## Unpolarised light
 

@@ -52,7 +52,7 @@ within {GRAZING:g}° of the normal, as Kirchhoff / `small_slope`:
 {table(header, rows)}
 
 At slopes up to 0.1 `small_slope` is within {percent(normal)} in light along the normal, and within
-{percent(worst)} up to 75°. `energy_conserving` scales all orders of a direction alike."""
+{percent(worst)} up to 75°."""
 
 
 def _surfaces(measured: Measurements) -> str:
@@ -72,7 +72,7 @@ model → `energy_conserving`, the default.
 
 {table(["surface", "light", *map(angle, PASSED)], rows)}
 
-All light is scaled: missing light is shared by all orders."""
+Missing light is shared by all orders."""
 
 
 def _recipes(measured: Measurements) -> str:
@@ -89,8 +89,8 @@ def _recipes(measured: Measurements) -> str:
     header = ["recipe", "medium", "model", "`energy_conserving`"]
     return f"""### Recipes
 
-The recipes of `precompute/`, with a coherence width of 65 µm but for the hologram's 12 µm; least
-and largest R + T of light from both sides up to 75°.
+Least and largest R + T of light from both sides up to 75°, coherence width 65 µm (12 µm for the
+hologram).
 
 {table(header, rows)}"""
 
