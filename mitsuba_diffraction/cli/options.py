@@ -249,9 +249,9 @@ def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
 
 
 def option_of(args: argparse.Namespace, name: str) -> str:
-    """Return the option whose value has this name in `args`."""
-    option: str = next(a.option_strings[-1] for a in args.parser._actions if a.dest == name)
-    return option
+    """Return the option, or the file's placeholder, whose value has this name in `args`."""
+    action = next(action for action in args.parser._actions if action.dest == name)
+    return str(action.option_strings[-1] if action.option_strings else action.metavar)
 
 
 def refuse(

@@ -254,4 +254,5 @@ def test_formats_are_listed_with_what_to_export_for_others(run, tmp_path):
     assert "Nanonis" in said
     assert "Gwyddion" in said
     assert "--formats" in run("info").err
+    assert "argument FILE with --formats" in run("info", "a.png", "--formats").err
     assert "--level" in run("info", "--formats", "--level", "plane").err

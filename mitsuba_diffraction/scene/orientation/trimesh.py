@@ -93,7 +93,7 @@ def _shared(normals: Floats, places: Ints) -> Floats:
     ranks[order] = np.arange(len(order)) - first[places[order]]
     total = np.where(ranks[:, None] < _MOST_AT_ONE_PLACE, 0.0, normals)
     directions = unit(normals)
-    for rank in range(min(int(counts.max()), _MOST_AT_ONE_PLACE)):
+    for rank in range(min(int(counts.max(initial=0)), _MOST_AT_ONE_PLACE)):
         (here,) = np.nonzero(counts[places] > rank)
         there = order[first[places[here]] + rank]
         near = (directions[here] * directions[there]).sum(axis=1) > math.cos(CREASE)
