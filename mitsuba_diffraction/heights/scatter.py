@@ -114,8 +114,11 @@ def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
 def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     """Fit the ABg model to a spectrum at a wavelength, nm, in logarithms over its modes.
 
-    Raises a DiffractionError if fewer than five rings of the spectrum scatter the light.
+    Raises a DiffractionError if the heights are flat, or fewer than five rings of the spectrum
+    scatter the light.
     """
+    if spectrum.rms == 0.0:
+        raise DiffractionError("the heights are flat and scatter no light; an ABg model needs some")
     lam = 1e-3 * wavelength
     beta = lam * spectrum.frequency
     used = (beta < 1.0) & (spectrum.density > 0.0)

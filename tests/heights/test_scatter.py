@@ -42,3 +42,5 @@ def test_an_abg_model_is_found_again():
     assert model.error < 0.1
     with pytest.raises(DiffractionError, match="an ABg model needs"):
         abg_model(power_spectrum(HeightField(np.eye(8) * 0.01, 0.2)), 632.8)
+    with pytest.raises(DiffractionError, match="flat"):
+        abg_model(power_spectrum(HeightField(np.zeros((24, 24)), 0.1)), 632.8)

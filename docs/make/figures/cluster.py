@@ -235,7 +235,7 @@ def job_text(job: Job) -> str:
 
 
 def costs_text(costs: Costs) -> str:
-    """What the simulation assumes."""
+    """Return the assumptions of the simulation, in words."""
     return (
         f"Assumed: workers of two cores ({costs.sample * 2**21:.2g} s for a pass of the snake), "
         f"tasks that vary by {costs.spread:.0%}, {8e-9 / costs.network:g} Gbit/s, no failures. "

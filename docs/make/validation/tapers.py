@@ -1,4 +1,4 @@
-"""What a taper of a scan's windows costs: width of lobes against light from strong waves far away.
+"""Costs of a taper of a scan's windows: width of lobes against light from strong waves far away.
 
 Both follow from the taper's transform T alone. A wave of frequency q₀ has the lobe
 Σ_j |T(q_j − q₀)|² exp(−σ_l²(q − q_j)²) over the orders q_j, π/W apart, of a window of width W.
