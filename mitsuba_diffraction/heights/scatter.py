@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, warn
 from .field import HeightField
 from .spectra import frequencies, height_spectrum
 
@@ -21,6 +21,8 @@ Reals = NDArray[np.float64]
 
 #: Rings of spatial frequency for each octave.
 _RINGS = 6
+#: Largest (4πσ/λ)² of heights that are far below the wavelength.
+_MOST_SCATTER = 0.1
 #: Fewest rings that an ABg model is fitted to.
 _FEWEST = 5
 
@@ -99,11 +101,17 @@ def _density(field: HeightField) -> Reals:
 def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
     """Return the total integrated scatter of a mirror at normal incidence, over its reflectance.
 
-    ∫ (16π²/λ²) cosθ S₂ d²f over f < 1/λ: (4πσ/λ)² of a smooth, slowly varying surface.
+    ∫ (16π²/λ²) cosθ S₂ d²f over f < 1/λ: (4πσ/λ)² of a smooth, slowly varying surface. Warns
+    where that exceeds 0.1: the theory is of its first power.
 
     wavelength : nm.
     """
     lam = 1e-3 * wavelength
+    if (scatter := (4.0 * np.pi * float(field.heights.std()) / lam) ** 2) > _MOST_SCATTER:
+        warn(
+            f"{field.name}: (4πσ/λ)² is {scatter:.2g} at {wavelength:g} nm, and Rayleigh-Rice "
+            f"theory is for at most {_MOST_SCATTER:g}; go by the scatter of the table"
+        )
     fx, fy = frequencies(field)
     cosine = np.sqrt(np.maximum(1.0 - lam**2 * (fx**2 + fy**2), 0.0))
     density = _density(field)

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
+from mitsuba_diffraction import (
+    DiffractionError,
+    DiffractionTable,
+    DiffractionWarning,
+    HeightField,
+    gratings,
+)
 from mitsuba_diffraction.heights.scatter import abg_model, power_spectrum, rayleigh_rice_scatter
 from mitsuba_diffraction.tables.powers import order_0_power
 
@@ -44,3 +50,8 @@ def test_an_abg_model_is_found_again():
         abg_model(power_spectrum(HeightField(np.eye(8) * 0.01, 0.2)), 632.8)
     with pytest.raises(DiffractionError, match="flat"):
         abg_model(power_spectrum(HeightField(np.zeros((24, 24)), 0.1)), 632.8)
+
+
+def test_heights_that_are_not_far_below_the_wavelength_are_named():
+    with pytest.warns(DiffractionWarning, match="Rayleigh-Rice"):
+        rayleigh_rice_scatter(gratings.sinusoidal(period=2.0, depth=0.4, periods=2), 632.8)
