@@ -168,12 +168,22 @@ def test_truncated_instrument_files_are_refused(tmp_path, length):
 
 
 def test_nanoscope_file_needs_no_option(shared_afm):
-    field = HeightField.load(shared_afm / "nanoscope-10um.di", periodic="none")
-    assert field.shape == (512, 512)
-    assert field.extent == pytest.approx((10, 10), rel=1e-12)
+    path = shared_afm / "nanoscope-10um.di"
+    measured = HeightField.load(path, level="none")
+    assert measured.shape == (512, 512)
+    assert measured.extent == pytest.approx((10, 10), rel=1e-12)
     # -25000 to 32760 counts, 1.5 V over 2^16 at 363.9 nm/V (its "Sens. ZsensSens")
-    assert field.range == pytest.approx(0.4811, rel=1e-3)
-    assert "'ZSensor', the only height channel" in field.history[0]
+    assert measured.range == pytest.approx(0.4811, rel=1e-3)
+    assert "'ZSensor', the only height channel" in measured.history[0]
+
+    level = HeightField.load(path)
+    y, x = np.mgrid[:512, :512].reshape(2, -1)
+    plane = np.stack([x, y, np.ones_like(x)], -1)
+    removed = (measured.heights - level.heights).ravel()
+    fit = np.linalg.lstsq(plane, measured.heights.ravel(), rcond=None)[0]
+    # the least squares plane, but for its mean
+    tilt = plane[:, :2] @ fit[:2]
+    np.testing.assert_allclose(removed - removed.mean(), tilt - tilt.mean(), atol=1e-6)
 
 
 HEADS = [
