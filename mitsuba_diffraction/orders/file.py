@@ -37,8 +37,7 @@ from ..tables.fields import mapping
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
-#: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
-#: and crossed gratings, which have other lights now.
+#: Raised whenever the meaning of the numbers changes; files of other versions are refused.
 FORMAT_VERSION = 2
 SUFFIX = ".nc"
 _AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
@@ -127,11 +126,9 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     try:
         with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
             version = int(getattr(file, ORDERS_ATTRIBUTE))
-            if version == 1:
-                return _first_version(file)
             if version != FORMAT_VERSION:
                 raise DiffractionError(
-                    f"its format version is {version}, this program reads 1 and {FORMAT_VERSION}"
+                    f"its format version is {version}, this program reads {FORMAT_VERSION}"
                 )
             return _table(file)
     except DiffractionError as error:
@@ -227,64 +224,4 @@ def _checksum(file: Any) -> str:
         variable = file.variables[name]
         content.update(repr((name, tuple(map(int, variable.shape)))).encode())
         content.update(np.ascontiguousarray(variable[:]).data)
-    return content.hexdigest()
-
-
-# ---------------------------------------------------------------------- version 1
-
-
-def _first_version(file: Any) -> OrderTable:
-    """Return the table of a file of version 1, with efficiencies in steps of 1/30000.
-
-    They are those of light whose E, then B, lies along the grooves; matrices follow where there are
-    any.
-    """
-    if hasattr(file, "crossed") or getattr(file, "components", b"grooves") != b"grooves":
-        raise DiffractionError(
-            "it holds imported efficiencies, or a crossed grating, of a former format, whose "
-            "listed light was not kept"
-        )
-    _check_sizes(file)
-    numbers = {name: variable[:] for name, variable in file.variables.items()}
-    if file.sha256 != _first_checksum(file, numbers).encode():
-        raise ValueError("its checksum is of another one")
-    block = hasattr(file, "block")
-
-    def kind(name: str, k: int) -> NDArray[np.float32] | None:
-        if f"kind_{name}_{k}" not in numbers:
-            return None
-        scale = file.variables[f"kind_{name}_{k}"].scale_factor
-        if (matrices := numbers.get(f"mueller_{name}_{k}")) is not None:
-            values = matrices * scale
-            return values.reshape(*values.shape[:-2], -1).astype(np.float32)
-        along_e, along_b = np.moveaxis(numbers[f"kind_{name}_{k}"] * scale, -1, 0)
-        mean, half = 0.5 * (along_e + along_b), 0.5 * (along_e - along_b)
-        return np.stack([mean] if block else [mean, half], axis=-1).astype(np.float32)
-
-    bands = []
-    for k in sorted({int(name.rpartition("_")[2]) for name in numbers}):
-        a = kind("a", k)
-        if a is None:
-            raise ValueError(f"it lacks kind A of band {k}")
-        bands.append(Band(k, a, kind("b", k)))
-    return _with_outline(file, CellResponse(tuple(bands), even=block))
-
-
-def _first_checksum(file: Any, numbers: dict[str, NDArray[Any]]) -> str:
-    always = (
-        float(file.period), tuple(map(float, file.wavelengths)), float(file.superstrate),
-        _text(file.header),
-    )  # fmt: skip
-    content = hashlib.sha256(repr(always).encode())
-    if getattr(file, "thin", False):
-        content.update(b"thin")
-    if hasattr(file, "block"):
-        content.update(repr(("block", float(file.block))).encode())
-    packed = {}
-    for name, values in numbers.items():
-        first, kind, k = name.split("_")
-        packed[int(k), kind + (" mueller" if first == "mueller" else "")] = values
-    for key in sorted(packed):
-        content.update(repr((key, packed[key].shape)).encode())
-        content.update(np.ascontiguousarray(packed[key], ">i2").data)
     return content.hexdigest()

@@ -4,7 +4,7 @@ Contents
 --------
 orders      `solve_orders`: from a profile and a material to a table
 directions  the same of some directions of light alone, as of an echelle
-crossed     `solve_crossed`: orders of crossed gratings
+crossed     solver: coupled waves of crossed gratings
 settings    settings of a solution, and estimates of its stages
 accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
