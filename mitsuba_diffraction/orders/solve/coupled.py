@@ -28,6 +28,8 @@ Complex = NDArray[Any]
 
 # Decimals of µm that tell edges of layers apart
 _DIGITS = 9
+# |Im q| over Re q up to which a mode travels, but for rounding
+_TRAVELLING = 1e-6
 # Number of the medium above: the last one
 _ABOVE = -1
 
@@ -206,7 +208,8 @@ def modes(x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex
     left, right = _products(x, y, across_x, across_y, along)
     square, electric = np.linalg.eig(left @ right)
     q = np.sqrt(square)
-    q = np.where(q.imag < 0, -q, q)
+    # rounding decides the sign of Im q of modes that travel: their Re q is positive
+    q = np.where((q.imag < 0) & (np.abs(q.imag) > _TRAVELLING * q.real), -q, q)
     return Modes(q, electric, (right @ electric) / q)
 
 
