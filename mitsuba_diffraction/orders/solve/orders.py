@@ -18,7 +18,6 @@ from ..polarised import mueller_of
 from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
 from ..table import OrderTable, check_outline
 from .accuracy import WORST, measured_error, missed_tolerance, powers, warn_of_error
-from .block import to_node
 from .crossed import PHI, THETA, check_cell
 from .directions import Directions, solve_directions
 from .films import Layers, Substance, structure_of
@@ -289,16 +288,13 @@ def _band(
 ) -> Band:
     """Assemble the response of a band from its stations."""
     places = places_of(band, counts, _nodes(grating))
+    values_of = _limited_mueller if polarised else _along_grooves
     if grating.block:
-        moved = {place: solved[place] * to_node(grating, place) for place in places}
         values_of = _lossless
-    else:
-        moved = {place: solved[place] for place in places}
-        values_of = _limited_mueller if polarised else _along_grooves
     return Band(
         band,
         *(
-            at_nodes(kind, places, counts, moved, grating.sides, values_of)
+            at_nodes(kind, places, counts, solved, grating.sides, values_of)
             for kind in kinds_of(band)
         ),
     )

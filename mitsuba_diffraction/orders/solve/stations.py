@@ -44,7 +44,7 @@ class Grating:
     thin : whether the material is a sheet with a flat lower side (`sheet`).
     structure : films on the profile, and what lies beneath it.
     block : whether the medium above is a block, the material the rarer one that surrounds it, and
-        light of both is solved (`block`).
+        light of both is solved (`blocks`).
     """
 
     profile: Profile | UnitCell
