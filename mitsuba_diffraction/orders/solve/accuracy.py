@@ -97,7 +97,7 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Interpola
         side = n % table.sides * int(not (table.block and guided[n]))
         at = index * x[n], index * y[n], lam[n], *orders.T
         below = (side == 1) != bool(table.block)
-        truth, got = _by_polarisation(table, solved[place], at, side * count + port, below)
+        truth, got = by_polarisation(table, solved[place], at, side * count + port, below)
         alone = np.arange(table.sides) != (side if table.block else -1)
         coloured = np.tile(orders.any(axis=1), table.sides) if count > 1 else alone
         difference = np.abs(got.mean(axis=-1) - truth.mean(axis=-1))
@@ -126,7 +126,7 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Interpola
     )
 
 
-def _by_polarisation(
+def by_polarisation(
     table: OrderTable, amplitudes: Complex, at: tuple[Any, ...], port: int, below: bool
 ) -> tuple[Real, Real]:
     """Return solved and tabulated efficiencies of all ports, (ports, 1 or 2).
