@@ -287,18 +287,12 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         )
         if table.polarised and "error_polarised" in facts:
             yield "", f"{facts['error_polarised']:.2%} with its polarisation"
-        if "error_largest" in facts:
-            yield (
-                "",
-                f"of an order above 1e-4, relative: {facts['error_relative']:.2%} in 95 %, at most "
-                f"{facts['error_largest']:.2%} ({facts['error_place']})",
-            )
-        elif "error_relative" in facts:
-            yield (
-                "",
-                f"of a listed number, relative: at most {facts['error_relative']:.2g} "
-                f"({facts['error_place']})",
-            )
+        yield (
+            "",
+            f"of a single order, relative: {facts['error_relative']:.2g} in 95 %, at most "
+            f"{facts['error_largest']:.2g} ({facts['error_place']})",
+        )
+    if "reciprocity_error" in facts:
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
         yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"

@@ -214,7 +214,7 @@ def _solve_cells(
         header |= error.facts()
         if not missed_tolerance(header) or refinement == REFINEMENTS:
             break
-        excess = max(error.mean, error.polarised or 0.0, error.most / WORST) / how.tolerance
+        excess = max(error.mean, error.table.most / WORST) / how.tolerance
         finer = _refined_counts(counts, error.bands, excess, grating.block)
         if _size(grating, finer, elements) > MOST_BYTES:
             break
