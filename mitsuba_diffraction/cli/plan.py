@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..scene.planning.plan import PlannedTable
 
 
-PATHS, TOLERANCE = 1 << 15, 1e-3
+PATHS, TOLERANCE = 1 << 17, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
 #: How a plan is made.
 PLAN = (
@@ -100,10 +100,11 @@ def run(args: argparse.Namespace) -> Figures:
 def _planned(
     args: argparse.Namespace, load: Callable[[], Any], tell: Progress
 ) -> list[PlannedTable]:
-    from ..scene.planning.plan import plan_table, record
+    from ..scene.planning.light import light_of_tables
+    from ..scene.planning.plan import plan_table
 
     tell(0, 0, "tracing paths")
-    _, tables = record(load, partial(sensor_of, index=args.sensor), args.paths)
+    tables = light_of_tables(load, partial(sensor_of, index=args.sensor), args.paths)
     tell(0, 0, "building tables")
     return [plan_table(table, args.plan_tolerance) for table in tables]
 
@@ -140,7 +141,7 @@ def load_by_plan(
     finally:
         set_variant(variant)
     for table in planned:
-        names, before = ", ".join(table.recorded.surfaces), table.recorded.table.nbytes / 1e6
+        names, before = ", ".join(table.light.surfaces), table.light.table.nbytes / 1e6
         if table.settings is None:
             say(f"plan: {names} keeps its whole table of {before:.3g} MB")
         else:

@@ -256,14 +256,14 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
         )
 
 
-def shrink(sensor: Any) -> None:
-    """Halve the width and height of a sensor's film, its crop included."""
+def shrink(sensor: Any, factor: float = 2.0) -> None:
+    """Divide the width and height of a sensor's film, its crop included, by a factor."""
     import mitsuba as mi
 
     values = mi.traverse(sensor)
     for name in ("film.size", "film.crop_size", "film.crop_offset"):
         least = 0 if name.endswith("offset") else 1
-        values[name] = [max(least, length // 2) for length in values[name]]
+        values[name] = [max(least, int(length / factor)) for length in values[name]]
     values.update()
 
 
