@@ -36,38 +36,35 @@ from .observed import OBSERVER, run_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, default_output, elapsed, output_name
 from .studio import STUDIO_OPTIONS, take_studio
-from .workers import THREADS, add_workers, client_of, film_of, on_workers, say_report
+from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "render", run, "render a Mitsuba scene",
-        "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
-        "current pass and keeps the picture so far. With --frames, render a folder of PNG "
-        "files while parameters of the scene change; existing frames with the same "
-        "settings are kept, so an interrupted run can be continued.",
-        *scene_options.SCENE,
-        ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
-         ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
-        *options.samples(1, None),
-        ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
-        options.VIEW,
-        ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
-         "--frames, denoise each frame", bool),
-        ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
-         bool),
-        ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "
-         "of `plan -o`, or without any, planned first", recipe_file, None, {"nargs": "*"}),
-        *PLAN,
-        *OBSERVER,
-    )  # fmt: skip
-    options.add_json(parser, "size, samples, time and files of the picture")
-    options.add_options(parser.add_argument_group("animation"), *ANIMATION)
-    options.add_options(parser.add_argument_group("a mesh in a few words"), *STUDIO_OPTIONS)
-    add_workers(parser)
-    options.add_option(parser, *THREADS)
-
-
+@options.command(
+    "render", "render a Mitsuba scene",
+    "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
+    "current pass and keeps the picture so far. With --frames, render a folder of PNG "
+    "files while parameters of the scene change; existing frames with the same "
+    "settings are kept, so an interrupted run can be continued.",
+    *scene_options.SCENE,
+    ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
+     ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
+    *options.samples(1, None),
+    ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
+    options.VIEW,
+    ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
+     "--frames, denoise each frame", bool),
+    ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
+     bool),
+    ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "
+     "of `plan -o`, or without any, planned first", recipe_file, None, {"nargs": "*"}),
+    *PLAN,
+    *OBSERVER,
+    options.json("size, samples, time and files of the picture"),
+    options.Group("animation", ANIMATION),
+    options.Group("a mesh in a few words", STUDIO_OPTIONS),
+    WORKERS,
+    THREADS,
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Render, and return the figures."""
     check_plan_options(args)
