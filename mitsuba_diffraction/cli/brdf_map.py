@@ -272,12 +272,9 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
-    import mitsuba as mi
-
     from ..analysis.media import medium_index
-    from ..orders.bsdf.diffraction_orders import DiffractionOrders
-    from ..plugin.dictionary import ORDERS, bsdf_dict
-    from ..plugin.diffraction import Diffraction
+    from ..analysis.scans import bsdf_of
+    from ..plugin.dictionary import bsdf_dict
     from ..plugin.presets import preset
 
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
@@ -291,14 +288,8 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
         parameters["height_scale"] = index * (args.height_scale or 1.0)
     parameters |= options.given(args, options.HEIGHTS)
     if args.preset is not None:
-        values = preset(args.preset, **parameters)
-    else:
-        values = bsdf_dict(str(args.source), **parameters)
-    kind = values.pop("type")
-    props = mi.Properties(kind)
-    for name, value in values.items():
-        props[name] = value
-    return DiffractionOrders(props) if kind == ORDERS else Diffraction(props)
+        return bsdf_of(preset(args.preset, **parameters))
+    return bsdf_of(bsdf_dict(str(args.source), **parameters))
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:

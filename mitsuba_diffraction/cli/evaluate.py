@@ -188,6 +188,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     from ..analysis.media import in_medium
     from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
+    from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
     from ..tables.source import TableSource
 
@@ -198,7 +199,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     asked["wavelength_range"] = table_range(steps)
     source = in_medium(TableSource.of(patch), args.ext_ior)
     table = table_of(source, source.settings_for(asked), bar)
-    return partial(brdf_values, bsdf_of(table, **surface_parameters(args))), table.sigma
+    return partial(brdf_values, bsdf_of(bsdf_dict(table, **surface_parameters(args)))), table.sigma
 
 
 def _write(
