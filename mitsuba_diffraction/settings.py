@@ -169,9 +169,9 @@ class TableSettings:
         averaged (`tables.build.windows`); "auto" as `heights.coherence.usual_window` has it.
     window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
         (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
-    taper_width : 4σ of the taper of a scan's phase screen, µm; None for a patch that tiles the
-        plane. The look-up's window is as much wider than `window_width`, so that an order has the
-        lobe of that window. Tables have it; users do not give it.
+    taper_width : 4σ_t of a scan's windows, µm; None for a patch that tiles the plane. Its orders
+        have lobes exp(−σ_t²Δ²), nearly; the look-up's window is as much wider than `window_width`,
+        so that light has the lobe of that window. Tables have it; users do not give it.
     """
 
     coherence_width: str | float = parameter(
@@ -220,7 +220,7 @@ class TableSettings:
         "a positive number of µm, at most coherence_width", "W",
     )  # fmt: skip
     taper_width: float | None = parameter(
-        None, _or(None, _between(0.0, math.inf)), "µm, 4σ of the taper of a scan's phase screen",
+        None, _or(None, _between(0.0, math.inf)), "µm, 4σ of the lobes that orders of a scan have",
         "a positive number of µm, above window_width", "W",
     )  # fmt: skip
 
