@@ -14,23 +14,20 @@ from .report import Figures, check_outputs, output_name, save_figure
 _WAVELENGTH = 632.8
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "scatter", run, "power spectrum and scatter of a rough mirror",
-        "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
-        "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
-        "an ABg model, at normal incidence and over the reflectance.",
-        options.SOURCE,
-        ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
-         "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
-        ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
-         {"dest": "wavelengths"}),
-    )  # fmt: skip
-    options.add_table(parser, ("coherence_width", "tolerance"))
-    options.add_json(parser)
-    options.add_heights(parser)
-
-
+@options.command(
+    "scatter", "power spectrum and scatter of a rough mirror",
+    "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
+    "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
+    "an ABg model, at normal incidence and over the reflectance.",
+    options.SOURCE,
+    ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
+     "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
+    ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
+     {"dest": "wavelengths"}),
+    *options.table(("coherence_width", "tolerance")),
+    options.json(),
+    options.heights(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the spectrum, and return the figures."""
 
