@@ -30,18 +30,13 @@ PLAN = (
 )  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "plan", run, "find out which part of its tables a scene needs",
-        "Trace paths through an XML scene, report which spatial frequencies, kappa and "
-        "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
-        "these, for `precompute` and `render --plan`.",
-        *scene_options.SCENE,
-        *PLAN,
-        ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
-         "on", options.path_ending_in(".toml")),
-    )  # fmt: skip
-    options.add_json(parser)
+def recipe_file(text: str) -> Path:
+    """Recipe of a plan. A scene after --plan without a recipe is refused with a hint."""
+    if not text.lower().endswith(".toml"):
+        raise argparse.ArgumentTypeError(
+            f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"
+        )
+    return Path(text)
 
 
 def planning_variant(requested: str | None) -> str:
@@ -58,6 +53,17 @@ def planning_variant(requested: str | None) -> str:
     return set_variant(f"{'cuda' if name.startswith('cuda') else 'llvm'}_ad_spectral")
 
 
+@options.command(
+    "plan", "find out which part of its tables a scene needs",
+    "Trace paths through an XML scene, report which spatial frequencies, kappa and "
+    "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
+    "these, for `precompute` and `render --plan`.",
+    *scene_options.SCENE,
+    *PLAN,
+    ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
+     "on", options.path_ending_in(".toml")),
+    options.json(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Plan, report, and return the figures."""
     scene_options.put_on_stage(args)
@@ -107,15 +113,6 @@ def _planned(
     tables = light_of_tables(load, partial(sensor_of, index=args.sensor), args.paths)
     tell(0, 0, "building tables")
     return [plan_table(table, args.plan_tolerance) for table in tables]
-
-
-def recipe_file(text: str) -> Path:
-    """Recipe of a plan. A scene after --plan without a recipe is refused with a hint."""
-    if not text.lower().endswith(".toml"):
-        raise argparse.ArgumentTypeError(
-            f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"
-        )
-    return Path(text)
 
 
 def load_by_plan(

@@ -273,8 +273,8 @@ def preview_samples(sensor: Any, preview: bool) -> int:
     return min(samples, 16) if preview else samples
 
 
-def sensor_of(scene: Any, index: int) -> Any:
-    """Return a sensor of the scene.
+def sensor_of(scene: Any, index: int, preview: bool = False) -> Any:
+    """Return a sensor of the scene, for a preview with half of its pixels along either side.
 
     Raises a DiffractionError if no sensor has that index.
     """
@@ -285,6 +285,8 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError(
             f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
+    if preview:
+        shrink(sensors[index])
     return sensors[index]
 
 
