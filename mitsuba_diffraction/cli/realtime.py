@@ -79,8 +79,7 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "compare the realtime picture of a scene with the path-traced one",
         "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
         "difference: over all pixels in all direct light of the scene, and beside it in full "
-        "transport; and, as a detail, where both see the same lit surface under lights "
-        "without extent, by points and directions in place of the scene's.",
+        "transport.",
         *scene_options.SCENE,
         ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
          "scene's name with _compare in the current folder", Path),
@@ -89,9 +88,9 @@ def add_compare(subparsers: options.Subparsers) -> None:
         *options.samples(2, 1024),
         ("--full-spp N", "samples per pixel of full transport; 0 leaves it out",
          whole_number(0), 64),
-        ("--frames N", "frames of progressive light for fast and exact", whole_number(4), 512),
-        ("--supersampling N", "the shaders' samples along either side of a pixel (at most 2 of "
-         "flss, nmm and pq)", whole_number(1), 8),
+        ("--frames N", "frames of progressive light", whole_number(4), 512),
+        ("--supersampling N", "the shaders' samples along either side of a pixel",
+         whole_number(1), 8),
     )  # fmt: skip
     options.add_json(parser)
 

@@ -16,7 +16,6 @@ from .context import (
     Target,
     bind,
     check_version,
-    clock_of,
     headless_context,
     set_uniforms,
 )
@@ -100,27 +99,6 @@ class Renderer:
         fine = target.read().reshape(height, n, width, n, 4)
         target.release()
         return np.ascontiguousarray(fine.mean(axis=(1, 3), dtype=np.float32))
-
-    def frame_time(
-        self, method: str, *, size: tuple[int, int] | None = None, frames: int = 1
-    ) -> float:
-        """Return the seconds of the fastest of some frames with one sample per pixel.
-
-        The program is compiled before. The clock is `context.clock_of`.
-        """
-        width, height = size or self.camera.size
-        target = self.target(width, height)
-        camera = self.camera.resized(width, height)
-        self.draw(target.frame, method, self.camera.resized(1, 1))
-        self.context.finish()
-        clock, times = clock_of(self.driver), []
-        for _ in range(frames):
-            start = clock()
-            self.draw(target.frame, method, camera)
-            self.context.finish()
-            times.append(clock() - start)
-        target.release()
-        return min(times)
 
     def texture_bytes(self, method: str) -> int:
         """Return the size of a method's textures."""
