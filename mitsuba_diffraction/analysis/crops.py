@@ -43,13 +43,6 @@ def crops_of(
     return [treated_by_default(part, treatment) for part in parts]
 
 
-def cropped(fields: Sequence[HeightField], side: float) -> list[HeightField]:
-    """Return the central squares of `side`, µm, of fields that are wider."""
-    from ..heights.preprocess import crop
-
-    return [crop(field, (side, side)) if min(field.extent) > side else field for field in fields]
-
-
 def _squares(whole: HeightField, count: int, side: float) -> list[HeightField]:
     """Cut at most `count` squares, spread over the field, or return the field if it is narrower."""
     nx, ny = (round(side / pixel) for pixel in whole.pixel_size)

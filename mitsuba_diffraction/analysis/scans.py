@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 import warnings
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 from ..errors import DiffractionWarning
-from ..orders import OrderTable
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.source import TableSource
@@ -29,23 +27,19 @@ def table_of(
         return source.table(settings, progress=progress)
 
 
-def bsdf_of(table: DiffractionTable | OrderTable, **parameters: Any) -> Any:
-    """Return the BSDF of a table, `diffraction` or `diffraction_orders`, in the current variant.
+def bsdf_of(values: Mapping[str, Any]) -> Any:
+    """Return the BSDF of a dictionary of `bsdf_dict` or `preset`, in the current variant.
 
-    parameters : of the plugin, e.g. material="Al".
-
-    Raises a DiffractionError if a parameter has no valid value.
+    Raises a DiffractionError if a parameter has no valid value; `mi.load_dict` would wrap it.
     """
     import mitsuba as mi
 
     from ..orders.bsdf.diffraction_orders import DiffractionOrders
+    from ..plugin.dictionary import ORDERS
     from ..plugin.diffraction import Diffraction
 
-    with tempfile.TemporaryDirectory() as folder:
-        solved = isinstance(table, OrderTable)
-        file = Path(folder) / ("table.nc" if solved else "table.exr")
-        table.save(file)
-        props = mi.Properties("diffraction_orders" if solved else "diffraction")
-        for name, value in {"filename": str(file), **parameters}.items():
+    props = mi.Properties(values["type"])
+    for name, value in values.items():
+        if name != "type":
             props[name] = value
-        return DiffractionOrders(props) if solved else Diffraction(props)
+    return DiffractionOrders(props) if values["type"] == ORDERS else Diffraction(props)

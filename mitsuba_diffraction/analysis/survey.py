@@ -108,6 +108,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
     import drjit as dr
 
+    from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
 
     set_variant(job.variant)
@@ -148,7 +149,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     phi = gratings[0].direction if gratings else 0.0
     # the energy of a metal is solved for some ten seconds; neither map nor index need it
     surface = {**dict(job.surface), "energy_conserving": False}
-    bsdf = bsdf_of(table, **surface)
+    bsdf = bsdf_of(bsdf_dict(table, **surface))
     row["surface"] = bsdf.describe().summary
     measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
@@ -174,12 +175,13 @@ def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
 
     Mitsuba takes seconds to change the variant: it loads its integrators again.
     """
+    from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
 
     key = job.surface, job.theta, job.variant
     if key not in _materials:
         set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
-        bsdf = bsdf_of(table, **{**dict(job.surface), "energy_conserving": False})
+        bsdf = bsdf_of(bsdf_dict(table, **{**dict(job.surface), "energy_conserving": False}))
         _materials.clear()
         _materials[key] = MaterialFactor.of(bsdf, job.theta)
         set_variant(job.variant)

@@ -13,6 +13,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionWarning
+from ..plugin.dictionary import bsdf_dict
+from ..tables.table import DiffractionTable
 
 #: Pixel size in µm of the patches that are timed: 1332 pixels span the default coherence window.
 PIXEL = 65.0 / 1332
@@ -63,11 +65,11 @@ def ratio(a: Sequence[float], b: Sequence[float]) -> float:
     return statistics.median(x / y for x, y in zip(a, b, strict=True))
 
 
-def quiet_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+def quiet_bsdf(table: DiffractionTable | str | os.PathLike[str], **parameters: Any) -> Any:
     """Load the plugin with a table, without warnings about the model's limits."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict({"type": "diffraction", "filename": str(table), **parameters})
+        return mi.load_dict(bsdf_dict(table, **parameters))
 
 
 @dataclass(frozen=True)

@@ -64,40 +64,20 @@ RELATIVE = (
 )  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "brdf-map", run, "picture a surface's reflection in every direction",
-        "Picture the BRDF over all view directions for one light direction, seen from above: "
-        "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
-        "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
-        *SURFACE_SOURCE,
-        ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
-         "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),
-        options.MODE,
-    )  # fmt: skip
-    group = parser.add_argument_group("the map")
-    options.add_direction(group)
-    options.add_wavelengths(group)
-    options.add_options(
-        group,
-        ("--wavelength NM", "one wavelength only, in false colours", float),
-        ("--resolution N", "pixels a side", int, 512),
-        ("--samples N", "directions in a pixel; default: enough to find every lobe", int),
-        ("--illuminant", "light for the colours, daylight or equal energy", ILLUMINANTS, "D65"),
-        ("--cosine", "map f·cosθo, the radiance of a lit surface, instead of f", bool),
-        ("--exposure EV", "exposure of the PNG in stops; default: half of the diffracted light is "
-         "darker than white", options.STOPS),
-        ("--spectral", "also write every band as a channel of the EXR", bool),
-    )  # fmt: skip
-    add_surface(parser.add_argument_group("the surface"))
-    group = parser.add_argument_group("methods of the 2014 thesis")
-    options.add_method(
-        group, None,
-        "method to evaluate in NumPy, instead of the renderer's BSDF, for R = 1 and light D65",
-    )  # fmt: skip
-    options.add_option(group, *RELATIVE)
-    options.add_heights(parser)
-    options.add_json(parser, "settings and statistics of the map")
+def surface_options(*, turned: bool = True) -> options.Group:
+    """Return the options of a reflecting surface; see `surface_bsdf`.
+
+    turned: include its orientation.
+    """
+    model = "model of the boundary; default: small_slope for materials with an index"
+    return options.Group("the surface", (
+        *MATERIAL,
+        ("--model", model, tuple(MODELS)),
+        *([("--orientation DEG", "angle of the patch", float)] if turned else []),
+        ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
+        *options.table(tuple(_TABLE), **_TABLE),
+        options.retired_row("second_order", 1),
+    ))  # fmt: skip
 
 
 def take_source(args: argparse.Namespace) -> None:
@@ -118,23 +98,6 @@ def take_source(args: argparse.Namespace) -> None:
 
         pigment_range(args.pigment)
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
-
-
-def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
-    """Declare the options of a reflecting surface; see `surface_bsdf`.
-
-    turned: include its orientation.
-    """
-    model = "model of the boundary; default: small_slope for materials with an index"
-    options.add_options(
-        group,
-        *MATERIAL,
-        ("--model", model, tuple(MODELS)),
-        *([("--orientation DEG", "angle of the patch", float)] if turned else []),
-        ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
-    )
-    options.add_table(group, tuple(_TABLE), **_TABLE)
-    options.add_retired(group, "second_order", 1)
 
 
 def gain_of(args: argparse.Namespace) -> Any:
@@ -158,6 +121,36 @@ def gain_of(args: argparse.Namespace) -> Any:
         ) from error
 
 
+@options.command(
+    "brdf-map", "picture a surface's reflection in every direction",
+    "Picture the BRDF over all view directions for one light direction, seen from above: "
+    "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
+    "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
+    *SURFACE_SOURCE,
+    ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
+     "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),
+    options.MODE,
+    options.Group("the map", (
+        *options.direction(),
+        *options.SPECTRUM,
+        ("--wavelength NM", "one wavelength only, in false colours", float),
+        ("--resolution N", "pixels a side", int, 512),
+        ("--samples N", "directions in a pixel; default: enough to find every lobe", int),
+        ("--illuminant", "light for the colours, daylight or equal energy", ILLUMINANTS, "D65"),
+        ("--cosine", "map f·cosθo, the radiance of a lit surface, instead of f", bool),
+        ("--exposure EV", "exposure of the PNG in stops; default: half of the diffracted light is "
+         "darker than white", options.STOPS),
+        ("--spectral", "also write every band as a channel of the EXR", bool),
+    )),
+    surface_options(),
+    options.Group("methods of the 2014 thesis", (
+        *options.method(None, "method to evaluate in NumPy, instead of the renderer's BSDF, for "
+                        "R = 1 and light D65"),
+        RELATIVE,
+    )),
+    options.heights(),
+    options.json("settings and statistics of the map"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Make the map, and return the figures."""
     take_source(args)
@@ -279,12 +272,9 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
-    import mitsuba as mi
-
     from ..analysis.media import medium_index
-    from ..orders.bsdf.diffraction_orders import DiffractionOrders
-    from ..plugin.dictionary import ORDERS, bsdf_dict
-    from ..plugin.diffraction import Diffraction
+    from ..analysis.scans import bsdf_of
+    from ..plugin.dictionary import bsdf_dict
     from ..plugin.presets import preset
 
     parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
@@ -298,14 +288,8 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
         parameters["height_scale"] = index * (args.height_scale or 1.0)
     parameters |= options.given(args, options.HEIGHTS)
     if args.preset is not None:
-        values = preset(args.preset, **parameters)
-    else:
-        values = bsdf_dict(str(args.source), **parameters)
-    kind = values.pop("type")
-    props = mi.Properties(kind)
-    for name, value in values.items():
-        props[name] = value
-    return DiffractionOrders(props) if kind == ORDERS else Diffraction(props)
+        return bsdf_of(preset(args.preset, **parameters))
+    return bsdf_of(bsdf_dict(str(args.source), **parameters))
 
 
 def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:

@@ -31,44 +31,6 @@ _LEAST_COSINE = 0.2
 _NARROWEST = 20.0
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "evaluate", run, "compare the angles of maxima with the grating equation",
-        "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
-        "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
-        "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
-        options.SOURCE,
-        ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
-         "folder", options.path_ending_in(".png")),
-    )  # fmt: skip
-    group = parser.add_argument_group("the beam")
-    options.add_direction(group, theta=75.0, phi=None)
-    options.add_wavelengths(group)
-    options.add_options(
-        group,
-        ("--angles FIRST:LAST", "viewing angles, degrees, positive away from the light; default: "
-         "the order of the patch's own period, to the mirror direction",
-         options.limits),
-        ("--angle-step DEG", "", float, 0.1),
-        ("--order M", "order that is followed", int, 1),
-    )  # fmt: skip
-    group = parser.add_argument_group("the model")
-    options.add_method(group, "spectral", "what evaluates")
-    options.add_table(
-        group,
-        options.TABLE_NAMES,
-        coherence="ensemble for spectral, patch for the thesis' own methods",
-    )
-    options.add_option(
-        group, "--positions N", "window positions whose own periods are fitted, for the spread; 0 "
-        "leaves them out", whole_number(0), 32, {"dest": "positions"},
-    )  # fmt: skip
-    group = parser.add_argument_group("the surface; methods other than spectral have R = 1")
-    options.add_options(group, *MATERIAL)
-    options.add_json(parser)
-    options.add_heights(parser)
-
-
 class _Experiment(NamedTuple):
     """Patch under a beam: gratings, periods in the plane of incidence (µm), and the axes."""
 
@@ -81,6 +43,36 @@ class _Experiment(NamedTuple):
     angles: Any  # (A,) degrees
 
 
+@options.command(
+    "evaluate", "compare the angles of maxima with the grating equation",
+    "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
+    "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
+    "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
+    options.SOURCE,
+    ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
+     "folder", options.path_ending_in(".png")),
+    options.Group("the beam", (
+        *options.direction(theta=75.0, phi=None),
+        *options.SPECTRUM,
+        ("--angles FIRST:LAST", "viewing angles, degrees, positive away from the light; default: "
+         "the order of the patch's own period, to the mirror direction",
+         options.limits),
+        ("--angle-step DEG", "", float, 0.1),
+        ("--order M", "order that is followed", int, 1),
+    )),
+    options.Group("the model", (
+        *options.method("spectral", "what evaluates"),
+        *options.table(
+            options.TABLE_NAMES,
+            coherence="ensemble for spectral, patch for the thesis' own methods",
+        ),
+        ("--positions N", "window positions whose own periods are fitted, for the spread; 0 "
+         "leaves them out", whole_number(0), 32, {"dest": "positions"}),
+    )),
+    options.Group("the surface; methods other than spectral have R = 1", MATERIAL),
+    options.json(),
+    options.heights(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure, fit, draw, and return the figures."""
 
@@ -196,6 +188,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     from ..analysis.media import in_medium
     from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
+    from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
     from ..tables.source import TableSource
 
@@ -206,7 +199,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     asked["wavelength_range"] = table_range(steps)
     source = in_medium(TableSource.of(patch), args.ext_ior)
     table = table_of(source, source.settings_for(asked), bar)
-    return partial(brdf_values, bsdf_of(table, **surface_parameters(args))), table.sigma
+    return partial(brdf_values, bsdf_of(bsdf_dict(table, **surface_parameters(args)))), table.sigma
 
 
 def _write(

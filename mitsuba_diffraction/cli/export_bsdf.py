@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from . import options
-from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
 from .report import Figures, check_outputs, elapsed, output_name
@@ -21,20 +21,17 @@ _SUFFIXES = {
 }  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "export-bsdf", run, "write a surface's BRDF for other programs",
-        "Write the reflected light on a grid of directions, for programs that have no diffraction: "
-        "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
-        "the BiRD project, csv for lines of scatter in 1/sr. Lobes narrower than the grid "
-        "become as wide as it, with all their light.",
-        *SURFACE_SOURCE,
-        ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
-         options.path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
-        options.MODE,
-    )  # fmt: skip
-    options.add_options(
-        parser.add_argument_group("the file"),
+@options.command(
+    "export-bsdf", "write a surface's BRDF for other programs",
+    "Write the reflected light on a grid of directions, for programs that have no diffraction: "
+    "rgl for Mitsuba's 'measured', zemax for OpticStudio's tabular BSDF, bird for the JSON of "
+    "the BiRD project, csv for lines of scatter in 1/sr. Lobes narrower than the grid "
+    "become as wide as it, with all their light.",
+    *SURFACE_SOURCE,
+    ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
+     options.path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
+    options.MODE,
+    options.Group("the file", (
         ("--format", "default: rgl for .bsdf, bird for .json and .brdf, csv for .csv",
          tuple(_SUFFIXES)),
         ("--theta DEG", "angles of the light from the normal, e.g. 0:80:10; default: by format",
@@ -45,12 +42,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "550; default: by format", options.numbers, None, {"dest": "wavelengths"}),
         ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
          "for zemax, 18 for bird and csv", whole_number(8)),
-    )  # fmt: skip
-    add_surface(parser.add_argument_group("the surface"))
-    options.add_heights(parser)
-    options.add_json(parser, "what was written")
-
-
+    )),
+    surface_options(),
+    options.heights(),
+    options.json("what was written"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)

@@ -9,36 +9,32 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 from . import options
-from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in
 from .report import Figures, check_outputs, elapsed, output_name
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "export-osl", run,
-        "write a surface as a shader for Blender's Cycles (OSL)",
-        "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
-        "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
-        "all presets, as an add-on that Blender installs.",
-        *SURFACE_SOURCE,
-        ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
-         "folder; without SOURCE and --preset it has all presets that the shaders show",
-         path_ending_in(".zip")),
-        ("--with FOLDER", "exported folder that the add-on has, too; may be given several times",
-         [Path], None, {"dest": "folders"}),
-        ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
-         "-osl in the current folder", Path),
-        ("--name NAME", "name of the shader and its files; default: diffraction_ and SOURCE's "
-         "name"),
-        options.MODE,
-    )  # fmt: skip
-    add_surface(parser.add_argument_group("the surface"))
-    options.add_heights(parser)
-    options.add_json(parser, "the files and their settings")
-
-
+@options.command(
+    "export-osl", "write a surface as a shader for Blender's Cycles (OSL)",
+    "Write a shader in Open Shading Language with its textures (EXR), and a script that adds "
+    "the material to a .blend file: docs/blender.md. With --addon, pack exported surfaces, or "
+    "all presets, as an add-on that Blender installs.",
+    *SURFACE_SOURCE,
+    ("--addon ZIP", "write this add-on for Blender, with a panel and an asset library, and no "
+     "folder; without SOURCE and --preset it has all presets that the shaders show",
+     path_ending_in(".zip")),
+    ("--with FOLDER", "exported folder that the add-on has, too; may be given several times",
+     [Path], None, {"dest": "folders"}),
+    ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
+     "-osl in the current folder", Path),
+    ("--name NAME", "name of the shader and its files; default: diffraction_ and SOURCE's "
+     "name"),
+    options.MODE,
+    surface_options(),
+    options.heights(),
+    options.json("the files and their settings"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     if args.addon is not None:

@@ -11,29 +11,26 @@ from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_name
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "hologram", run, "make a hologram of a logo: textures and a scene",
-        "Divide a picture into areas of a few colours, give each the grating that shows its "
-        "colour, and write textures and a scene with a card, or with a label on the front of a "
-        "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
-        ("PICTURE", "PNG, JPEG, ...", Path),
-        ("--mesh FILE", "mesh with texture coordinates", Path),
-        ("-o --output FOLDER", "default: PICTURE_hologram", Path),
-        ("--colours N", "largest number of colours", whole_number(1), 6),
-        ("--dots N", "dots along the longer side", whole_number(16), 512),
-        ("--keep-ground", "give the colour of most of the border a grating, too", bool),
-        ("--width S", "of a label, as a share of the mesh's width", number_between(0.01, 10), 0.5),
-        ("--height S", "of a label's middle, as a share of the mesh's height",
-         number_between(0, 1), 0.5),
-        ("--turn DEG", "turn the mesh around the vertical, which puts another side to the front",
-         number_between(-360, 360), 0.0),
-        ("--up AXIS", "axis of the mesh that points upwards: x, y, z, with a minus sign if it "
-         "points downwards", str, "auto"),
-    )  # fmt: skip
-    options.add_json(parser, "colours and files")
-
-
+@options.command(
+    "hologram", "make a hologram of a logo: textures and a scene",
+    "Divide a picture into areas of a few colours, give each the grating that shows its "
+    "colour, and write textures and a scene with a card, or with a label on the front of a "
+    "mesh: docs/holograms.md. Transparent pixels, black and the ground stay blank foil.",
+    ("PICTURE", "PNG, JPEG, ...", Path),
+    ("--mesh FILE", "mesh with texture coordinates", Path),
+    ("-o --output FOLDER", "default: PICTURE_hologram", Path),
+    ("--colours N", "largest number of colours", whole_number(1), 6),
+    ("--dots N", "dots along the longer side", whole_number(16), 512),
+    ("--keep-ground", "give the colour of most of the border a grating, too", bool),
+    ("--width S", "of a label, as a share of the mesh's width", number_between(0.01, 10), 0.5),
+    ("--height S", "of a label's middle, as a share of the mesh's height",
+     number_between(0, 1), 0.5),
+    ("--turn DEG", "turn the mesh around the vertical, which puts another side to the front",
+     number_between(-360, 360), 0.0),
+    ("--up AXIS", "axis of the mesh that points upwards: x, y, z, with a minus sign if it "
+     "points downwards", str, "auto"),
+    options.json("colours and files"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the folder, print the colours, and return the figures."""
     from ..scene import label

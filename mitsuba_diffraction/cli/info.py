@@ -26,31 +26,25 @@ _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV
 _TABLE = ("coherence_width", "wavelength_range")
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "info", run, "describe a table, a height field, a recipe or a mesh",
-        "Describe a table, a table of orders, a file of heights, a recipe, or a mesh (PLY, OBJ, "
-        "glTF, USD, serialized) and whether its tangents suit a measured patch.",
-    )  # fmt: skip
-    plot = path_ending_in(".png", ".pdf", ".svg")
-    options.add_option(
-        parser, "FILE", "table, table of orders, heights, recipe or mesh", Path, more={"nargs": "?"}
-    )
-    options.add_json(parser, "the description", nargs="?", const=STDOUT)
-    options.add_options(
-        parser,
-        ("--formats", "list the formats of scans: what is read, from which instruments, and what "
-         "to export in place of others", bool),
-        ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", plot),
-        ("--energy", "a table's albedo for three materials, raw and conserved, and R + T of a "
-         "dielectric and of a thin sheet", bool),
-        ("--picture OUT", "draw heights or a recipe's: the patch, its distribution and spectrum, "
-         "and the light that it scatters", plot),
-    )  # fmt: skip
-    options.add_heights(parser)
-    options.add_table(parser.add_argument_group("the table"), _TABLE)
+_PLOT = path_ending_in(".png", ".pdf", ".svg")
 
 
+@options.command(
+    "info", "describe a table, a height field, a recipe or a mesh",
+    "Describe a table, a table of orders, a file of heights, a recipe, or a mesh (PLY, OBJ, "
+    "glTF, USD, serialized) and whether its tangents suit a measured patch.",
+    ("FILE", "table, table of orders, heights, recipe or mesh", Path, None, {"nargs": "?"}),
+    options.json("the description", nargs="?", const=STDOUT),
+    ("--formats", "list the formats of scans: what is read, from which instruments, and what "
+     "to export in place of others", bool),
+    ("--albedo OUT", "plot a table's raw directional albedo against angle and azimuth", _PLOT),
+    ("--energy", "a table's albedo for three materials, raw and conserved, and R + T of a "
+     "dielectric and of a thin sheet", bool),
+    ("--picture OUT", "draw heights or a recipe's: the patch, its distribution and spectrum, "
+     "and the light that it scatters", _PLOT),
+    options.heights(),
+    options.Group("the table", tuple(options.table(_TABLE))),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Print the description, and return the figures."""
     if args.formats:

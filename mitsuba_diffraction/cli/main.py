@@ -1,9 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
-A sub-command is two functions: one declares its parser by `options.add_command`, the other runs it
-and returns its figures, which are written for --json; it sets `args.code` to end with another
-exit code than 0. The second imports its modules (Mitsuba above all) when called, so that
-`--help` and `--version` answer at once.
+A sub-command is a function that `options.command` declares. It returns its figures, for --json, and
+sets `args.code` to end with another exit code than 0. It imports its modules (Mitsuba above all)
+when called, so that `--help` and `--version` answer at once.
 """
 
 from __future__ import annotations
@@ -11,13 +10,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import sys
 import time
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..errors import DiffractionError, printable, shortened
 from ..files import check_name
@@ -52,16 +52,12 @@ from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
 from .report import STDOUT, check_outputs, save_report
 from .spellings import current
 
-#: Functions that declare the sub-commands, in the order of --help.
+#: The sub-commands, in the order of --help.
 COMMANDS = (
-    precompute.add_parser, solve.add_parser, orders.add_parser, info.add_parser,
-    tangents.add_parser, presets.add_parser, hologram.add_parser, plan.add_parser,
-    render.add_parser, tonemap.add_parser,
-    brdf_map.add_parser, spectrum.add_parser,
-    evaluate.add_parser, survey.add_parser, scatter.add_parser, sweep.add_parser,
-    tradeoff.add_parser,
-    realtime.add_compare, realtime.add_view, realtime.add_export_viewer, realtime.add_export_shader,
-    export_osl.add_parser, export_bsdf.add_parser,
+    precompute.run, solve.run, orders.run, info.run, tangents.run, presets.run, hologram.run,
+    plan.run, render.run, tonemap.run, brdf_map.run, spectrum.run, evaluate.run, survey.run,
+    scatter.run, sweep.run, tradeoff.run, realtime.compare, realtime.view, realtime.export_viewer,
+    realtime.export_shader, export_osl.run, export_bsdf.run,
 )  # fmt: skip
 
 DONE = 0
@@ -70,7 +66,14 @@ USAGE = 2
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose errors are one line, with the values that they quote shortened."""
+    """Argument parser whose errors are one line, with the values that they quote shortened.
+
+    Ranges may begin with a minus: -60:60:5 is no option.
+    """
+
+    def __init__(self, **how: Any) -> None:
+        super().__init__(**how)
+        self._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
 
     def error(self, message: str) -> NoReturn:
         line = shortened(printable(message))
@@ -113,8 +116,8 @@ def build_parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    for add_parser in COMMANDS:
-        add_parser(subparsers)
+    for command in COMMANDS:
+        command.add_to(subparsers)
     for subparser in subparsers.choices.values():
         _add_common(subparser.add_argument_group("general"))
     return parser

@@ -131,9 +131,10 @@ class Measurement:
         from ..analysis.media import follow, loaded_in_media
         from ..analysis.scans import bsdf_of
         from ..analysis.spectra import spectrum
+        from ..plugin.dictionary import bsdf_dict
 
         parameters = surface_parameters(self.args)
-        bsdf = bsdf_of(table, **loaded_in_media(parameters))
+        bsdf = bsdf_of(bsdf_dict(table, **loaded_in_media(parameters)))
         before = follow(bsdf, parameters, float(lam[0]))
         azimuth, cone = geometry.azimuth, geometry.acceptance
         spectra = spectrum(

@@ -1,29 +1,30 @@
-"""Options that several commands share, each declared once, and types of arguments.
+"""Commands, declared by `command`; options that several share, and types of arguments.
 
-A value that does not fit is a usage error that quotes it. Options are rows of tables, which
-`add_options` declares on a parser or a group; the functions beside them read the values. Modules of
-the library are imported where values are read, so that --help answers at once.
+A value that does not fit is a usage error that quotes it. Options are rows of values; the functions
+beside them read what is given. Modules of the library are imported where values are read, so that
+--help answers at once.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
+from ..heights.read import OPTIONS, LoadOptions
 from ..optics.display import VIEWS
-from ..settings import TableSettings, checked, described_setting
+from ..settings import SETTINGS, TableSettings, checked
 from .report import Figures
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
-    from ..heights.read import LoadOptions
 
-Group = argparse._ActionsContainer
-Subparsers = argparse._SubParsersAction
+#: The values that `add_option` takes after the group.
+Row = tuple[Any, ...]
 
 #: Default of --wavelength-range and of --step, nm.
 WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
@@ -43,32 +44,8 @@ LIMITS = (
 #: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
-#: Options for reading heights: the name of the value, and help.
-HEIGHTS: dict[str, tuple[str, str]] = {
-    "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
-    "max_height": (
-        "H",
-        "µm, height of white in an image; other heights are scaled to span it from end to end",
-    ),
-    "height_unit": ("U", "unit of the numbers in the file, e.g. nm; overrides what it states"),
-    "channel": ("C", "name or index of the channel; default: the heights"),
-    "crop": (
-        "W[,H[,X,Y]]",
-        "size of the region to keep, µm, central or with the lower left corner X, Y; default: all",
-    ),
-    "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
-    "level": (
-        "METHOD",
-        "surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then a plane) or "
-        "none; default: plane if a tilt shows",
-    ),
-    "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
-    "periodic": (
-        "METHOD",
-        "edges: exact, whole periods of a surface that repeats; open, part of a larger surface; "
-        "default: open, of a file",
-    ),
-}
+#: Names of the options for reading heights.
+HEIGHTS = tuple(OPTIONS)
 #: Settings of a table.
 TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
@@ -96,6 +73,10 @@ VIEW = (
     "--tonemap", "natural keeps hues and turns bright light white; standard clips each channel by "
     "itself", VIEWS, "natural", {"dest": "view"},
 )  # fmt: skip
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
@@ -168,27 +149,52 @@ def numbers_of(text: str, most: int) -> list[float]:
     return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
 
-def add_command(
-    subparsers: Subparsers, name: str, run: Callable[..., Figures], help: str, description: str,
-    *rows: tuple[Any, ...],
-) -> argparse.ArgumentParser:  # fmt: skip
-    """Add the parser of a sub-command, which `main` runs by calling run(args), and its options."""
-    parser: argparse.ArgumentParser = subparsers.add_parser(
-        name, help=help, description=description
-    )
-    parser.set_defaults(run=run, parser=parser)
-    add_options(parser, *rows)
-    return parser
+@dataclass(frozen=True)
+class Group:
+    """Options with a title of their own in --help; without a title at most one may be given."""
+
+    title: str
+    rows: tuple[Row | Group, ...]
+    text: str | None = None
 
 
-def add_options(group: Group, *rows: tuple[Any, ...]) -> None:
-    """Add options or arguments: rows of the values that `add_option` takes after the group."""
+@dataclass
+class Command:
+    """Sub-command: its function, which `main` calls with the arguments, and its options."""
+
+    run: Callable[[argparse.Namespace], Figures]
+    name: str
+    help: str
+    description: str
+    rows: tuple[Row | Group, ...]
+
+    def add_to(self, subparsers: argparse._SubParsersAction[Any]) -> None:
+        """Add the parser of the command."""
+        parser = subparsers.add_parser(self.name, help=self.help, description=self.description)
+        parser.set_defaults(run=self.run, parser=parser)
+        add_options(parser, *self.rows)
+
+
+def command(
+    name: str, help: str, description: str, *rows: Row | Group
+) -> Callable[[Callable[[argparse.Namespace], Figures]], Command]:
+    """Declare a function as a sub-command."""
+    return lambda run: Command(run, name, help, description, rows)
+
+
+def add_options(group: argparse._ActionsContainer, *rows: Row | Group) -> None:
+    """Add options or arguments, and groups of them."""
     for row in rows:
-        add_option(group, *row)
+        if not isinstance(row, Group):
+            add_option(group, *row)
+        elif row.title:
+            add_options(group.add_argument_group(row.title, row.text), *row.rows)
+        else:
+            add_options(group.add_mutually_exclusive_group(), *row.rows)
 
 
 def add_option(
-    group: Group, usage: str, text: str, kind: Any = None, default: Any = None,
+    group: argparse._ActionsContainer, usage: str, text: str, kind: Any = None, default: Any = None,
     more: Mapping[str, Any] = {},
 ) -> None:  # fmt: skip
     """Add an option, or an argument.
@@ -234,12 +240,10 @@ class _Retired(argparse.Action):
         namespace.retired = (*getattr(namespace, "retired", ()), self.dest)
 
 
-def add_retired(group: Group, name: str, count: int) -> None:
-    """Add an option of an earlier version, with so many values; see `retired`."""
-    group.add_argument(
-        _option(name), action=_Retired, nargs=count, default=argparse.SUPPRESS,
-        help=argparse.SUPPRESS,
-    )  # fmt: skip
+def retired_row(name: str, count: int) -> Row:
+    """Return the row of an option of an earlier version, with so many values; see `retired`."""
+    more = {"action": _Retired, "nargs": count, "default": argparse.SUPPRESS}
+    return _option(name), argparse.SUPPRESS, None, None, more
 
 
 def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
@@ -265,11 +269,10 @@ def refuse(
         args.parser.error(f"{before}{option_of(args, name)}{why}")
 
 
-def add_heights(parser: argparse.ArgumentParser) -> None:
-    """Add the options for reading a file of heights; `load_options` checks their values."""
-    group = parser.add_argument_group("reading heights")
-    for name, (metavar, text) in HEIGHTS.items():
-        add_option(group, f"{_option(name)} {metavar}", text)
+def heights() -> Group:
+    """Return the options for reading a file of heights; `load_options` checks their values."""
+    rows = ((f"{_option(name)} {each.metavar}", each.help) for name, each in OPTIONS.items())
+    return Group("reading heights", tuple(rows))
 
 
 def load_options(args: argparse.Namespace) -> LoadOptions:
@@ -277,29 +280,25 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
 
     Raises a DiffractionError if a value does not fit.
     """
-    from ..heights.read import LoadOptions
-
-    return LoadOptions.parse(**{name: getattr(args, name) for name in HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in OPTIONS})
 
 
-def files(kinds: str, nargs: str = "+") -> tuple[Any, ...]:
+def files(kinds: str, nargs: str = "+") -> Row:
     """Return the row of FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
     text = f"{kinds}; folders and patterns of names, too"
     return "FILE", text, Path, None, {"dest": "files", "nargs": nargs}
 
 
-def add_table(group: Group, names: Sequence[str] = TABLE, **defaults: str) -> None:
-    """Add the settings of a table. defaults: texts for the help in place of the default values."""
+def table(names: Sequence[str] = TABLE, **defaults: str) -> Iterator[Row]:
+    """Yield rows of a table's settings. defaults: texts for the help in place of the defaults."""
     for name in names:
-        item = described_setting(name)
+        item = SETTINGS[name]
         kind: Any = item.choices or (whole_number(1) if item.type is int else item.type)
         values = (item.metavar,) if isinstance(item.metavar, str) else ()
         if isinstance(item.metavar, tuple):
             kind, values = limits, (":".join(item.metavar),)
         default = defaults.get(name, item.default_text)
-        add_option(
-            group, " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind
-        )
+        yield " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind
 
 
 def table_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -311,22 +310,22 @@ def table_options(args: argparse.Namespace) -> dict[str, Any]:
     return {name: checked(name, value) for name, value in values.items()}
 
 
-def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
-    """Add the direction of the light in degrees; without `phi` it is across the patch's grooves."""
+def direction(theta: float = 0.0, phi: float | None = 0.0) -> tuple[Row, Row]:
+    """Return the rows of the light's direction; without `phi` it is across the patch's grooves."""
     azimuth = "azimuth of the light from x towards y, degrees"
     if phi is None:
         azimuth += "; default: across the grooves if there are any, or 0"
-    add_options(
-        group,
+    return (
         ("--theta DEG", "angle of the light from the normal, 0 to below 90", float, theta),
         ("--phi DEG", azimuth, float, phi),
     )
 
 
-def add_wavelengths(group: Group) -> None:
-    """Add the limits of the spectrum and its step, nm; see `wavelengths`."""
-    add_table(group, ("wavelength_range",))
-    add_option(group, "--step NM", f"between wavelengths; default: {STEP:g}", float)
+#: Limits of the spectrum and its step, nm; see `wavelengths`.
+SPECTRUM = (
+    *table(("wavelength_range",)),
+    ("--step NM", f"between wavelengths; default: {STEP:g}", float),
+)
 
 
 def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
@@ -335,13 +334,13 @@ def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
     return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
 
 
-def add_method(group: Group, default: str | None, text: str) -> None:
-    """Add the method that sums the spectrum, and the period that some methods need."""
+def method(default: str | None, text: str) -> tuple[Row, Row]:
+    """Return the rows of the method that sums the spectrum, and of the period that some need."""
     period = "µm, for the methods that need one; default: estimated from the heights"
-    add_options(group, ("--method", text, METHODS, default), ("--period D", period, float))
+    return ("--method", text, METHODS, default), ("--period D", period, float)
 
 
-def samples(least: int, default: int | None) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+def samples(least: int, default: int | None) -> tuple[Row, Row]:
     """Return the rows of samples per pixel and of the seed of their random numbers."""
     own = "; default: the scene's" if default is None else ""
     return (
@@ -350,15 +349,9 @@ def samples(least: int, default: int | None) -> tuple[tuple[Any, ...], tuple[Any
     )
 
 
-def add_json(parser: argparse.ArgumentParser, content: str = "the figures", **more: Any) -> None:
-    """Add a file for the figures that are printed; `main` checks that it can be written."""
-    add_option(
-        parser, "--json FILE", f"write {content} as JSON", path_ending_in(".json"), None, more
-    )
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def json(content: str = "the figures", **more: Any) -> Row:
+    """Return the row of a file for the figures; `main` checks that it can be written."""
+    return "--json FILE", f"write {content} as JSON", path_ending_in(".json"), None, more
 
 
 def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:

@@ -10,47 +10,34 @@ from .options import number_between
 from .report import Figures, check_outputs, output_name
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "orders", run, "efficiencies of solved orders as a CSV",
-        "List the efficiencies of a table's orders, a line for each order that propagates: "
-        "wavelength, direction to the light within the superstrate, order, and the reflected share "
-        "of s and of p light; a thin sheet also has the transmitted shares. "
-        "'solve --import' reads the file back.",
-        ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
-        ("-o --output OUT", "the CSV, or NetCDF (.nc); default: TABLE's name with .csv in the "
-         "current folder", options.path_ending_in(".csv", ".nc")),
-    )  # fmt: skip
-    group = parser.add_argument_group(
-        "the light", "Values, or FIRST:LAST:STEP, several joined by commas."
-    )
-    options.add_options(
-        group,
+@options.command(
+    "orders", "efficiencies of solved orders as a CSV",
+    "List the efficiencies of a table's orders, a line for each order that propagates: "
+    "wavelength, direction to the light within the superstrate, order, and the reflected share "
+    "of s and of p light; a thin sheet also has the transmitted shares. "
+    "'solve --import' reads the file back.",
+    ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
+    ("-o --output OUT", "the CSV, or NetCDF (.nc); default: TABLE's name with .csv in the "
+     "current folder", options.path_ending_in(".csv", ".nc")),
+    options.Group("the light", (
         ("--theta DEG", "angles of the light from the normal, -90 to 90; e.g. 30, or "
          "--theta=-85:85:5; default: 0", options.numbers, (0.0,)),
         ("--phi DEG", "azimuths of the light, from x, across the grooves, towards y; default: 0",
          options.numbers, (0.0,)),
-    )  # fmt: skip
-    options.add_options(
-        group.add_mutually_exclusive_group(),
-        ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20", options.numbers),
-        (
-            "--step NM",
-            "between wavelengths, over all of the table",
-            number_between(0.01, 1000),
-            5.0,
-        ),
-    )
-    options.add_options(
-        group.add_mutually_exclusive_group(),
-        ("--polarised", "shares of s and of p light; default: both are the share of unpolarised "
-         "light", bool),
-        ("--jones", "Jones matrices about s and p, of a table of 'solve --polarised', for ray "
-         "tracers; J_ss is real", bool),
-    )  # fmt: skip
-    options.add_json(parser, "the lines")
-
-
+        options.Group("", (
+            ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20", options.numbers),
+            ("--step NM", "between wavelengths, over all of the table",
+             number_between(0.01, 1000), 5.0),
+        )),
+        options.Group("", (
+            ("--polarised", "shares of s and of p light; default: both are the share of "
+             "unpolarised light", bool),
+            ("--jones", "Jones matrices about s and p, of a table of 'solve --polarised', for ray "
+             "tracers; J_ss is real", bool),
+        )),
+    ), "Values, or FIRST:LAST:STEP, several joined by commas."),
+    options.json("the lines"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """List the orders, and return the figures."""
     import numpy as np

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..scene.planning.plan import PlannedTable
 
 
-PATHS, TOLERANCE = 1 << 15, 1e-3
+PATHS, TOLERANCE = 1 << 17, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
 #: How a plan is made.
 PLAN = (
@@ -30,18 +30,13 @@ PLAN = (
 )  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "plan", run, "find out which part of its tables a scene needs",
-        "Trace paths through an XML scene, report which spatial frequencies, kappa and "
-        "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
-        "these, for `precompute` and `render --plan`.",
-        *scene_options.SCENE,
-        *PLAN,
-        ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
-         "on", options.path_ending_in(".toml")),
-    )  # fmt: skip
-    options.add_json(parser)
+def recipe_file(text: str) -> Path:
+    """Recipe of a plan. A scene after --plan without a recipe is refused with a hint."""
+    if not text.lower().endswith(".toml"):
+        raise argparse.ArgumentTypeError(
+            f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"
+        )
+    return Path(text)
 
 
 def planning_variant(requested: str | None) -> str:
@@ -58,6 +53,17 @@ def planning_variant(requested: str | None) -> str:
     return set_variant(f"{'cuda' if name.startswith('cuda') else 'llvm'}_ad_spectral")
 
 
+@options.command(
+    "plan", "find out which part of its tables a scene needs",
+    "Trace paths through an XML scene, report which spatial frequencies, kappa and "
+    "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
+    "these, for `precompute` and `render --plan`.",
+    *scene_options.SCENE,
+    *PLAN,
+    ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
+     "on", options.path_ending_in(".toml")),
+    options.json(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Plan, report, and return the figures."""
     scene_options.put_on_stage(args)
@@ -100,21 +106,13 @@ def run(args: argparse.Namespace) -> Figures:
 def _planned(
     args: argparse.Namespace, load: Callable[[], Any], tell: Progress
 ) -> list[PlannedTable]:
-    from ..scene.planning.plan import plan_table, record
+    from ..scene.planning.light import light_of_tables
+    from ..scene.planning.plan import plan_table
 
     tell(0, 0, "tracing paths")
-    _, tables = record(load, partial(sensor_of, index=args.sensor), args.paths)
+    tables = light_of_tables(load, partial(sensor_of, index=args.sensor), args.paths)
     tell(0, 0, "building tables")
     return [plan_table(table, args.plan_tolerance) for table in tables]
-
-
-def recipe_file(text: str) -> Path:
-    """Recipe of a plan. A scene after --plan without a recipe is refused with a hint."""
-    if not text.lower().endswith(".toml"):
-        raise argparse.ArgumentTypeError(
-            f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"
-        )
-    return Path(text)
 
 
 def load_by_plan(
@@ -140,7 +138,7 @@ def load_by_plan(
     finally:
         set_variant(variant)
     for table in planned:
-        names, before = ", ".join(table.recorded.surfaces), table.recorded.table.nbytes / 1e6
+        names, before = ", ".join(table.light.surfaces), table.light.table.nbytes / 1e6
         if table.settings is None:
             say(f"plan: {names} keeps its whole table of {before:.3g} MB")
         else:

@@ -14,7 +14,7 @@ from ..system import peak_memory
 from . import options
 from .console import Bar
 from .report import Figures, check_outputs, output_name
-from .workers import add_workers, client_of, on_workers
+from .workers import WORKERS, client_of, on_workers
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -24,26 +24,23 @@ if TYPE_CHECKING:
     from ..tables.source import TableSource
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "precompute", run, "build the table of a height field",
-        "Build a table of diffraction orders from measured or generated heights, and measure its "
-        "error. Options override the settings of a recipe.",
-        ("SOURCE ...", "image, array, text, AFM file or recipe (.toml); several patches of one "
-         "surface make one table of their mean powers, several recipes make a table each", Path,
-         None, {"dest": "sources"}),
-        ("-o --output OUT", "the table; default: where the recipe says, or else SOURCE's name with "
-         ".exr in the current folder", options.path_ending_in(".exr")),
-    )  # fmt: skip
-    options.add_heights(parser)
-    group = parser.add_argument_group("the table")
-    options.add_table(group)
-    options.add_table(group, ("wavelength_range",))
-    options.add_retired(group, "second_order", 1)
-    add_workers(parser)
-    options.add_json(parser, "the table's summary")
-
-
+@options.command(
+    "precompute", "build the table of a height field",
+    "Build a table of diffraction orders from measured or generated heights, and measure its "
+    "error. Options override the settings of a recipe.",
+    ("SOURCE ...", "image, array, text, AFM file or recipe (.toml); several patches of one "
+     "surface make one table of their mean powers, several recipes make a table each", Path,
+     None, {"dest": "sources"}),
+    ("-o --output OUT", "the table; default: where the recipe says, or else SOURCE's name with "
+     ".exr in the current folder", options.path_ending_in(".exr")),
+    options.heights(),
+    options.Group("the table", (
+        *options.table(), *options.table(("wavelength_range",)),
+        options.retired_row("second_order", 1),
+    )),
+    WORKERS,
+    options.json("the table's summary"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Build the table of each recipe, and return the figures."""
     from ..tables.source import TableSource

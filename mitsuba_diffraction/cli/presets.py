@@ -8,14 +8,11 @@ from . import options
 from .report import Figures
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "presets", run, "list the presets",
-        "List the presets, which --preset uses in place of a patch: docs/gallery.md.",
-    )  # fmt: skip
-    options.add_json(parser, "the looks")
-
-
+@options.command(
+    "presets", "list the presets",
+    "List the presets, which --preset uses in place of a patch: docs/gallery.md.",
+    options.json("the looks"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Print a line for each look, and return the figures."""
     from ..plugin.presets import presets

@@ -16,7 +16,7 @@ from ..errors import DiffractionError
 from ..realtime.glsl.source import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from . import options, scene_options
-from .brdf_map import SURFACE_SOURCE, add_surface, surface_bsdf, take_source
+from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import path_ending_in, whole_number
 from .report import Figures, check_outputs, elapsed, output_name, plain, save_json
@@ -24,20 +24,17 @@ from .report import Figures, check_outputs, elapsed, output_name, plain, save_js
 _EXPORTED = ("fast", "exact")
 
 
-def add_view(subparsers: options.Subparsers) -> None:
-    options.add_command(
-        subparsers, "view", view, "look at a scene in the browser, in real time",
-        "Write the page of a scene, as export-viewer does, and open it in the browser: orbit, pan, "
-        "zoom, drag the light, change method, exposure and material.",
-        *scene_options.SCENE,
-        ("--method", "method to start with", WEB_METHODS, "fast"),
-        ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
-        options.VIEW,
-        ("-o --output OUT", "page to write; default: one in the system's folder of temporary files",
-         path_ending_in(".html")),
-    )  # fmt: skip
-
-
+@options.command(
+    "view", "look at a scene in the browser, in real time",
+    "Write the page of a scene, as export-viewer does, and open it in the browser: orbit, pan, "
+    "zoom, drag the light, change method, exposure and material.",
+    *scene_options.SCENE,
+    ("--method", "method to start with", WEB_METHODS, "fast"),
+    ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
+    options.VIEW,
+    ("-o --output OUT", "page to write; default: one in the system's folder of temporary files",
+     path_ending_in(".html")),
+)  # fmt: skip
 def view(args: argparse.Namespace) -> Figures:
     """Write the page, open it, and return its figures."""
     scene_options.put_on_stage(args)
@@ -73,28 +70,23 @@ def _opened(address: str) -> bool:
         return False
 
 
-def add_compare(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "compare", compare,
-        "compare the realtime picture of a scene with the path-traced one",
-        "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
-        "difference: over all pixels in all direct light of the scene, and beside it in full "
-        "transport.",
-        *scene_options.SCENE,
-        ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
-         "scene's name with _compare in the current folder", Path),
-        ("--method NAME ...", f"methods of the shaders: {', '.join(METHODS)}, or all; default: "
-         "fast", (*METHODS, "all"), ["fast"]),
-        *options.samples(2, 1024),
-        ("--full-spp N", "samples per pixel of full transport; 0 leaves it out",
-         whole_number(0), 64),
-        ("--frames N", "frames of progressive light", whole_number(4), 512),
-        ("--supersampling N", "the shaders' samples along either side of a pixel",
-         whole_number(1), 8),
-    )  # fmt: skip
-    options.add_json(parser)
-
-
+@options.command(
+    "compare", "compare the realtime picture of a scene with the path-traced one",
+    "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
+    "difference: over all pixels in all direct light of the scene, and beside it in full "
+    "transport.",
+    *scene_options.SCENE,
+    ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
+     "scene's name with _compare in the current folder", Path),
+    ("--method NAME ...", f"methods of the shaders: {', '.join(METHODS)}, or all; default: "
+     "fast", (*METHODS, "all"), ["fast"]),
+    *options.samples(2, 1024),
+    ("--full-spp N", "samples per pixel of full transport; 0 leaves it out",
+     whole_number(0), 64),
+    ("--frames N", "frames of progressive light", whole_number(4), 512),
+    ("--supersampling N", "the shaders' samples along either side of a pixel", whole_number(1), 8),
+    options.json(),
+)  # fmt: skip
 def compare(args: argparse.Namespace) -> Figures:
     """Compare, and return the figures."""
     scene_options.put_on_stage(args)
@@ -125,24 +117,20 @@ def compare(args: argparse.Namespace) -> Figures:
     return figures
 
 
-def add_export_viewer(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "export-viewer", export_viewer,
-        "write a page that shows a scene in a browser, without a server",
-        "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
-        "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
-        "as fit; the resulting ΔE2000 is printed, and shown on the page.",
-        *scene_options.SCENE,
-        ("-o --output OUT", "page; default: the scene's name with .html in the current folder",
-         path_ending_in(".html")),
-        ("--method", "method on the page; all leaves out those that do not suit the scene",
-         (*WEB_METHODS, "all"), "all"),
-        options.VIEW,
-        ("--title TEXT", "title of the page; default: the scene's name"),
-    )  # fmt: skip
-    options.add_json(parser, "contents of the page")
-
-
+@options.command(
+    "export-viewer", "write a page that shows a scene in a browser, without a server",
+    "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
+    "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
+    "as fit; the resulting ΔE2000 is printed, and shown on the page.",
+    *scene_options.SCENE,
+    ("-o --output OUT", "page; default: the scene's name with .html in the current folder",
+     path_ending_in(".html")),
+    ("--method", "method on the page; all leaves out those that do not suit the scene",
+     (*WEB_METHODS, "all"), "all"),
+    options.VIEW,
+    ("--title TEXT", "title of the page; default: the scene's name"),
+    options.json("contents of the page"),
+)  # fmt: skip
 def export_viewer(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     scene_options.put_on_stage(args)
@@ -181,25 +169,22 @@ def _write_page(args: argparse.Namespace, methods: Sequence[str], title: str = "
             "seconds": seconds}  # fmt: skip
 
 
-def add_export_shader(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "export-shader", export_shader,
-        "write a surface's diffraction as GLSL with its textures, for other programs",
-        "Write a function `vec3 diffraction(vec3 wi, vec3 wo)` in GLSL, its textures (EXR) and "
-        "constants (JSON), and a material of three.js that uses them. How to bring it into "
-        "another engine: docs/realtime.md.",
-        *SURFACE_SOURCE,
-        ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
-         "-shader in the current folder", Path),
-        ("--method", "colours of daylight summed up beforehand, a loop over wavelengths, or both; "
-         "default: both", _EXPORTED, _EXPORTED, {"nargs": "+"}),
-        options.MODE,
-    )  # fmt: skip
-    add_surface(parser.add_argument_group("the surface"), turned=False)
-    options.add_heights(parser)
-    options.add_json(parser, "the files and their settings")
-
-
+@options.command(
+    "export-shader",
+    "write a surface's diffraction as GLSL with its textures, for other programs",
+    "Write a function `vec3 diffraction(vec3 wi, vec3 wo)` in GLSL, its textures (EXR) and "
+    "constants (JSON), and a material of three.js that uses them. How to bring it into "
+    "another engine: docs/realtime.md.",
+    *SURFACE_SOURCE,
+    ("-o --output FOLDER", "to write into, made if it is missing; default: SOURCE's name with "
+     "-shader in the current folder", Path),
+    ("--method", "colours of daylight summed up beforehand, a loop over wavelengths, or both; "
+     "default: both", _EXPORTED, _EXPORTED, {"nargs": "+"}),
+    options.MODE,
+    surface_options(turned=False),
+    options.heights(),
+    options.json("the files and their settings"),
+)  # fmt: skip
 def export_shader(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     take_source(args)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DiffractionError
 from ..extras import optional
@@ -24,58 +24,56 @@ from ..scene.frames import (
     write_film,
     write_frame,
 )
-from ..scene.load import load_scene, set_variant
+from ..scene.load import load_scene, preview_samples, sensor_of, set_variant
 from ..scene.parameters import values_of_frames
-from ..scene.passes import Result, Stop, integrator_of
+from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import ANIMATION, say_why
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
-from .observed import OBSERVER, run_observed
+from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, default_output, elapsed, output_name
 from .studio import STUDIO_OPTIONS, take_studio
-from .workers import THREADS, add_workers, client_of, film_of, on_workers, say_report
+from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
+
+if TYPE_CHECKING:
+    from ..analysis.observers import Eye
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "render", run, "render a Mitsuba scene",
-        "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
-        "current pass and keeps the picture so far. With --frames, render a folder of PNG "
-        "files while parameters of the scene change; existing frames with the same "
-        "settings are kept, so an interrupted run can be continued.",
-        *scene_options.SCENE,
-        ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
-         ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
-        *options.samples(1, None),
-        ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
-        options.VIEW,
-        ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
-         "--frames, denoise each frame", bool),
-        ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
-         bool),
-        ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "
-         "of `plan -o`, or without any, planned first", recipe_file, None, {"nargs": "*"}),
-        *PLAN,
-        *OBSERVER,
-    )  # fmt: skip
-    options.add_json(parser, "size, samples, time and files of the picture")
-    options.add_options(parser.add_argument_group("animation"), *ANIMATION)
-    options.add_options(parser.add_argument_group("a mesh in a few words"), *STUDIO_OPTIONS)
-    add_workers(parser)
-    options.add_option(parser, *THREADS)
-
-
+@options.command(
+    "render", "render a Mitsuba scene",
+    "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
+    "current pass and keeps the picture so far. With --frames, render a folder of PNG "
+    "files while parameters of the scene change; existing frames with the same "
+    "settings are kept, so an interrupted run can be continued.",
+    *scene_options.SCENE,
+    ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
+     ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
+    *options.samples(1, None),
+    ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
+    options.VIEW,
+    ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
+     "--frames, denoise each frame", bool),
+    ("--preview", "half the width and height, and at most 16 samples, unless -s is given",
+     bool),
+    ("--plan RECIPE.toml", "render with tables limited to what the scene needs: by the recipes "
+     "of `plan -o`, or without any, planned first", recipe_file, None, {"nargs": "*"}),
+    *PLAN,
+    *OBSERVER,
+    options.json("size, samples, time and files of the picture"),
+    options.Group("animation", ANIMATION),
+    options.Group("a mesh in a few words", STUDIO_OPTIONS),
+    WORKERS,
+    THREADS,
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Render, and return the figures."""
     check_plan_options(args)
     take_studio(args)
     scene_options.put_on_stage(args)
-    if args.observer is not None:
-        return run_observed(args)
-    options.refuse(args, ["illuminant"], ": is for the eye of --observer; name one")
+    eye = eye_of(args)
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
@@ -94,7 +92,7 @@ def run(args: argparse.Namespace) -> Figures:
         return _run_frames(args)
     if moving or args.exr or args.fps:
         args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
-    return _on_workers(args) if on_workers(args) else _run_one(args)
+    return _on_workers(args) if on_workers(args) else _run_one(args, eye)
 
 
 class Outputs(NamedTuple):
@@ -168,24 +166,33 @@ def _on_workers(args: argparse.Namespace) -> Figures:
     return {}
 
 
-def _run_one(args: argparse.Namespace) -> Figures:
+def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
-
-    def load(bar: Bar) -> Any:
-        whole = partial(load_scene, args.scene, parameters, box_filter=args.denoise, say=say)
-        return whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
-
     variant = set_variant(args.mode)
-
-    def check(scene: Any, sensor: Any) -> None:
-        check_outputs(_files(args, outputs.named))  # of what only loading tells
-        if outputs.only_png:
-            _check_colours(args, outputs.png, scene, sensor)
-
+    bands = None if eye is None else bands_of(args, eye, variant)
+    whole = partial(
+        load_scene, args.scene, parameters, box_filter=args.denoise, bands=bands, say=say
+    )
     with mitsuba_warnings():
-        scene, sensor, result = scene_options.rendered(args, variant, load, check)
-        report = _finish(args, result, outputs, variant, scene)
+        with Bar(args, unit=" spp", delay=0) as bar:
+            bar(0, args.spp or 0, "loading")
+            scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
+            sensor = sensor_of(scene, args.sensor, args.preview)
+            spp = args.spp or preview_samples(sensor, args.preview)
+            check_outputs(_files(args, outputs.named))  # of what only loading tells
+            if outputs.only_png:
+                _check_colours(args, outputs.png, scene, sensor)
+            with Stop() as stop:
+                result = render_passes(
+                    scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
+                )
+        if result.spp == 0:
+            raise KeyboardInterrupt  # interrupted before the first pass, without a picture
+        if result.interrupted:
+            say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
+            args.code = INTERRUPTED
+        report = _finish(args, result, outputs, variant, scene, eye)
         if args.denoise:
             clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
             _write_denoised(args, clean, outputs.denoised)
@@ -194,12 +201,14 @@ def _run_one(args: argparse.Namespace) -> Figures:
 
 
 def _finish(
-    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str, scene: Any
-) -> Figures:
+    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str, scene: Any,
+    eye: Eye | None = None,
+) -> Figures:  # fmt: skip
     """Write the picture, print warnings and a summary, and return the figures for --json."""
-    bad = count_bad(result.bitmap)
-    if bad:
+    if bad := count_bad(result.bitmap):
         say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
+    if eye is not None:
+        return save_observed(args, eye, result, outputs.named, outputs.png, variant)
     written = []
     if not outputs.only_png:
         origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}

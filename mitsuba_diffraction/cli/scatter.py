@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..columns import save_numbers
 from . import options
 from .console import Bar
 from .report import Figures, check_outputs, output_name, save_figure
@@ -14,23 +15,20 @@ from .report import Figures, check_outputs, output_name, save_figure
 _WAVELENGTH = 632.8
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "scatter", run, "power spectrum and scatter of a rough mirror",
-        "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
-        "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
-        "an ABg model, at normal incidence and over the reflectance.",
-        options.SOURCE,
-        ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
-         "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
-        ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
-         {"dest": "wavelengths"}),
-    )  # fmt: skip
-    options.add_table(parser, ("coherence_width", "tolerance"))
-    options.add_json(parser)
-    options.add_heights(parser)
-
-
+@options.command(
+    "scatter", "power spectrum and scatter of a rough mirror",
+    "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
+    "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
+    "an ABg model, at normal incidence and over the reflectance.",
+    options.SOURCE,
+    ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
+     "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
+    ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
+     {"dest": "wavelengths"}),
+    *options.table(("coherence_width", "tolerance")),
+    options.json(),
+    options.heights(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the spectrum, and return the figures."""
 
@@ -42,7 +40,6 @@ def run(args: argparse.Namespace) -> Figures:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from ..atomic import atomic_path
     from ..heights.scatter import abg_model, power_spectrum, rayleigh_rice_scatter
     from ..settings import TableSettings
     from ..tables.build.build import build_with
@@ -63,11 +60,8 @@ def run(args: argparse.Namespace) -> Figures:
             "tis_table": 1.0 - float(order_0_power(table, kappa)),
             **model._asdict(),
         })  # fmt: skip
-    with atomic_path(output) as temporary:
-        np.savetxt(
-            temporary, np.column_stack([spectrum.frequency, spectrum.density]), "%.7g", ",",
-            header="frequency_per_um,psd_um4", comments="", encoding="utf-8",
-        )  # fmt: skip
+    numbers = np.column_stack([spectrum.frequency, spectrum.density])
+    save_numbers(output, ("frequency_per_um", "psd_um4"), numbers)
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.loglog(spectrum.frequency, spectrum.density, label="heights")

@@ -7,17 +7,11 @@ place of a scene into the studio.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, readable_file
-from ..scene.load import preview_samples, sensor_of, shrink
 from ..scene.parameters import Change, change_of
-from ..scene.passes import Result, Stop, render_passes
-from .console import Bar, say
-from .interrupt import INTERRUPTED
 from .options import MODE, whole_number
 
 #: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
@@ -77,36 +71,6 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
         if ids.count(name) > 1:
             args.parser.error(f"argument --assign, --preset: {name!r} is given more than once")
     return parameters | {MATERIAL + name: value for name, value in surfaces}
-
-
-def rendered(
-    args: argparse.Namespace, variant: str, load: Callable[[Bar], Any],
-    check: Callable[[Any, Any], None] | None = None,
-) -> tuple[Any, Any, Result]:  # fmt: skip
-    """Render a picture, and return the scene, its sensor and the result; Ctrl-C ends it early.
-
-    load : returns the scene; may show its progress.
-    check : called with the scene and its sensor before they are rendered.
-    """
-    with Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, args.spp or 0, "loading")
-        scene = load(bar)
-        sensor = sensor_of(scene, args.sensor)
-        if args.preview:
-            shrink(sensor)
-        spp = args.spp or preview_samples(sensor, args.preview)
-        if check is not None:
-            check(scene, sensor)
-        with Stop() as stop:
-            result = render_passes(
-                scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
-            )
-    if result.spp == 0:
-        raise KeyboardInterrupt  # interrupted before the first pass, without a picture
-    if result.interrupted:
-        say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
-        args.code = INTERRUPTED
-    return scene, sensor, result
 
 
 def put_on_stage(args: argparse.Namespace) -> None:

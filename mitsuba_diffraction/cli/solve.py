@@ -15,7 +15,7 @@ from .console import Bar, say
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_name
 from .solve_crossed import solve_crossed_cell
-from .workers import add_workers, executor_for
+from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
     from ..orders import OrderTable
@@ -40,20 +40,35 @@ _SETTINGS = {
 }  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "solve", run, "solve the orders of a periodic profile rigorously",
-        "Solve Maxwell's equations for a grating and write the efficiencies of its reflected "
-        "orders, and a thin sheet's transmitted ones, for all directions and wavelengths, as a "
-        "table of the BSDF diffraction_orders. "
-        "Interrupted by Ctrl-C, the same command goes on.",
-        ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
-         "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
-        ("-o --output OUT", "the table; default: SOURCE's name with .nc",
-         options.path_ending_in(".nc")),
-    )  # fmt: skip
-    options.add_options(
-        parser.add_argument_group("the grating"),
+def _layer(text: str) -> Layers:
+    if text.endswith(".toml"):
+        from ..orders.solve.films import read_layers
+
+        try:
+            return read_layers(text)
+        except DiffractionError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+    material, _, thickness = text.rpartition(":")
+    try:
+        return ((material, float(thickness)),)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
+            f"'{text[:40]}'"
+        ) from error
+
+
+@options.command(
+    "solve", "solve the orders of a periodic profile rigorously",
+    "Solve Maxwell's equations for a grating and write the efficiencies of its reflected "
+    "orders, and a thin sheet's transmitted ones, for all directions and wavelengths, as a "
+    "table of the BSDF diffraction_orders. "
+    "Interrupted by Ctrl-C, the same command goes on.",
+    ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
+     "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
+    ("-o --output OUT", "the table; default: SOURCE's name with .nc",
+     options.path_ending_in(".nc")),
+    options.Group("the grating", (
         ("--period D", "µm", number_between(0.01, 1000)),
         ("--crossed", "SOURCE is one period of heights in x and y: an array (.npy) in µm, or an "
          "image with --depth from black to white; needs --period; reflection in air, by "
@@ -77,9 +92,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "needs an index as material", bool),
         ("--block", "a clear block with these grooves on its upper face, in light from above and "
          "from within; needs an index as material; solved by coupled waves", bool),
-    )  # fmt: skip
-    options.add_options(
-        parser.add_argument_group("the table"),
+    )),
+    options.Group("the table", (
         ("--wavelength-range FIRST:LAST", "nm; default: 380:780", options.limits),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
@@ -100,13 +114,12 @@ def add_parser(subparsers: options.Subparsers) -> None:
          "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of incidence "
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
          {"dest": "imports"}),
-    )  # fmt: skip
-    options.add_retired(parser, "accept", 0)
-    options.add_option(parser, "--jobs N", "processes here; default: 1", whole_number(1))
-    add_workers(parser)
-    options.add_json(parser, "the table's summary")
-
-
+    )),
+    options.retired_row("accept", 0),
+    ("--jobs N", "processes here; default: 1", whole_number(1)),
+    WORKERS,
+    options.json("the table's summary"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Solve, write the table, and return the figures.
 
@@ -278,24 +291,6 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
         yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"
-
-
-def _layer(text: str) -> Layers:
-    if text.endswith(".toml"):
-        from ..orders.solve.films import read_layers
-
-        try:
-            return read_layers(text)
-        except DiffractionError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-    material, _, thickness = text.rpartition(":")
-    try:
-        return ((material, float(thickness)),)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
-            f"'{text[:40]}'"
-        ) from error
 
 
 def _time(seconds: float) -> str:

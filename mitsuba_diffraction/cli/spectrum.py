@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import re
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..scene.load import set_variant
 from . import options
-from .brdf_map import add_surface
+from .brdf_map import surface_options
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
@@ -71,44 +70,39 @@ _SPECTROMETER = (
 )  # fmt: skip
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "spectrum", run, "spectra as a spectrometer with a fibre measures them",
-        "Measure reflectance spectra: a lamp at one angle, detectors that collect cones of "
-        "directions in the plane of incidence, a white standard. Writes a CSV in per cent, `wl` "
-        "in nm first and a column for each detector, as the R package pavo reads it, a table of "
-        "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
-        f"their mean, and a second file the standard errors. {options.LIMITS}",
-        options.files("tables, also of orders, recipes or heights", "*"),
-        ("--group NAME=PATTERN", "scans of one species instead of FILE, e.g. corn='corn/*.spm'; "
-         "may be given several times",
-         [_group], None, {"dest": "groups"}),
-        ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
-         "repeatability", whole_number(2)),
-        ("--observer ANIMAL|CSV", "eye for quantum catches and contrasts (JND): avian_uv, "
-         "avian_v, lizard, snake, dog, bee, human, or a CSV of sensitivities"),
-        ("--illuminant LIGHT|CSV", "light of --observer: ideal (equal quanta), d55, d65, d75, "
-         "leaves, or a file of wavelengths (nm) and photons; default: ideal"),
-        ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
-         "first, which share the noise; default: the eye's, docs/seen.md", options.numbers),
-        ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
-         "default: 0.1", options.numbers),
-        ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
-         number_between(1e-4, 1e2)),
-        ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
-         "2019)", bool),
-        ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
-         "the current folder", options.path_ending_in(".csv")),
-    )  # fmt: skip
-    # argparse takes -60:60:5 for an option otherwise
-    parser._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
-    options.add_options(parser.add_argument_group("the spectrometer"), *_SPECTROMETER)
-    add_surface(parser.add_argument_group("the surface"))
-    options.add_option(parser, *options.TREATMENTS)
-    options.add_heights(parser)
-    options.add_json(parser, "the spectra")
-
-
+@options.command(
+    "spectrum", "spectra as a spectrometer with a fibre measures them",
+    "Measure reflectance spectra: a lamp at one angle, detectors that collect cones of "
+    "directions in the plane of incidence, a white standard. Writes a CSV in per cent, `wl` "
+    "in nm first and a column for each detector, as the R package pavo reads it, a table of "
+    "colours and a plot beside it. Several files are scans of one kind of surface: the CSV has "
+    f"their mean, and a second file the standard errors. {options.LIMITS}",
+    options.files("tables, also of orders, recipes or heights", "*"),
+    ("--group NAME=PATTERN", "scans of one species instead of FILE, e.g. corn='corn/*.spm'; "
+     "may be given several times",
+     [_group], None, {"dest": "groups"}),
+    ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
+     "repeatability", whole_number(2)),
+    ("--observer ANIMAL|CSV", "eye for quantum catches and contrasts (JND): avian_uv, "
+     "avian_v, lizard, snake, dog, bee, human, or a CSV of sensitivities"),
+    ("--illuminant LIGHT|CSV", "light of --observer: ideal (equal quanta), d55, d65, d75, "
+     "leaves, or a file of wavelengths (nm) and photons; default: ideal"),
+    ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
+     "first, which share the noise; default: the eye's, docs/seen.md", options.numbers),
+    ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
+     "default: 0.1", options.numbers),
+    ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
+     number_between(1e-4, 1e2)),
+    ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
+     "2019)", bool),
+    ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
+     "the current folder", options.path_ending_in(".csv")),
+    options.Group("the spectrometer", _SPECTROMETER),
+    surface_options(),
+    options.TREATMENTS,
+    options.heights(),
+    options.json("the spectra"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure the spectra, and return the figures."""
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded

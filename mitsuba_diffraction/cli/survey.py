@@ -18,43 +18,37 @@ from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, elapsed, output_name
-from .workers import THREADS, add_workers, client_of, on_workers, say_files, worker_threads
+from .workers import THREADS, WORKERS, client_of, on_workers, say_files, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
 _SIZES = 1.5
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "survey", run, "measure many scans: tables, maps, gratings, colours",
-        "For each scan build its table, map its BRDF and measure its heights, the gratings in "
-        "it, the colours that it shows and how much they change with direction. Writes "
-        "survey.csv, samples.csv (means and standard errors of repeated scans), contact sheets, "
-        "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
-        "command then exits with 1; a second run measures only new scans.",
-        options.files("scans of any format, or recipes"),
-        ("-o --output FOLDER", "default: survey", Path),
-        options.TREATMENTS,
-        ("--theta DEG", "angle of the light from the normal, across the strongest grating",
-         number_between(0, 89), 30.0),
-        ("--resolution N", "pixels of a map a side", whole_number(8), 160),
-        ("--repeats", "scans of one sample: names that differ in their last number, or files of "
-         "one folder", ("name", "folder"), "name"),
-        ("--crops N", "number of crops of 10 µm of each scan, or as many as fit: compares scans "
-         "of different sizes", whole_number(1)),
-        options.MODE,
-    )  # fmt: skip
-    group = parser.add_argument_group("the surface, of maps and numbers")
-    options.add_options(group, *MATERIAL)
-    options.add_heights(parser)
-    group = parser.add_argument_group("the tables")
-    options.add_table(group)
-    options.add_retired(group, "second_order", 1)
-    add_workers(parser)
-    options.add_option(parser, *THREADS)
-    options.add_json(parser, "the rows")
-
-
+@options.command(
+    "survey", "measure many scans: tables, maps, gratings, colours",
+    "For each scan build its table, map its BRDF and measure its heights, the gratings in "
+    "it, the colours that it shows and how much they change with direction. Writes "
+    "survey.csv, samples.csv (means and standard errors of repeated scans), contact sheets, "
+    "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
+    "command then exits with 1; a second run measures only new scans.",
+    options.files("scans of any format, or recipes"),
+    ("-o --output FOLDER", "default: survey", Path),
+    options.TREATMENTS,
+    ("--theta DEG", "angle of the light from the normal, across the strongest grating",
+     number_between(0, 89), 30.0),
+    ("--resolution N", "pixels of a map a side", whole_number(8), 160),
+    ("--repeats", "scans of one sample: names that differ in their last number, or files of "
+     "one folder", ("name", "folder"), "name"),
+    ("--crops N", "number of crops of 10 µm of each scan, or as many as fit: compares scans "
+     "of different sizes", whole_number(1)),
+    options.MODE,
+    options.Group("the surface, of maps and numbers", MATERIAL),
+    options.heights(),
+    options.Group("the tables", (*options.table(), options.retired_row("second_order", 1))),
+    WORKERS,
+    THREADS,
+    options.json("the rows"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure new scans, and return the figures."""
     try:

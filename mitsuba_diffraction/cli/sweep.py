@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import warnings
 from pathlib import Path
 from typing import Any
 
+from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
 from ..scene.load import set_variant
 from . import options
@@ -22,45 +22,33 @@ KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
 _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_exposure", "blueness")
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "sweep", run,
-        "BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
-        "Evaluate BRDF maps for several values of one parameter by the methods of the 2014 "
-        "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
-        "sweep over methods also times the package's own look-up against flss with both "
-        "compiled. Writes a picture, and the numbers as CSV beside it.",
-        ("KIND", f"one of {', '.join(KINDS)}", KINDS),
-        options.SOURCE,
-        ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
-         "folder", options.path_ending_in(".png")),
-        ("--values V ...", "values to compare; default: those of the thesis"),
-    )  # fmt: skip
-    _add_options(parser.add_argument_group("the maps"))
-    options.add_json(parser)
-    options.add_heights(parser)
-
-
-def _add_options(group: argparse._ArgumentGroup) -> None:
-    options.add_method(group, "flss", "what evaluates, except in a sweep over methods")
-    options.add_direction(group)
-    options.add_wavelengths(group)
-    options.add_options(
-        group,
+@options.command(
+    "sweep", "BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
+    "Evaluate BRDF maps for several values of one parameter by the methods of the 2014 "
+    "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
+    "sweep over methods also times the package's own look-up against flss with both "
+    "compiled. Writes a picture, and the numbers as CSV beside it.",
+    ("KIND", f"one of {', '.join(KINDS)}", KINDS),
+    options.SOURCE,
+    ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
+     "folder", options.path_ending_in(".png")),
+    ("--values V ...", "values to compare; default: those of the thesis"),
+    options.Group("the maps", (
+        *options.method("flss", "what evaluates, except in a sweep over methods"),
+        *options.direction(),
+        *options.SPECTRUM,
         ("--resolution N", "pixels a side", int, 128),
         ("--samples N", "directions in a pixel", int, 1),
         ("--exposure EV", "of all maps, in stops; default: the best map's own", options.STOPS),
-    )
-    options.add_table(group, options.TABLE_NAMES, coherence="patch")
-    options.add_options(
-        group,
+        *options.table(options.TABLE_NAMES, coherence="patch"),
         RELATIVE,
         ("--int-ior N", "index for --relative; default: 1.5"),
         ("--compiled", "time spectral and flss in compiled code, in a sweep over methods", None,
          None, {"action": argparse.BooleanOptionalAction, "default": True}),
-    )  # fmt: skip
-
-
+    )),
+    options.json(),
+    options.heights(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Evaluate all maps, compare, draw, and return the figures."""
     from ..analysis.maps import LightDirection
@@ -95,7 +83,7 @@ def run(args: argparse.Namespace) -> Figures:
         title=f"{patch.name}: {args.kind}{where}", exposure=exposure,
     )  # fmt: skip
     save_figure(output, sheet)
-    _save(numbers, result)
+    save_rows(numbers, _COLUMNS, map(_row, result.steps), digits=6)
     print(f"{output}, {numbers}: {elapsed(args):.1f} s")
     for line in [*_lines(result), *compiled]:
         print(f"  {line}")
@@ -159,19 +147,6 @@ def _lines(result: Any) -> list[str]:
             )
         lines.append(text)
     return lines
-
-
-def _save(path: Path, result: Any) -> None:
-    from ..atomic import atomic_path
-
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream)
-        writer.writerow(_COLUMNS)
-        for value, *numbers in (_row(step).values() for step in result.steps):
-            writer.writerow([value, *(f"{n:.6g}" if math.isfinite(n) else "" for n in numbers)])
 
 
 def _row(step: Any) -> dict[str, Any]:

@@ -18,26 +18,23 @@ _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "tangents", run, "give a mesh a smooth field of directions for its patch",
-        "Write a mesh (PLY, OBJ, glTF, USD) as a PLY whose attribute vertex_orientation lays "
-        "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
-        "a mesh without them gets some that carry only the direction. On a closed surface that "
-        "(a torus excepted) every field has singular points, around which the patch turns.",
-        ("MESH", "mesh to read", Path),
-        ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
-        ("--along", "field of directions: smooth, turns least; x, y, z, an axis laid onto the "
-         "surface; body, from end to end", _GUIDES, "smooth"),
-        ("--rotate DEGREES", "angle from the field to the x axis, counter-clockwise from outside; "
-         "-90 lays the y axis along the field",
-         number_between(-360, 360), 0.0),
-        ("--smoothing S", "distance within which the field may leave its guide to stay smooth, as "
-         "share of the mesh's size", number_between(1e-4, 1), 0.03),
-    )  # fmt: skip
-    options.add_json(parser, "quality of the field")
-
-
+@options.command(
+    "tangents", "give a mesh a smooth field of directions for its patch",
+    "Write a mesh (PLY, OBJ, glTF, USD) as a PLY whose attribute vertex_orientation lays "
+    "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
+    "a mesh without them gets some that carry only the direction. On a closed surface that "
+    "(a torus excepted) every field has singular points, around which the patch turns.",
+    ("MESH", "mesh to read", Path),
+    ("-o --output OUT", "PLY to write", path_ending_in(".ply"), None, {"required": True}),
+    ("--along", "field of directions: smooth, turns least; x, y, z, an axis laid onto the "
+     "surface; body, from end to end", _GUIDES, "smooth"),
+    ("--rotate DEGREES", "angle from the field to the x axis, counter-clockwise from outside; "
+     "-90 lays the y axis along the field",
+     number_between(-360, 360), 0.0),
+    ("--smoothing S", "distance within which the field may leave its guide to stay smooth, as "
+     "share of the mesh's size", number_between(1e-4, 1), 0.03),
+    options.json("quality of the field"),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the mesh, say where its field is singular, and return the figures."""
     check_outputs([args.output])

@@ -11,19 +11,16 @@ from . import options
 from .report import Figures, check_outputs, default_output, output_name
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    options.add_command(
-        subparsers, "tonemap", run, "show a linear EXR as a PNG",
-        "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
-        "than it was rendered with.",
-        ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
-        ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
-         options.path_ending_in(".png")),
-        ("--exposure EV", "stops: +1 doubles the light", options.STOPS, 0.0),
-        options.VIEW,
-    )  # fmt: skip
-
-
+@options.command(
+    "tonemap", "show a linear EXR as a PNG",
+    "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
+    "than it was rendered with.",
+    ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
+    ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
+     options.path_ending_in(".png")),
+    ("--exposure EV", "stops: +1 doubles the light", options.STOPS, 0.0),
+    options.VIEW,
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the PNG, which has no figures."""
     output = output_name(args.output, default_output(args.picture, ".png"))

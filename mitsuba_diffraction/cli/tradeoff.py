@@ -29,33 +29,26 @@ class Effort(NamedTuple):
 FULL, QUICK = Effort(1332, 240, 1 << 19, 7, 14), Effort(400, 160, 1 << 17, 5, 9)
 
 
-def add_parser(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "tradeoff", run,
-        "measure accuracy against speed and memory, setting by setting",
-        "Build a patch's table with many settings and measure each: its error against the "
-        "integral in double precision, the colours' ΔE2000, the time of eval beside "
-        "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
-        "error against time, and one of error against depth; recommends a setting.",
-        ("-o --output FOLDER", "where files go; default: tradeoff", Path),
-        ("--quick", "fewer settings, a smaller patch", bool),
-    )  # fmt: skip
-    options.add_table(parser, ["coherence_width"])
-    options.add_options(
-        parser.add_argument_group("recommend a setting with"),
+@options.command(
+    "tradeoff", "measure accuracy against speed and memory, setting by setting",
+    "Build a patch's table with many settings and measure each: its error against the "
+    "integral in double precision, the colours' ΔE2000, the time of eval beside "
+    "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
+    "error against time, and one of error against depth; recommends a setting.",
+    ("-o --output FOLDER", "where files go; default: tradeoff", Path),
+    ("--quick", "fewer settings, a smaller patch", bool),
+    *options.table(["coherence_width"]),
+    options.Group("recommend a setting with", (
         ("--max-error E", "largest measured error; default: 1e-3", number_between(0, 1)),
         ("--memory MB", "largest table", number_between(0, 1e6)),
         ("--time X", "longest time of eval, as a multiple of roughconductor's",
          number_between(0, 1e6)),
-    )  # fmt: skip
-    options.add_json(parser)
-    options.add_option(
-        parser, "HEIGHTS", "patch to measure, from any file of heights; default: "
-        "gratings.elaphe_like", Path, None, {"nargs": "?"},
-    )  # fmt: skip
-    options.add_heights(parser)
-
-
+    )),
+    options.json(),
+    ("HEIGHTS", "patch to measure, from any file of heights; default: "
+     "gratings.elaphe_like", Path, None, {"nargs": "?"}),
+    options.heights(),
+)  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure, write and recommend, and return the figures."""
     if args.heights is None:

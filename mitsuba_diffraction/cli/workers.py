@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system import cores
 from .console import say, say_warning
-from .options import add_options, refuse, whole_number
+from .options import Group, refuse, whole_number
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -23,17 +23,12 @@ if TYPE_CHECKING:
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose workers."""
-    group = parser.add_argument_group("workers (extra `cluster`)")
-    add_options(
-        group,
-        ("--workers N", "start N processes here for it", whole_number(1)),
-        ("--scheduler ADDRESS", "use the Dask cluster of this scheduler, or of a scheduler file "
-         f"(.json); default: that of ${VARIABLE}, if it is set"),
-    )  # fmt: skip
-
-
+#: Options that choose workers.
+WORKERS = Group("workers (extra `cluster`)", (
+    ("--workers N", "start N processes here for it", whole_number(1)),
+    ("--scheduler ADDRESS", "use the Dask cluster of this scheduler, or of a scheduler file "
+     f"(.json); default: that of ${VARIABLE}, if it is set"),
+))  # fmt: skip
 #: The number of Dr.Jit threads of a worker.
 THREADS = (
     "--threads N", "Dr.Jit threads of a worker; default: its share of this machine's cores, or "

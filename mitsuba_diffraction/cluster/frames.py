@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..progress import Progress, silent
-from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
+from ..scene.load import load_scene, preview_samples, sensor_of, set_variant
 from ..scene.passes import Result, Span, Stop, added, developed, integrator_of, passes_of
 from .groups import Groups, Report, Stopped, sums_in_worker
 from .kept import Kept
@@ -131,10 +131,8 @@ class FrameSequence:
         self.report = Report()
         self._client, self._kept, self._warn = client, Kept(keep, warn), warn
         self.scene = load_scene(scene, frames[0].values)
-        self.sensor = sensor_of(self.scene, sensor)
+        self.sensor = sensor_of(self.scene, sensor, preview)
         default_samples = preview_samples(self.sensor, preview)
-        if preview:
-            shrink(self.sensor)
         film, kind = film_of(self.scene, self.sensor), versions()
         self.frames: list[Task] = []
         for number, frame in enumerate(frames):

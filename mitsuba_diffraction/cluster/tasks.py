@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
-from ..scene.load import load_scene, sensor_of, set_variant, shrink
+from ..scene.load import load_scene, sensor_of, set_variant
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor
@@ -190,10 +190,7 @@ def loaded_scene(files: SceneFiles, variant: str, number: int, preview: bool) ->
     """Load the scene of a task; the one before stays loaded meanwhile, for what both need."""
     path, values = files.here()
     scene = load_scene(path, values)
-    sensor = sensor_of(scene, number)
-    if preview:
-        shrink(sensor)
-    return scene, sensor
+    return scene, sensor_of(scene, number, preview)
 
 
 def film_of(scene: Any, sensor: Any) -> str:

@@ -27,9 +27,14 @@ SMALLER = 0.9
 #: Mark of results under such a window.
 REPEATS = "wider than the patch: its repetition shows as a grating"
 _GREEN = 0.55  # µm
-#: Share of 1/σ² that a scan's taper has: σ_l of the look-up is 2σ, so that orders π/W apart are as
-#: many under it as the orders of a tile, 2π/W apart, under σ.
-TAPER_SHARE = 0.75
+#: Taper of a scan's windows at places u from −1 to 1: (1 + Σ c_n cos nπu)/(1 + Σ c_n).
+TAPER = (0.47, -0.16)
+#: σ_l of the look-up over σ of a scan's windows: narrow enough that ripples between orders π/W
+#: apart are small, wide enough for four orders in each direction at a tolerance of 1e-3.
+LOOKUP = 1.7
+#: Share of an order's power that each neighbour takes less, along either axis: taper and look-up
+#: alone would make lobes a fifth too wide.
+SHARPENING = 0.125
 #: An axis with less than so many windows' widths has one window, in its middle.
 SEVERAL = 1.25
 #: Width, µm, up to which a scan is one window. Windows of wider scans are at least as wide.
@@ -134,7 +139,9 @@ def resolved(settings: TableSettings, patches: Sequence[HeightField]) -> TableSe
 def window_and_taper(
     settings: TableSettings, patches: Sequence[HeightField], window: float
 ) -> tuple[float, float | None]:
-    """Return 4σ of the window, µm, and 4σ of the taper, None of patches that tile the plane.
+    """Return 4σ of the window, µm, and 4σ_t of `TableSettings.taper_width`.
+
+    The latter is None for patches that tile the plane.
 
     window : limit by the light and the patches, µm.
     """
@@ -145,7 +152,7 @@ def window_and_taper(
         return window, None
     side = widest_window(scans or patches)
     window = min(window, side, usual_window(side) if asked is None else asked)
-    return window, window / math.sqrt(TAPER_SHARE)
+    return window, window / math.sqrt(1.0 - LOOKUP**-2)
 
 
 def repeats(width: float, patches: Sequence[HeightField]) -> bool:

@@ -148,10 +148,10 @@ def _densities(table: DiffractionTable) -> NDArray[np.float64]:
     bands = []
     for band in range(BANDS):
         kappas = BANDED * largest * (band + (np.arange(_NODES) + 0.5) / _NODES) / BANDS
-        powers = sum(powers_at(table, kappa).ravel().astype(np.float64) for kappa in kappas)
+        powers = sum(np.maximum(powers_at(table, k), 0.0).ravel().astype(float) for k in kappas)
         bands.append(powers / np.maximum(np.sum(powers), 1e-30))
     shares = np.stack(bands)
-    last = powers_at(table, largest).ravel().astype(np.float64)
+    last = np.maximum(powers_at(table, largest), 0.0).ravel().astype(np.float64)
     even = shares.mean(axis=0) + last / np.maximum(last.sum(), 1e-30)
     mixed = (1.0 - _EVEN) * shares + 0.5 * _EVEN * even
     mixed[mixed.sum(axis=1) == 0.0] = 1.0  # a mirror has no order to draw
@@ -178,9 +178,20 @@ def patch_error(table: DiffractionTable, textures: PatchTextures) -> dict[str, f
     largest = table.expansion.kappa_max
     errors = []
     for kappa in largest * (np.arange(12) + 0.5) / 12:
-        exact = powers_at(table, float(kappa)).astype(np.float64)
+        exact = np.maximum(powers_at(table, float(kappa)), 0.0).astype(np.float64)
         errors.append(np.abs(interpolated(textures, float(kappa)) - exact).sum())
     return {"mean": float(np.mean(errors)), "worst κ": float(np.max(errors))}
+
+
+def _positive_share(table: DiffractionTable) -> float:
+    """Return the factor that keeps all light, of orders whose powers are positive.
+
+    Cycles has no closures of negative weight: others, of a scan, are left out.
+    """
+    kappas = table.expansion.kappa_max * (np.arange(_NODES) + 0.5) / _NODES
+    powers = [powers_at(table, float(kappa)).astype(np.float64) for kappa in kappas]
+    positive = np.sum([np.maximum(each, 0.0).sum() for each in powers])
+    return float(np.sum(powers) / max(positive, 1e-30)) if positive > 0.0 else 1.0
 
 
 def patch_constants(
@@ -207,7 +218,7 @@ def patch_constants(
         "TEXELS": textures.packed.texels,
         "FACTORS": len(textures.factors),
         "SCALE": textures.scale,
-        "LIKELIHOOD": textures.likelihood,
+        "LIKELIHOOD": textures.likelihood * _positive_share(table),
         "BANDS": BANDS,
         "BANDED": BANDED,
         "FIRST_OCTAVE": statistic.first,

@@ -10,6 +10,7 @@ import mitsuba as mi
 from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
+from ..tables.table import DiffractionTable
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -25,9 +26,17 @@ class HeightData(mi.Object):
         self.field = field
 
 
+class TableData(mi.Object):
+    """Table in an object that a dictionary of Mitsuba's can hold."""
+
+    def __init__(self, table: DiffractionTable | SolvedTable) -> None:
+        super().__init__()
+        self.table = table
+
+
 @runtime_checkable
-class Pluggable(Protocol):
-    """Table with a BSDF of its own, such as an `OrderTable`.
+class SolvedTable(Protocol):
+    """Table with a BSDF of its own, an `OrderTable`.
 
     Attributes
     ----------
@@ -37,27 +46,19 @@ class Pluggable(Protocol):
     plugin: str
 
 
-class TableData(mi.Object):
-    """Table with its own BSDF, in an object that a dictionary of Mitsuba's can hold."""
-
-    def __init__(self, table: Pluggable) -> None:
-        super().__init__()
-        self.table = table
-
-
 def bsdf_dict(
-    field: HeightField | Pluggable | str | os.PathLike[str],
+    field: HeightField | DiffractionTable | SolvedTable | str | os.PathLike[str],
     plugin: str = "diffraction",
     **parameters: Any,
 ) -> dict[str, Any]:
-    """Return the dictionary of a BSDF for a height field or a table of orders, or for a file.
+    """Return the dictionary of a BSDF for a height field, a table, or a file.
 
-    Raises a DiffractionError if `field` is neither heights nor a path, or the plugin is unknown.
+    Raises a DiffractionError if `field` is none of these, or the plugin is unknown.
 
     Parameters
     ----------
-    field : heights in µm; or the path of a file, as for the parameter `filename`. Or a table of
-        orders, whose plugin is `diffraction_orders`.
+    field : heights in µm, or their table; or the path of a file, as for the parameter `filename`.
+        Or a table of orders, whose plugin is `diffraction_orders`.
     plugin : `diffraction`, which reflects light, or `diffraction_dielectric`, which lets it through
         as well.
     parameters : any other parameter of the plugin, e.g. material="Al", tolerance=1e-4; None is
@@ -69,8 +70,10 @@ def bsdf_dict(
     """
     check_choice("bsdf_dict: plugin", plugin, PLUGINS)
     arguments = {name: value for name, value in parameters.items() if value is not None}
-    if isinstance(field, Pluggable):
+    if isinstance(field, SolvedTable):
         return {"type": field.plugin, "data": TableData(field), **arguments}
+    if isinstance(field, DiffractionTable):
+        return {"type": plugin, "data": TableData(field), **arguments}
     if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
         return {"type": ORDERS, "filename": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from functools import partial
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -17,7 +17,7 @@ from ..heights.read import LoadOptions, treat
 from ..settings import SURFACE, checked
 from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
-from .dictionary import HeightData
+from .dictionary import HeightData, TableData
 from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
 from .types import Properties
 
@@ -51,6 +51,13 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
         del given["coherence_width"]
     asked = {name: checked(name, value) for name, value in given.items()}
     value = props.get(name)
+    if isinstance(value, TableData):
+        table = value.table
+        if not isinstance(table, DiffractionTable):
+            raise DiffractionError("a table of orders has a BSDF of its own, 'diffraction_orders'")
+        shown = str(table.source.get("name") or "data")
+        _check_table(table, shown, options, asked, height_scale, stretch)
+        return Patch(table, partial(_no_heights, shown))
     if name == "data":
         source = TableSource.of(_heights_of(value, options))
     elif isinstance(value, str):
@@ -63,7 +70,8 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
             "table; change the type of the BSDF, or give heights"
         )
     if source.kind is FileKind.TABLE:
-        table = _table_file(source, asked, height_scale, stretch)
+        table = loaded_table(source.files[0])
+        _check_table(table, str(source.path), options, asked, height_scale, stretch)
     else:
         settings = source.settings_for(asked, height_scale)
         table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
@@ -105,17 +113,22 @@ def _heights_of(data: Any, options: LoadOptions) -> HeightField:
     return treat(HeightField(values, options.pixel_size, name="data"), options)
 
 
-def _table_file(
-    source: TableSource, asked: Mapping[str, Any], height_scale: float, stretch: float
-) -> DiffractionTable:
-    """Load a table file; refuse parameters of the scene that contradict it."""
-    (path,) = source.files
-    table = loaded_table(path)
-    _check_agreement(path, table, source.options, asked)
+def _no_heights(shown: str) -> HeightField:
+    raise DiffractionError(
+        f"'{shown}' is a table; this needs the heights it was made of, or their recipe"
+    )
+
+
+def _check_table(
+    table: DiffractionTable, shown: str, options: LoadOptions, asked: Mapping[str, Any],
+    height_scale: float, stretch: float,
+) -> None:  # fmt: skip
+    """Refuse parameters of the scene that contradict a table, or are beyond it."""
+    _check_agreement(shown, table, options, asked)
     if stretch > 1.0:
         raise DiffractionError(
             f"lateral_scale={stretch:g} is above 1, beyond the frequencies of the table "
-            f"'{path}'; give the height field instead of the table"
+            f"'{shown}'; give the height field instead of the table"
         )
     if height_scale > table.height_scale_max:
         raise DiffractionError(
@@ -124,7 +137,6 @@ def _table_file(
             f"table, or build the table with height_scale_max={height_scale:.4g} or more (the "
             "command 'precompute')"
         )
-    return table
 
 
 def _remedy(name: str) -> str:
@@ -134,7 +146,7 @@ def _remedy(name: str) -> str:
 
 
 def _check_agreement(
-    path: Path, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
+    path: str, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
 ) -> None:
     """Refuse parameters of a scene that contradict its table, which fixes them."""
     tabulated = {

@@ -35,8 +35,8 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
     width, taper = window_and_taper(TableSettings(), [field], width)
     if taper is None:
         return Sigmas(sigma_of(width), sigma_of(light))
-    looked_up = (width**-2 - taper**-2) ** -0.5
-    return Sigmas(sigma_of(looked_up), sigma_of(light), ScanWindows(width, sigma_of(taper)))
+    windows = ScanWindows(width)
+    return Sigmas(windows.lookup, sigma_of(light), windows)
 
 
 class Window(NamedTuple):

@@ -80,7 +80,8 @@ def field_powers(
         screen_powers(screen, field.pixel_size, *q, sigmas, coherence, centre, tapers)
         for screen in screens
     ]
-    return np.asarray(np.mean(powers, axis=0))
+    others, zeroth, cosine = np.mean(powers, axis=0)
+    return np.array([max(others, 0.0), zeroth, cosine])  # `model.ensemble_power` says why
 
 
 def screen_power(

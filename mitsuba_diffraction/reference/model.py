@@ -111,17 +111,21 @@ def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
         screens = (np.exp(1j * kappa * part) for part in parts)
         orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
         powers[:, n] = np.mean([window_sums(each, q, sigmas) for each in orders], axis=0)
-    return powers
+    return np.maximum(powers, 0.0)  # sharpened powers of a scan dip below 0 between strong orders
 
 
 class Orders(NamedTuple):
-    """Orders about q: q_j along x and y, plane waves exp(i q_j·r) at the pixels, and a_j (y, x)."""
+    """Orders about q: q_j along x and y, plane waves exp(i q_j·r) at the pixels, and a_j (y, x).
+
+    `tapers`: of a scan's windows.
+    """
 
     qx: Real
     qy: Real
     waves_x: Complex
     waves_y: Complex
     a: Complex
+    tapers: scan.Tapers | None = None
 
 
 def orders_near(
@@ -135,7 +139,7 @@ def orders_near(
     a = waves_y @ screen @ waves_x.T / screen.size
     if mean is not None:
         a[np.ix_(qy == 0, qx == 0)] = mean
-    return Orders(qx, qy, waves_x[:, :nx], waves_y[:, :ny], a)
+    return Orders(qx, qy, waves_x[:, :nx], waves_y[:, :ny], a, tapers)
 
 
 def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
@@ -155,6 +159,8 @@ def window_sums(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> tuple
     window_x, window_y = (np.exp(-((sigma * d) ** 2)) for d in (q[0] - orders.qx, q[1] - orders.qy))
     powers, mirror = np.abs(orders.a) ** 2, np.ix_(orders.qy == 0, orders.qx == 0)
     zeroth, powers[mirror] = powers[mirror].sum(), 0.0
+    if orders.tapers is not None:
+        powers = scan.sharpened(powers, (orders.qy == 0, orders.qx == 0), orders.tapers)
     lobe, unit = np.exp(-(sigmas.zeroth**2) * (q[0] ** 2 + q[1] ** 2)), 4 * np.pi**2 * sigma**4
     return float(unit * (window_y @ powers @ window_x)), float(unit * ratio * lobe * zeroth)
 

@@ -1,14 +1,19 @@
 """Orders of a scan, which is a part of a larger surface and does not tile the plane.
 
 A scan is seen through windows of width W, half overlapping, over which powers are averaged (Welch,
-IEEE Transactions on Audio and Electroacoustics 15, 70, 1967). With t(r) = exp(−r²/2σ_t²) about the
-middle of a window and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are DFTs of
+IEEE Transactions on Audio and Electroacoustics 15, 70, 1967). With the taper t = t(x) t(y),
+t(x) = 1 + 0.47 cos(2πx/W) − 0.16 cos(4πx/W) about the middle of a window, and s = exp(iκh), order 0
+is a_0 = Σ t² s / Σ t². The other orders are DFTs of
 
     f = c t (s − a_0)   in the window, 0 around it up to 2W,   Σ_j |a_j|² = 1 over all orders,
 
-which sets c: nearly √(1/mean t²), by Parseval, but for the bin j = 0, where a_0 replaces f's. Their
-lobe exp(−σ_l²|q − q_j|²) has 1/σ_l² + 1/σ_t² = 1/σ²: the transform of t² under σ_l is as wide as
-that of the light's window σ.
+which sets c: nearly √(1/mean t²), by Parseval, but for the bin j = 0, where a_0 replaces f's. Along
+each axis neighbours take an eighth of their power less,
+
+    P_j = |a_j|² − (|a_j+1|² − 2|a_j|² + |a_j−1|²)/8,
+
+where |a_0|² is the mean of its neighbours. Lobes are exp(−σ_l²|q − q_j|²) with σ_l = 1.7 σ: a wave
+under them is as wide as under the light's window σ = W/4.
 """
 
 from __future__ import annotations
@@ -29,10 +34,14 @@ Tapers = tuple[Real | None, Real | None]
 
 
 class ScanWindows(NamedTuple):
-    """Width W of the windows of a scan, and σ_t of their taper, µm."""
+    """Width W of the windows of a scan, µm."""
 
     width: float
-    taper: float
+
+    @property
+    def lookup(self) -> float:
+        """σ_l, µm."""
+        return 1.7 * 0.25 * self.width
 
 
 def parts(field: HeightField, windows: ScanWindows | None) -> list[Real]:
@@ -56,12 +65,11 @@ def tapers(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     """Tapers of the windows; None if the patch tiles the plane."""
     if windows is None:
         return None
-    dx, dy = field.pixel_size
     found: list[Real | None] = []
-    for axis, pixel, (_, n) in zip((0, 1), (dy, dx), _places(field, windows.width), strict=True):
-        x = pixel * (np.arange(n) - 0.5 * (n - 1))
-        fades = field.varies_along(axis)
-        found.append(np.exp(-0.5 * (x / windows.taper) ** 2) if fades else None)
+    for axis, (_, n) in enumerate(_places(field, windows.width)):
+        turn = 2 * np.pi / n * (np.arange(n) - 0.5 * (n - 1))
+        taper = 1 + 0.47 * np.cos(turn) - 0.16 * np.cos(2 * turn)
+        found.append(taper if field.varies_along(axis) else None)
     return found[0], found[1]
 
 
@@ -78,6 +86,21 @@ def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex | Non
     rest[: screen.shape[0], : screen.shape[1]] = t * (screen - mean)
     power = np.mean(np.abs(rest) ** 2) - abs(np.mean(rest)) ** 2
     return rest * np.sqrt(max(1.0 - abs(mean) ** 2, 0.0) / max(power, 1e-300)), mean
+
+
+def sharpened(
+    powers: Real, zeroth: tuple[NDArray[np.bool_], NDArray[np.bool_]], along: Tapers
+) -> Real:
+    """P_j from |a_j|² (ny, nx); zeroth : where q_j is 0 along y and x. Order 0 stays empty."""
+    empty = np.outer(*zeroth)
+    axes = [axis for axis, taper in enumerate(along) if taper is not None]
+    if empty.any():
+        sides = [np.roll(empty, step, axis) for axis in axes for step in (-1, 1)]
+        powers = np.where(empty, np.mean([powers[side].sum() for side in sides]), powers)
+    for axis in axes:
+        wide = np.pad(powers, [(int(n == axis),) * 2 for n in (0, 1)], mode="edge")
+        powers = powers - np.diff(wide, 2, axis=axis) / 8
+    return np.where(empty, 0.0, powers)
 
 
 def _places(

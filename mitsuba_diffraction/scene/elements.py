@@ -69,15 +69,15 @@ def surfaces_text(scene: Any) -> str:
 
 def surfaces_within(bsdf: Any) -> list[Surface]:
     """Return the descriptions of all surfaces that diffract within a BSDF, itself included."""
-    return [d for part in _parts(bsdf) if isinstance(d := describe(part), Surface)]
+    return [d for part in parts_of(bsdf) if isinstance(d := describe(part), Surface)]
 
 
-def _parts(thing: Any) -> Iterator[Any]:
+def parts_of(thing: Any) -> Iterator[Any]:
     """Yield an object of Mitsuba's, and everything within it that it shows to `traverse`."""
     if thing is not None:
         yield thing
         for part in children(thing).values():
-            yield from _parts(part)
+            yield from parts_of(part)
 
 
 def check_attributes(shape: Any, number: int | None = None) -> None:
@@ -101,7 +101,7 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
             "places on the surface; unwrap it, or use coherence='ensemble'"
         )
     stretching = [_attribute(surface.lateral_scale.texture) for surface in surfaces]
-    attributes = [name for part in _parts(shape.bsdf()) if (name := _attribute(part))]
+    attributes = [name for part in parts_of(shape.bsdf()) if (name := _attribute(part))]
     for name in dict.fromkeys(attributes):
         if np.all(shape.has_attribute(name)):
             if name in stretching and (least := _least(shape, name)) <= 0.0:

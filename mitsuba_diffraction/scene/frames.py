@@ -17,7 +17,7 @@ from ..extras import optional
 from ..files import refuse_pipe
 from ..progress import Progress
 from .denoise import denoised
-from .load import load_scene, preview_samples, sensor_of, shrink
+from .load import load_scene, preview_samples, sensor_of
 from .parameters import files_of
 from .passes import Stop, render_passes
 from .pictures import colours_of, count_bad, write_exr, write_png
@@ -93,9 +93,7 @@ def render_frames(
             loaded = load_scene(
                 scene, frame.values, box_filter=settings["denoise"], say=None if n else say
             )
-            sensor = sensor_of(loaded, settings["sensor"])
-            if settings["preview"]:
-                shrink(sensor)
+            sensor = sensor_of(loaded, settings["sensor"], settings["preview"])
             spp = settings["samples"]
             if not isinstance(spp, int):
                 spp = preview_samples(sensor, settings["preview"])

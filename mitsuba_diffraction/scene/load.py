@@ -256,14 +256,14 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
         )
 
 
-def shrink(sensor: Any) -> None:
-    """Halve the width and height of a sensor's film, its crop included."""
+def shrink(sensor: Any, factor: float = 2.0) -> None:
+    """Divide the width and height of a sensor's film, its crop included, by a factor."""
     import mitsuba as mi
 
     values = mi.traverse(sensor)
     for name in ("film.size", "film.crop_size", "film.crop_offset"):
         least = 0 if name.endswith("offset") else 1
-        values[name] = [max(least, length // 2) for length in values[name]]
+        values[name] = [max(least, int(length / factor)) for length in values[name]]
     values.update()
 
 
@@ -273,8 +273,8 @@ def preview_samples(sensor: Any, preview: bool) -> int:
     return min(samples, 16) if preview else samples
 
 
-def sensor_of(scene: Any, index: int) -> Any:
-    """Return a sensor of the scene.
+def sensor_of(scene: Any, index: int, preview: bool = False) -> Any:
+    """Return a sensor of the scene, for a preview with half of its pixels along either side.
 
     Raises a DiffractionError if no sensor has that index.
     """
@@ -285,6 +285,8 @@ def sensor_of(scene: Any, index: int) -> Any:
         raise DiffractionError(
             f"sensor {index}: the scene has {len(sensors)}, numbered from 0 to {len(sensors) - 1}"
         )
+    if preview:
+        shrink(sensors[index])
     return sensors[index]
 
 

@@ -52,12 +52,15 @@ def order_0_power(table: DiffractionTable, kappa: ArrayLike) -> NDArray[np.float
 
 
 def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
-    """Return |a_j(κ)|² of all orders but order 0, (ny, nx); kappa : rad/µm."""
+    """Return |a_j(κ)|² of all orders but order 0, (ny, nx); kappa : rad/µm.
+
+    Sharpened powers of a scan may be negative.
+    """
     interval = int(table.expansion.interval(kappa))
     weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
     parts = table.coefficients[interval].astype(np.float32) @ weights
     if table.expansion.kind == "power":
-        return np.maximum(parts[..., 0], 0.0)
+        return np.asarray(parts[..., 0])
     return np.asarray(np.sum(parts**2, axis=-1))
 
 

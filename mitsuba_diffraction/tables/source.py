@@ -15,6 +15,7 @@ from typing import Any
 
 from ..errors import DiffractionError, warn
 from ..files import FileKind
+from ..heights.coherence import LOOKUP, SHARPENING, TAPER
 from ..heights.load import notes_line
 from ..heights.source import Source
 from ..progress import Progress, silent
@@ -135,7 +136,7 @@ def providing(provider: TableProvider) -> Iterator[None]:
 
 def table_key(digest: str, settings: TableSettings) -> str:
     """Return the key of the table of heights with this digest, built with these settings."""
-    return key_of(FORMAT_VERSION, digest, asdict(settings))
+    return key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING)
 
 
 def cached_table(

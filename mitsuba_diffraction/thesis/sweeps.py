@@ -7,11 +7,9 @@ against `flss`, both compiled by Dr.Jit.
 from __future__ import annotations
 
 import functools
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -301,15 +299,13 @@ def time_compiled(
                     best[name] = min(best[name], time.perf_counter() - start)
         return best
 
-    with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
-        default, flss = Path(folder) / "default.exr", Path(folder) / "flss.exr"
-        DiffractionTable.build(heights, progress=progress, **common).save(default)
-        full = make("flss", heights, progress=progress, **common)
-        assert isinstance(full, FullSpectrum)
-        full.table.save(flss)
-        mi.set_variant(f"{backend}_ad_rgb")
-        raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
-        best = seconds({"colours": quiet_bsdf(default, **raw)})
-        mi.set_variant(f"{backend}_ad_spectral")
-        best |= seconds({"spectral": quiet_bsdf(default, **raw), "flss": thesis_bsdf(flss, **raw)})
+    default = DiffractionTable.build(heights, progress=progress, **common)
+    full = make("flss", heights, progress=progress, **common)
+    assert isinstance(full, FullSpectrum)
+    mi.set_variant(f"{backend}_ad_rgb")
+    raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
+    best = seconds({"colours": quiet_bsdf(default, **raw)})
+    mi.set_variant(f"{backend}_ad_spectral")
+    flss = thesis_bsdf(full.table, **raw)
+    best |= seconds({"spectral": quiet_bsdf(default, **raw), "flss": flss})
     return Compiled(best["spectral"], best["colours"], best["flss"])

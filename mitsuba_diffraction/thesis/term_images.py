@@ -15,7 +15,7 @@ from ..plugin.memory import upload
 from ..tables.table import DiffractionTable
 
 
-def thesis_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+def thesis_bsdf(table: DiffractionTable | str | os.PathLike[str], **parameters: Any) -> Any:
     """Load the plugin with a coherent Taylor table that `TermImages` looks up."""
     bsdf = quiet_bsdf(table, **parameters)
     bsdf.power.device = TermImages(bsdf.table)

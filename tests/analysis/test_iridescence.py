@@ -17,6 +17,7 @@ from mitsuba_diffraction.analysis.iridescence import (
 from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.scans import bsdf_of
 from mitsuba_diffraction.optics.colour import response
+from mitsuba_diffraction.plugin.dictionary import bsdf_dict
 from mitsuba_diffraction.tables import DiffractionTable
 
 LIGHT = LightDirection(30.0, 0.0)
@@ -98,7 +99,7 @@ def test_a_material_s_factor_is_the_plugin_s_at_any_azimuth(variant, surface):
     if variant != "llvm_ad_spectral":
         pytest.skip("the factor is of wavelengths")
     table = DiffractionTable.build(gratings.sinusoidal(1.6, 0.05, rows=2), tolerance=0.05)
-    bsdf = bsdf_of(table, energy_conserving=False, **surface)
+    bsdf = bsdf_of(bsdf_dict(table, energy_conserving=False, **surface))
     light = LightDirection(35.0, 70.0)
     generator = np.random.default_rng(4)
     radius, angle = np.sqrt(generator.random(200)) * 0.98, generator.uniform(0.0, 2 * np.pi, 200)

@@ -66,7 +66,7 @@ def measured(parameters, lam, angles):
     """Reflectance factor of each angle, as the command measures it."""
     settings = TableSettings(wavelength_range=table_range(LAM))
     source = in_medium(md.TableSource.of(sinusoid()), parameters.get("ext_ior"), LAM[0])
-    bsdf = bsdf_of(table_of(source, settings), **loaded_in_media(parameters))
+    bsdf = bsdf_of(md.bsdf_dict(table_of(source, settings), **loaded_in_media(parameters)))
     before = follow(bsdf, parameters, LAM[0])
     return spectrum(bsdf, LIGHT, angles, acceptance=ACCEPTANCE, wavelengths=[lam],
                     before=before).value[0]  # fmt: skip

@@ -28,7 +28,7 @@ def command(monkeypatch, heights):
             action()
             return 0
 
-        monkeypatch.setattr("mitsuba_diffraction.cli.info.run", run)
+        monkeypatch.setattr("mitsuba_diffraction.cli.info.run.run", run)
         return ["info", heights]
 
     return replace

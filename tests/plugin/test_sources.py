@@ -57,3 +57,18 @@ def test_a_bsdf_and_a_measurement_of_one_scan_share_a_table(some_variant, tmp_pa
     assert array.table(array.settings_for({})) is given.table
     # one of the file's bytes, one of the array's numbers
     assert len(list((tmp_path / "cache").glob("table-*"))) == 2
+
+
+def test_a_table_in_memory_is_one_of_a_file(some_variant, tmp_path):
+    table = md.DiffractionTable.build(PATCH, coherence_width=5.0, tolerance=1e-2)
+    file = tmp_path / "table.exr"
+    table.save(file)
+    own, loaded = (mi.load_dict(md.bsdf_dict(given, material="Al")) for given in (table, file))
+    assert own.table is table
+    assert own.table.digest() == loaded.table.digest()
+    with pytest.raises(Exception, match=r"tolerance=0\.5 contradicts the table"):
+        mi.load_dict(md.bsdf_dict(table, tolerance=0.5))
+    with pytest.raises(Exception, match="beyond the table's"):
+        mi.load_dict(md.bsdf_dict(table, height_scale=9.0))
+    with pytest.raises(Exception, match="is a table; this needs the heights"):
+        own.heights()

@@ -1,9 +1,10 @@
-"""Costs of a taper of a scan's windows: width of lobes against light from strong waves far away.
+"""Costs of estimators of a scan's light: width of lobes against light from strong waves far away.
 
-Both follow from the taper's transform T alone. A wave of frequency q₀ has the lobe
-Σ_j |T(q_j − q₀)|² exp(−σ_l²(q − q_j)²) over the orders q_j, π/W apart, of a window of width W.
-Light of low relief is κ² S(q), with S the power spectrum of the heights (J. C. Stover, Optical
-Scattering, SPIE, section 4.3): seen through windows, S convolved with the mean lobe.
+Both follow from the transform T of a window's taper. A wave of frequency q₀ has the lobe
+Σ_j P_j exp(−σ_l²(q − q_j)²) over the orders q_j, π/W apart, of a window of width W, with
+P_j = |T(q_j − q₀)|², from which neighbours take a share b. Light of low relief is κ² S(q), with S
+the power spectrum of the heights (J. C. Stover, Optical Scattering, SPIE, section 4.3): seen
+through windows, S convolved with the mean lobe.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0
+
+from mitsuba_diffraction.heights.coherence import LOOKUP, SHARPENING, TAPER
 
 Real = NDArray[np.float64]
 #: Taper at places u from −1 to 1, the window's edges.
@@ -30,23 +33,45 @@ def kaiser(beta: float) -> Taper:
     return lambda u: i0(beta * np.sqrt(np.maximum(1.0 - u * u, 0.0))) / i0(beta)
 
 
-def tukey(share: float) -> Taper:
-    """Flat, with cosines over a `share` of the window at its ends."""
-    return lambda u: np.where(
-        np.abs(u) < 1.0 - share, 1.0, 0.5 + 0.5 * np.cos(np.pi * (np.abs(u) - 1.0 + share) / share)
-    )
+def cosines(*shares: float) -> Taper:
+    """1 + Σ c_n cos nπu."""
+    return lambda u: 1.0 + sum(c * np.cos(n * np.pi * u) for n, c in enumerate(shares, 1))
 
 
-#: The package's taper first.
-TAPERS: dict[str, Taper] = {
-    "Gaussian, σ_t = 1.155 σ": gaussian(2.0 / np.sqrt(3.0)),
-    "Gaussian, σ_t = 1.4 σ": gaussian(1.4),
-    "Kaiser, β = 2.5": kaiser(2.5),
-    "Kaiser, β = 3": kaiser(3.0),
-    "Kaiser, β = 3.5": kaiser(3.5),
-    "Tukey, 30 %": tukey(0.3),
-    "Tukey, 50 %": tukey(0.5),
-    "cosine": lambda u: np.cos(0.5 * np.pi * u),
+@dataclass(frozen=True)
+class Estimator:
+    """How a scan's light is estimated.
+
+    Attributes
+    ----------
+    taper : of a window.
+    lookup : σ_l over σ.
+    sharpening : b.
+    """
+
+    taper: Taper
+    lookup: float = 2.0
+    sharpening: float = 0.0
+
+    def orders(self, q: Real, width: float) -> Real:
+        """Return the mean power of orders by their distance q from a wave, rad/µm."""
+        apart = np.pi / width
+        power, left, right = (
+            _transform(self.taper, width, q + n * apart) for n in (0.0, -1.0, 1.0)
+        )
+        return power - self.sharpening * (left - 2.0 * power + right)
+
+
+#: The package's estimator first.
+ESTIMATORS = {
+    "package": Estimator(cosines(*TAPER), LOOKUP, SHARPENING),
+    "package, without sharpening": Estimator(cosines(*TAPER), LOOKUP),
+    "package's taper, σ_l = 2σ": Estimator(cosines(*TAPER)),
+    "Gaussian, σ_t = 1.155 σ": Estimator(gaussian(2.0 / np.sqrt(3.0))),
+    "Gaussian, σ_t = 1.4 σ": Estimator(gaussian(1.4)),
+    "Kaiser, β = 3": Estimator(kaiser(3.0)),
+    "Kaiser, β = 3.5": Estimator(kaiser(3.5)),
+    "cosine": Estimator(lambda u: np.cos(0.5 * np.pi * u)),
 }
 
 
@@ -64,22 +89,23 @@ class Seen:
     worst: float
 
 
-def lobe_widths(taper: Taper, places: int = 21) -> Real:
-    """Width at half height of a lobe over the ideal one, for orders at `places` beside the wave."""
-    sigma, width = 1.0, 4.0
-    q = np.linspace(-4.0, 4.0, 4001)
-    ideal = _half_width(q, np.exp(-np.square(sigma * q)))
-    found = []
-    for offset in np.linspace(0.0, 1.0, places, endpoint=False):
-        orders = (np.arange(-40, 41) + offset) * np.pi / width
-        power = _transform(taper, width, orders)[:, None]
-        lobe = np.sum(power * np.exp(-np.square(2.0 * sigma * (q - orders[:, None]))), axis=0)
+def lobe_widths(estimator: Estimator, count: int = 300) -> Real:
+    """Width at half height of lobes over the ideal one, of waves at random angles and places."""
+    rng, width, found = np.random.default_rng(0), 4.0, []
+    q = np.linspace(-4.0, 4.0, 801)
+    ideal = _half_width(q, np.exp(-np.square(q)))
+    for turn in rng.uniform(0.0, 0.25 * np.pi, count):
+        lobe = np.ones(len(q))
+        for along in (np.cos(turn) * q, np.sin(turn) * q):
+            orders = (np.arange(-12, 13) + rng.uniform()) * np.pi / width
+            weights = np.exp(-np.square(estimator.lookup * (along[:, None] - orders)))
+            lobe *= weights @ estimator.orders(orders, width)
         found.append(_half_width(q, lobe) / ideal)
     return np.array(found)
 
 
-def seen(taper: Taper, spectrum: Callable[[Real, Real], Real], width: float, degrees: float,
-         lam: Real) -> Seen:  # fmt: skip
+def seen(estimator: Estimator, spectrum: Callable[[Real, Real], Real], width: float,
+         degrees: float, lam: Real) -> Seen:  # fmt: skip
     """Return the light of a spectrum at an angle from the mirror, for light from 30°.
 
     spectrum : S(qx, qy), rad/µm, on grids.
@@ -89,8 +115,8 @@ def seen(taper: Taper, spectrum: Callable[[Real, Real], Real], width: float, deg
     sigma, step = 0.25 * width, 0.04
     q = np.arange(-24.0, 24.0, step)
     surface = spectrum(*np.meshgrid(q, q))
-    lookup = np.exp(-np.square(2.0 * sigma * q))
-    lobe = np.convolve(_transform(taper, width, q), lookup, "same")
+    lookup = np.exp(-np.square(estimator.lookup * sigma * q))
+    lobe = np.convolve(estimator.orders(q, width), lookup, "same")
     ideal = np.exp(-np.square(sigma * q))
     light, out = np.radians(30.0), np.radians(30.0 - degrees)
     values = []
@@ -109,7 +135,7 @@ def seen(taper: Taper, spectrum: Callable[[Real, Real], Real], width: float, deg
 
 def _transform(taper: Taper, width: float, q: Real) -> Real:
     """|T(q)|² of a taper over a window, q in radians over the unit of the width."""
-    x = 0.5 * width * np.linspace(-1.0, 1.0, 2001)
+    x = 0.5 * width * np.linspace(-1.0, 1.0, 401)
     weights = taper(2.0 * x / width)
     return np.array([np.trapezoid(weights * np.cos(each * x), x) for each in q]) ** 2
 

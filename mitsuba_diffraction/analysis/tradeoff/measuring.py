@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -151,10 +149,7 @@ def measure(
             results.append(MeasuredSetting(setting, refused=str(error)))
             continue
         seconds = time.perf_counter() - start
-        with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
-            file = Path(folder) / "table.exr"
-            table.save(file)
-            bsdf = quiet_bsdf(file, energy_conserving=False)
+        bsdf = quiet_bsdf(table, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
         sample = samples[setting.coherence]
         loss = power_colour_difference(finest[setting.coherence], table)

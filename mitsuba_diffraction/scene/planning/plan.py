@@ -6,7 +6,7 @@ A plan is made of recipes. Each describes the heights of one table, as the scene
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,38 +16,16 @@ import numpy as np
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
 from ...settings import RECIPE_SETTINGS, TableSettings
-from ...tables.source import TableRequest
+from ...tables.source import TableRequest, providing
 from ...tables.table import DiffractionTable
-from .lookups import Lookups
-from .paths import TracedPaths, trace
-from .recording import Session, described_table
+from .light import Load, TableLight
 
 #: Settings that a plan chooses.
 CHOSEN = ("frequency_limit", "height_scale_max")
 #: Share of a table's size above which a limited one is not worth it.
 WORTH = 0.8
-
-Load = Callable[[], Any]
-
-
-@dataclass(frozen=True)
-class RecordedTable:
-    """A table of a scene, and the look-ups in it.
-
-    Attributes
-    ----------
-    request : the heights and settings, as the scene has them.
-    table : of all orders.
-    surfaces : names of the BSDFs that look it up.
-    lookups : made by the paths; None where no path meets the surfaces.
-    lobe_turn : see `paths.TracedPaths.lobe_turn`; the largest of the surfaces'.
-    """
-
-    request: TableRequest
-    table: DiffractionTable
-    surfaces: Sequence[str]
-    lookups: Lookups | None
-    lobe_turn: float
+#: Factor on the frequency of the last light: a path not traced may go a little farther.
+ROOM = 1.02
 
 
 @dataclass(frozen=True)
@@ -56,88 +34,29 @@ class PlannedTable:
 
     Attributes
     ----------
-    recorded : the table of all orders, and the look-ups in it.
+    light : the table of all orders, and the light that it sends.
     settings : of the limited table; None where it would save too little.
     table : the limited table, or the table of all orders.
     outside : share of the surfaces' light that is looked up beyond the limits, and missing.
     """
 
-    recorded: RecordedTable
+    light: TableLight
     settings: TableSettings | None
     table: DiffractionTable
     outside: float
 
 
-def record(
-    load: Load, sensor: Callable[[Any], Any], paths: int, seed: int = 0
-) -> tuple[TracedPaths, list[RecordedTable]]:
-    """Load a scene, trace paths through it, and gather the look-ups in each of its tables.
-
-    Raises a DiffractionError if no surface diffracts, none has a table of heights, or no path
-    carries light of one.
-    """
-    session = Session(recording=True)
-    with session:
-        scene = load()
-    try:
-        _check(session)
-        traced = trace(scene, sensor(scene), session, paths, seed)
-        if not len(traced.lookups):
-            raise DiffractionError(
-                f"none of {paths} paths carries light of a surface that diffracts "
-                f"({_names(session)}): the camera does not see it lit; check camera and lights, or "
-                "raise paths"
-            )
-        return traced, [_recorded(key, session, traced) for key in session.tables]
-    finally:
-        session.close()
-
-
-def _check(session: Session) -> None:
-    if not session.bsdfs:
-        raise DiffractionError(
-            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
-        )
-    if not session.tables:
-        raise DiffractionError(
-            f"the tables of {_names(session)} come from files and stay as they are; give the scene "
-            "the height field, or its recipe, to have smaller ones planned"
-        )
-
-
-def _names(session: Session) -> str:
-    return ", ".join(sorted({name for name, _ in session.bsdfs}))
-
-
-def _recorded(key: str, session: Session, traced: TracedPaths) -> RecordedTable:
-    table = session.tables[key]
-    bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if described_table(bsdf) is table]
-    rows = traced.lookups[np.isin(traced.lookups["bsdf"], bsdfs)]
-    lookups = None
-    if len(rows):
-        total = float(min(traced.total[bsdfs].sum(), 1.0))
-        lookups = Lookups(rows["u"], rows["v"], rows["w"], rows["wavelength"], rows["xyz"], total)
-    turns = [float(traced.lobe_turn[n]) for n in bsdfs if traced.lobe_turn[n] >= 0.0]
-    return RecordedTable(
-        request=session.requests[key],
-        table=table,
-        surfaces=sorted({session.bsdfs[n][0] for n in bsdfs}),
-        lookups=lookups,
-        lobe_turn=max(turns, default=float("nan")),
-    )
-
-
-def plan_table(recorded: RecordedTable, tolerance: float) -> PlannedTable:
+def plan_table(light: TableLight, tolerance: float) -> PlannedTable:
     """Limit a table so that at most a share `tolerance` of its surfaces' light lies outside."""
-    whole, lookups = recorded.table, recorded.lookups
-    unlimited = PlannedTable(recorded, None, whole, 0.0)
-    if lookups is None:
+    whole = light.table
+    unlimited = PlannedTable(light, None, whole, 0.0)
+    if not light.share:
         return unlimited
-    limit = lookups.frequency_limit(tolerance, whole.q_limit)
+    limit = frequency_limit(light, tolerance)
     # a series in κ has as many terms as before, so that the size follows the area
     if limit[0] * limit[1] > WORTH * whole.q_limit**2:
         return unlimited
-    request = recorded.request
+    request = light.request
     settings = replace(
         request.settings,
         frequency_limit=(_rounded(limit[0]), _rounded(limit[1])),
@@ -146,11 +65,42 @@ def plan_table(recorded: RecordedTable, tolerance: float) -> PlannedTable:
     table = request.cached(settings)
     if table.nbytes > WORTH * whole.nbytes:
         return unlimited
-    return PlannedTable(recorded, settings, table, lookups.outside(table.frequency_limit))
+    return PlannedTable(light, settings, table, outside(light, table.frequency_limit))
+
+
+def frequency_limit(light: TableLight, share: float) -> tuple[float, float]:
+    """Return the half axes, rad/µm, of the smallest ellipse that leaves at most a share outside.
+
+    share : of all light of the surfaces.
+    """
+    x, y = light.edges
+    # Fingers and tracks spread light across themselves much farther than along
+    ratios = 2.0 ** np.arange(-3.0, 3.01, 0.25)
+    part = 1.0 - share * light.total / light.frequency.sum()
+    halves = [
+        (quantiles(np.hypot(x, y / ratio), light.frequency, [part])[0], ratio) for ratio in ratios
+    ]
+    half, ratio = min(halves, key=lambda axes: axes[0] ** 2 * axes[1])
+    largest = light.table.q_limit
+    return min(half * ROOM, largest), min(float(half * ratio) * ROOM, largest)
+
+
+def outside(light: TableLight, limit: tuple[float, float]) -> float:
+    """Return the share of the surfaces' light outside of an ellipse of these half axes, rad/µm."""
+    x, y = light.edges
+    beyond = np.hypot(x / limit[0], y / limit[1]) > 1.0
+    return float(light.frequency[beyond].sum() / light.total)
+
+
+def quantiles(values: Any, light: Any, shares: Sequence[float]) -> list[float]:
+    """Return values below which these shares of the light lie; arrays of one shape."""
+    flat, weights = np.ravel(values), np.ravel(light)
+    found = np.quantile(flat, np.clip(shares, 0.0, 1.0), weights=weights, method="inverted_cdf")
+    return list(map(float, found))
 
 
 def _rounded(frequency: float) -> float:
-    """Three digits are enough for people; the fourth is `lookups.ROOM`."""
+    """Three digits are enough for people; the fourth is `ROOM`."""
     return float(f"{frequency:.3g}")
 
 
@@ -159,9 +109,9 @@ def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
 
     Raises a DiffractionError if the heights come from no file.
     """
-    recorded, settings = planned.recorded, planned.settings
-    recipe = recorded.request.source.as_recipe()
-    surfaces = ", ".join(recorded.surfaces)
+    light, settings = planned.light, planned.settings
+    recipe = light.request.source.as_recipe()
+    surfaces = ", ".join(light.surfaces)
     if recipe is None or settings is None:
         raise DiffractionError(
             f"the heights of {surfaces} are an array, which no recipe can name; save them to a file"
@@ -185,16 +135,18 @@ def recipe_files(output: Path, count: int) -> list[Path]:
 
 def load_limited(load: Load, planned: Sequence[PlannedTable]) -> Any:
     """Load a scene with the tables of a plan."""
-    limited = {}
-    for table in planned:
-        if table.settings is not None:
-            request = table.recorded.request
-            limited[request.digest, request.settings] = table.settings
+    limited = {
+        (each.light.request.digest, each.light.request.settings): each.settings
+        for each in planned
+        if each.settings is not None
+    }
 
-    def settings_of(request: TableRequest) -> TableSettings:
-        return limited.get((request.digest, request.settings), request.settings)
+    def table_of(request: TableRequest) -> DiffractionTable:
+        key = request.digest, request.settings
+        return request.cached(limited.get(key, request.settings))
 
-    return Session(settings_of).load(load)
+    with providing(table_of):
+        return load()
 
 
 def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
@@ -205,16 +157,16 @@ def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
     recipes = {file: Recipe.load(file) for file in files}
     used = set()
 
-    def settings_of(request: TableRequest) -> TableSettings:
+    def table_of(request: TableRequest) -> DiffractionTable:
         named = request.source.as_recipe()
         for file, recipe in recipes.items():
             if named is not None and recipe.describes_heights_of(named):
                 used.add(file)
-                return _limited(request, recipe)
-        return request.settings
+                return request.cached(_limited(request, recipe))
+        return request.cached(request.settings)
 
-    session = Session(settings_of)
-    scene = session.load(load)
+    with providing(table_of):
+        scene = load()
     if missing := [str(file) for file in recipes if file not in used]:
         raise DiffractionError(
             f"the scene has no surface with the heights of {', '.join(missing)}; plan this scene"

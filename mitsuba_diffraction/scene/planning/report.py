@@ -1,34 +1,40 @@
-"""Reports of a plan as nested plain data: look-ups in each table, and memory that limits save."""
+"""Reports of a plan as nested plain data: light of each table, and memory that limits save."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from ...optics.colour import delta_e, linear_srgb, response
+from ...optics.geometry import wavenumber
 from ...tables.table import DiffractionTable
-from .lookups import lobes_in_a_pixel, quantiles, wavelengths_needed
-from .plan import PlannedTable
+from .light import BINS, WAVELENGTHS, Reals
+from .plan import PlannedTable, quantiles
 
 
 def describe(planned: PlannedTable) -> dict[str, Any]:
-    """Report the look-ups in a table, the limits that suffice, and the memory that they save."""
-    recorded, lookups = planned.recorded, planned.recorded.lookups
-    table = recorded.table
+    """Report the light of a table, the limits that suffice, and the memory that they save."""
+    light, table = planned.light, planned.light.table
     result: dict[str, Any] = {
-        "surfaces": ", ".join(recorded.surfaces),
+        "surfaces": ", ".join(light.surfaces),
         "heights": str(table.source.get("name", "")),
     }
     whole = _figures(table)
-    if lookups is None:
+    if not light.share:
         return result | {"asked for": "nothing: no path meets it; it stays whole", "whole": whole}
-    lobes = lobes_in_a_pixel(recorded.lobe_turn, table.sigma)
-    light = lookups.light
+    # 1/(kσ) wide are the lobes, and where ωi turns by δ, so does ωo: (u, v) moves by up to 2δ
+    lobes = float((2.0 * light.lobe_turn * wavenumber(550.0) * table.sigma) ** 2)
+    (x, y), by = light.edges, light.frequency
+    kappa_max = table.expansion.kappa_max
+    kappa = kappa_max / BINS * np.arange(1.0, BINS + 1.0)
     result["asked for"] = {
-        "share of the surfaces' light that is diffracted": float(light.sum()),
-        "frequency (rad/µm)": _shares(lookups.frequency, light, "light can probe", table.q_limit),
-        "frequency along x (rad/µm)": _shares(lookups.along[0], light),
-        "frequency along y (rad/µm)": _shares(lookups.along[1], light),
-        "kappa (rad/µm)": _shares(lookups.kappa, light, "the table has", table.expansion.kappa_max),
-        "wavelengths of 99.9 %": wavelengths_needed(lookups),
+        "share of the surfaces' light that is diffracted": light.share,
+        "frequency (rad/µm)": _shares(np.hypot(x, y), by, "light can probe", table.q_limit),
+        "frequency along x (rad/µm)": _shares(x, by.sum(axis=0)),
+        "frequency along y (rad/µm)": _shares(y, by.sum(axis=1)),
+        "kappa (rad/µm)": _shares(kappa, light.kappa, "the table has", kappa_max),
+        "wavelengths of 99.9 %": wavelengths_needed(light.wavelength),
         "lobes of the window in a pixel": lobes,
         "coherence": _coherence(table.coherence, lobes),
     }
@@ -48,6 +54,28 @@ def describe(planned: PlannedTable) -> dict[str, Any]:
         "planned": _figures(planned.table),
         "times less memory": table.nbytes / planned.table.nbytes,
     }
+
+
+def wavelengths_needed(light: Reals, share: float = 1e-3) -> dict[str, Any]:
+    """Return the band that all but a share of the diffracted light lies in, half on either side.
+
+    light : (470,) between `WAVELENGTHS`, in X + Y + Z.
+
+    Returns range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band
+    alone.
+    """
+    low, high = (
+        quantiles(ends, light, [part])[0]
+        for ends, part in ((WAVELENGTHS[:-1], 0.5 * share), (WAVELENGTHS[1:], 1.0 - 0.5 * share))
+    )
+    middle = 0.5 * (WAVELENGTHS[1:] + WAVELENGTHS[:-1])
+    seen = response(middle)
+    xyz = light[:, None] * seen / seen.sum(axis=1, keepdims=True)
+    inside = (middle >= low) & (middle <= high)
+    colours = [linear_srgb(xyz[part].sum(axis=0)) for part in (slice(None), inside)]
+    largest = max(float(np.abs(colours[0]).max()), 1e-30)
+    lost = delta_e(colours[0][None] / largest, colours[1][None] / largest, exposure=1.0)
+    return {"range_nm": [low, high], "lost_colour": float(lost[0])}
 
 
 def _figures(table: DiffractionTable) -> dict[str, Any]:

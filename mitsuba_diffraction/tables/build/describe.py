@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ...heights.coherence import TAPER_SHARE, repeats, width_reason
+from ...heights.coherence import repeats, width_reason
 from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
@@ -68,12 +67,12 @@ def _parts(windows: Windows) -> Windows:
     if max(windows.shape) <= _PART:
         return windows
     width = _PART * min(windows.scans[0].pixel_size)
-    return Windows(windows.scans, width, width / math.sqrt(TAPER_SHARE))
+    return Windows(windows.scans, width)
 
 
 def _whole(patch: HeightField) -> Windows:
     width = max(patch.extent)
-    return Windows([patch], width, width / math.sqrt(TAPER_SHARE))
+    return Windows([patch], width)
 
 
 def _variation(patches: Sequence[HeightField]) -> float:

@@ -123,7 +123,9 @@ class PatchSpectra:
             for _ in kappas:
                 self.tick()
         for power in total:
-            yield power.over(len(self._patches))
+            mean = power.over(len(self._patches))
+            mean.bins = self._patches.sharpened(mean.bins)
+            yield mean
 
 
 def _batch_sums(

@@ -3,9 +3,9 @@
 A scan is part of a larger surface: its edges do not meet, so it must not tile the plane. Windows
 W = 4σ wide overlap by half (Welch 1967, IEEE Transactions on Audio and Electroacoustics 15, 70);
 `heights.coherence` has their width and their places. The mean of a window's phase screen exp(iκh),
-weighted with its taper's square, is order 0. The rest fades with a Gaussian taper and is filled up
-with zeros to 2 W, so that orders lie π/W apart and no edge meets another. The look-up's window is
-wider by as much as the taper is narrow, 1/σ² = 1/σ_t² + 1/σ_l²: an order's lobe is that of σ.
+weighted with its taper's square, is order 0. The rest fades with a taper and is filled up with
+zeros to 2 W, so that orders lie π/W apart and no edge meets another. Neighbouring powers are
+subtracted in part (`sharpened`): under the look-up's window an order's lobe is that of σ.
 Windows are cut out when they are asked for: memory does not grow with the scan.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...heights.coherence import window_corners, window_places
+from ...heights.coherence import SHARPENING, TAPER, window_corners, window_places
 from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
 from ...optics.blend import ScaleRoughness
@@ -58,11 +58,11 @@ class _Axis:
     taper: Reals | None
 
     @classmethod
-    def of(cls, pixels: int, window: float, deviation: float) -> _Axis:
-        """Windows some `window` pixels long; `deviation` is σ of the taper."""
+    def of(cls, pixels: int, window: float) -> _Axis:
+        """Windows some `window` pixels long."""
         starts, length = window_places(pixels, window)
-        place = np.arange(length) - 0.5 * (length - 1)
-        taper = np.exp(-0.5 * np.square(place / deviation))
+        turn = 2.0 * np.pi / length * (np.arange(length) - 0.5 * (length - 1))
+        taper = 1.0 + sum(c * np.cos(n * turn) for n, c in enumerate(TAPER, 1))
         return cls(starts, length, 2 * length, taper / np.sqrt(np.mean(taper**2)))
 
     @classmethod
@@ -90,7 +90,7 @@ class Windows(Sequence[HeightField]):
     Parameters
     ----------
     scans : with pixels of one size.
-    width, taper_width : of a window, and 4σ of its taper, µm.
+    width : of a window, µm.
     run : what does the work of batches, as `map` does here.
 
     Attributes
@@ -100,16 +100,14 @@ class Windows(Sequence[HeightField]):
     variance_factor : variance of the mean over all windows, of one window's.
     """
 
-    def __init__(
-        self, scans: Sequence[HeightField], width: float, taper_width: float, run: Run = map
-    ) -> None:
+    def __init__(self, scans: Sequence[HeightField], width: float, run: Run = map) -> None:
         self.scans, self.run = list(scans), run
         changes = [any(scan.varies_along(axis) for scan in scans) for axis in (0, 1)]
 
         def axis_of(pixels: int, pixel: float, varies: bool) -> _Axis:
             if not varies:
                 return _Axis.even(pixels)
-            return _Axis.of(pixels, width / pixel, sigma_of(taper_width) / pixel)
+            return _Axis.of(pixels, width / pixel)
 
         axes = [
             [axis_of(*each) for each in zip(scan.shape, self._pixels, changes, strict=True)]
@@ -223,6 +221,32 @@ class Windows(Sequence[HeightField]):
             for w in self.some()
         ]
 
+    def sharpened(self, powers: NDArray[Any]) -> NDArray[Any]:
+        """Powers of all orders but 0, (ny, nx), without the share that their neighbours have.
+
+        P_j − b (P_{j+1} − 2 P_j + P_{j−1}) along each axis that fades: the lag window (Blackman and
+        Tukey 1958, The Measurement of Power Spectra) grows by 1 + 2b (1 − cos πr/W). The sum stays.
+        The bin of order 0 counts as the mean of its neighbours, and is empty again.
+        """
+        middle = powers.shape[0] // 2, powers.shape[1] // 2
+        around: list[float] = []
+        for axis, taper in enumerate(self.tapers):
+            if taper is not None:
+                line = np.moveaxis(powers, axis, 0)[:, middle[1 - axis]]
+                around += line[[middle[axis] - 1, middle[axis] + 1]].tolist()
+        if not around:
+            return powers
+        powers = powers.copy()
+        powers[middle] = np.mean(around)
+        for axis, taper in enumerate(self.tapers):
+            if taper is not None:
+                steps = SHARPENING * np.diff(powers, axis=axis)
+                rows = np.moveaxis(powers, axis, 0), np.moveaxis(steps, axis, 0)
+                rows[0][:-1] -= rows[1]
+                rows[0][1:] += rows[1]
+        powers[middle] = 0.0
+        return powers
+
     @property
     def taper(self) -> Reals:
         """Factor by which screens fade towards the edges: (ny or 1, nx or 1)."""
@@ -285,7 +309,7 @@ def windows_of(
             "windows have their powers averaged, which coherence='patch' and basis='taylor' "
             "cannot; use coherence='ensemble' and basis='svd', or leave windows out"
         )
-    return Windows(scans, settings.width, settings.taper_width, run)
+    return Windows(scans, settings.width, run)
 
 
 def extent_of(patches: Sequence[HeightField]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Plans: paths see what geometry says, tables follow, and recipes build them again."""
+"""Plans: light is where geometry says, tables follow, and recipes build them again."""
 
 from __future__ import annotations
 
@@ -12,15 +12,22 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.optics.colour import linear_srgb, response
-from mitsuba_diffraction.scene.planning.lookups import Lookups, quantiles, wavelengths_needed
+from mitsuba_diffraction.scene.planning.light import (
+    BINS,
+    WAVELENGTHS,
+    light_of_tables,
+)
 from mitsuba_diffraction.scene.planning.plan import (
+    frequency_limit,
     load_by_recipes,
     load_limited,
+    outside,
     plan_table,
+    quantiles,
     recipe_files,
     recipe_of,
-    record,
 )
+from mitsuba_diffraction.scene.planning.report import wavelengths_needed
 from mitsuba_diffraction.tables.source import TableRequest
 from tests.support.directions import polar, rough_patch
 
@@ -33,7 +40,7 @@ pytestmark = [
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2, correlation=0.2)
 #: |ωi + ωo| in the plane is 0.42: below Nyquist's frequency at all wavelengths.
 LIGHT, VIEW = polar(25.0, 25.0), polar(5.0, -50.0)
-#: A look-up then is some 1e-5 of the light, far below the 1e-3 that plans leave out.
+#: A path then is some 1e-5 of the light, far below the 1e-3 that plans leave out.
 PATHS = 20_000
 
 
@@ -65,11 +72,11 @@ def sensor(scene):
 
 
 @pytest.fixture(scope="module")
-def traced():
-    """Paths through the plate, and the look-ups in its only table."""
+def lit():
+    """Light of the plate's only table."""
     mi.set_variant("llvm_ad_spectral")
-    paths, (table,) = record(plate, sensor, PATHS)
-    return paths, table
+    (light,) = light_of_tables(plate, sensor, PATHS)
+    return light
 
 
 @pytest.fixture(scope="module")
@@ -86,11 +93,10 @@ def variant():
     mi.set_variant("llvm_ad_spectral")
 
 
-def lookups_by_hand(u, v, w, wavelength, light):
-    """Look-ups whose light is all there is."""
-    columns = (np.atleast_1d(np.asarray(a, float)) for a in (u, v, w, wavelength))
-    xyz = np.asarray(light, float)[:, None] * np.full(3, 1.0 / 3.0)
-    return Lookups(*columns, xyz, float(np.sum(light)))
+def light_by_hand(lit, frequency):
+    """Light of the plate's table at these frequencies, which is all there is."""
+    total = float(frequency.sum())
+    return dataclasses.replace(lit, frequency=frequency, total=total)
 
 
 def from_file(file, **parameters):
@@ -102,26 +108,42 @@ def tables_of(scene):
     return [shape.bsdf().table for shape in scene.shapes()]
 
 
-def test_a_plate_is_asked_for_one_direction_only(traced):
-    paths, recorded = traced
-    lookups = recorded.lookups
-    u, v, w = LIGHT + VIEW  # all in float32
-    assert lookups.u == pytest.approx(u, abs=1e-5)
-    assert lookups.v == pytest.approx(v, abs=1e-5)
-    assert lookups.w == pytest.approx(w, abs=1e-5)
-    k = 2e3 * np.pi / lookups.wavelength
-    assert lookups.frequency == pytest.approx(k * np.hypot(u, v), rel=1e-5)
-    assert lookups.kappa == pytest.approx(k * w, rel=1e-5)
-    assert lookups.wavelength.min() >= 360.0
-    assert lookups.wavelength.max() <= 830.0
+def bounds(light, end, count):
+    """Ends of the bins, from 0 to `end`, that have light."""
+    bins = np.flatnonzero(light)
+    return bins[0] * end / count, (bins[-1] + 1) * end / count
+
+
+def test_a_plate_is_asked_for_one_direction_only(lit):
+    table, (u, v, w) = lit.table, np.abs(LIGHT + VIEW)
+    seen = WAVELENGTHS[:-1][lit.wavelength > 0.0]
+    assert seen[0] < 380.0
+    assert seen[-1] > 700.0
+    k = 2e3 * np.pi / 360.0, 2e3 * np.pi / 830.0  # the largest and the least
+    for light, part, end in (
+        (lit.frequency.sum(axis=0), u, table.q_limit),
+        (lit.frequency.sum(axis=1), v, table.q_limit),
+        (lit.kappa, w, table.expansion.kappa_max),
+    ):
+        low, high = bounds(light, end, BINS)
+        step = end / BINS
+        assert k[1] * part - step <= low
+        assert high <= k[0] * part + step
+    # one k at a time: light at (α, β) lies on a line through 0, to a bin
+    rows, columns = np.nonzero(lit.frequency)
+    np.testing.assert_allclose((rows + 0.5) * u, (columns + 0.5) * v, atol=0.5 * (u + v) + 1e-3)
     # there is nothing else in the picture
-    assert lookups.light.sum() == pytest.approx(1.0, abs=1e-5)
+    # but for the noise of two renderings
+    assert lit.total == pytest.approx(1.0, abs=5e-3)
+    assert lit.share == pytest.approx(1.0, abs=1e-4)
+    assert lit.kappa.sum() == pytest.approx(lit.frequency.sum(), rel=1e-4)
+    assert lit.wavelength.sum() == pytest.approx(lit.frequency.sum(), rel=1e-4)
     # flat: all of a pixel, and all of the plate, sees the light at one angle
-    assert paths.lobe_turn == pytest.approx(0.0, abs=1e-5)
+    assert lit.lobe_turn == pytest.approx(0.0, abs=1e-5)
 
 
-def test_its_table_ends_where_the_light_does(traced):
-    planned = plan_table(traced[1], 1e-3)
+def test_its_table_ends_where_the_light_does(lit):
+    planned = plan_table(lit, 1e-3)
     u, v, w = LIGHT + VIEW
     # The observer is blind below 360 nm, and 0.1 % of the light lie below some 390 nm
     shortest = 2e3 * np.pi / 360.0
@@ -130,8 +152,8 @@ def test_its_table_ends_where_the_light_does(traced):
     assert 0.85 * shortest < edge < 1.02 * shortest
     assert planned.table.expansion.kappa_max >= shortest * w
     assert planned.outside <= 1e-3
-    assert planned.recorded.surfaces == ["foil"]
-    assert planned.table.nbytes < 0.5 * traced[1].table.nbytes
+    assert planned.light.surfaces == ("foil",)
+    assert planned.table.nbytes < 0.5 * lit.table.nbytes
 
 
 def test_what_lies_beneath_has_a_share_in_the_light():
@@ -142,64 +164,78 @@ def test_what_lies_beneath_has_a_share_in_the_light():
         scenes.append(plate(**pigment))
         return scenes[0]
 
-    _, (recorded,) = record(load, sensor, PATHS)
+    (light,) = light_of_tables(load, sensor, PATHS)
     # Mitsuba's own renderer on both, with the pigment and with nothing beneath
     brightness = [
         float((np.array(mi.render(scene, spp=512)) @ np.linalg.inv(linear_srgb(np.eye(3)))).mean())
         for scene in (plate(), scenes[0])
     ]
-    # noise of some 16,000 paths, and the brightest percent of which count less in the plan
-    light = recorded.lookups.light.sum()
-    assert light == pytest.approx(brightness[0] / brightness[1], rel=0.05)
+    # noise of some 20,000 paths
+    assert light.share == pytest.approx(brightness[0] / brightness[1], rel=0.05)
 
 
-def test_the_limit_is_a_quantile_of_the_light():
-    light = np.full(1000, 1e-3)
-    u = np.linspace(0.0, 1.0, 1000)
-    nothing, one = np.zeros(1000), np.ones(1000)
-    lookups = lookups_by_hand(u, nothing, one, np.full(1000, 2e3 * np.pi), light)  # k = 1
-    along_x, along_y = lookups.frequency_limit(0.1, 30.0)
+def test_several_surfaces_have_light_of_their_own():
+    """Two plates of different heights side by side, and one of them twice, as bright as it is."""
+    other = rough_patch((64, 64), (0.3, 0.3), 0.02, correlation=0.2)
+    scenes = []
+
+    def load():
+        parts = {"type": "scene", "integrator": {"type": "ptracer"}, "sensor": plate().sensors()[0]}
+        parts["light"] = {"type": "directional", "direction": [float(-x) for x in LIGHT]}
+        for name, patch, x in (("a", PATCH, -2.0), ("b", other, 0.0), ("c", PATCH, 2.0)):
+            given = {"coherence_width": 18.0, "energy_conserving": False, "id": name}
+            bsdf = {"type": "twosided", "bsdf": md.bsdf_dict(patch, **given)}
+            place = mi.ScalarTransform4f().translate([x / 5.0, 0, 0]).scale([0.2, 1, 1])
+            parts[f"plate {name}"] = {"type": "rectangle", "to_world": place, "bsdf": bsdf}
+        scenes.append(mi.load_dict(parts))
+        return scenes[-1]
+
+    first, second = light_of_tables(load, sensor, 8 * PATHS)
+    assert first.surfaces == ("a", "c")
+    assert second.surfaces == ("b",)
+    assert first.total + second.total == pytest.approx(1.0, abs=5e-3)
+    for each in (first, second):
+        assert each.share == pytest.approx(1.0, abs=1e-3)
+    assert first.total > 2.0 * second.total
+
+
+def test_the_limit_is_a_quantile_of_the_light(lit):
+    frequency = np.zeros((BINS, BINS))
+    frequency[0] = 1.0 / BINS
+    light, end = light_by_hand(lit, frequency), lit.table.q_limit
+    along_x, along_y = frequency_limit(light, 0.1)
     # 2 % of room are added
-    assert along_x == pytest.approx(1.02 * 0.90, abs=2e-3)
+    assert along_x == pytest.approx(1.02 * 0.90 * end, abs=2.0 * end / BINS)
     # all of it lies on one axis
-    assert along_y <= along_x / 8
-    assert lookups.outside((along_x, along_y)) <= 0.1
-    assert lookups.frequency_limit(0.1, 0.5)[0] == 0.5
-    assert quantiles(u, light, [0.5]) == pytest.approx([0.5], abs=2e-3)
+    assert along_y <= along_x / 7
+    assert outside(light, (along_x, along_y)) <= 0.1
+    assert frequency_limit(light, 1e-4)[0] == end
+    assert quantiles(np.arange(1000), np.ones(1000), [0.5]) == pytest.approx([500], abs=2)
 
 
 def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
-    wavelength = np.linspace(360.0, 830.0, 471)
-    xyz = response(wavelength)
-    ones = np.ones(471)
-    lookups = Lookups(ones, ones, ones, wavelength, xyz / xyz.sum(), 1.0)
-    needed = wavelengths_needed(lookups, 1e-3)
+    needed = wavelengths_needed(response(0.5 * (WAVELENGTHS[1:] + WAVELENGTHS[:-1])).sum(axis=1))
     low, high = needed["range_nm"]
     assert 380.0 < low < 410.0
     assert 680.0 < high < 720.0
     assert needed["lost_colour"] < 0.5  # half of what an eye can just tell apart
 
 
-def test_where_all_of_a_table_is_asked_for_it_stays_whole(traced):
-    angle = np.linspace(0.0, 2.0 * np.pi, 360)
-    u, v = 2.0 * np.cos(angle), 2.0 * np.sin(angle)  # light and view at the horizon
-    ones = np.ones(360)
-    lookups = lookups_by_hand(u, v, ones, 360.0 * ones, ones / 360.0)
-
+def test_where_all_of_a_table_is_asked_for_it_stays_whole(lit):
     class Unused(TableRequest):
         def cached(self, settings):
             raise AssertionError("a table is built")
 
-    asked = traced[1].request
+    asked = lit.request
     request = Unused(*(getattr(asked, each.name) for each in dataclasses.fields(asked)))
-    recorded = dataclasses.replace(traced[1], lookups=lookups, request=request)
-    assert plan_table(recorded, 1e-3).settings is None
-    unseen = dataclasses.replace(recorded, lookups=None)
-    assert plan_table(unseen, 1e-3).table is traced[1].table
+    full = dataclasses.replace(light_by_hand(lit, np.ones((BINS, BINS))), request=request)
+    assert plan_table(full, 1e-3).settings is None
+    unseen = light_by_hand(full, np.zeros((BINS, BINS)))
+    assert plan_table(unseen, 1e-3).table is lit.table
 
 
-def test_a_scene_is_loaded_with_the_limits_of_its_plan(traced):
-    planned = plan_table(traced[1], 1e-3)
+def test_a_scene_is_loaded_with_the_limits_of_its_plan(lit):
+    planned = plan_table(lit, 1e-3)
     (table,) = tables_of(load_limited(plate, [planned]))
     assert table is planned.table
     # one of other settings is none of the plan's
@@ -208,8 +244,8 @@ def test_a_scene_is_loaded_with_the_limits_of_its_plan(traced):
 
 
 def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
-    _, (recorded,) = record(lambda: from_file(file), sensor, PATHS)
-    planned = plan_table(recorded, 1e-3)
+    (light,) = light_of_tables(lambda: from_file(file), sensor, PATHS)
+    planned = plan_table(light, 1e-3)
     (output,) = recipe_files(tmp_path / "foil.toml", 1)
     recipe, comment = recipe_of(planned, "plate.xml")
     recipe.save(output, comment)
@@ -241,9 +277,9 @@ def test_recipes_for_another_scene_are_refused(file, tmp_path, recipe, parameter
         load_by_recipes(lambda: from_file(file, **parameters), [limited])
 
 
-def test_heights_without_a_file_have_no_recipe(traced):
+def test_heights_without_a_file_have_no_recipe(lit):
     with pytest.raises(DiffractionError, match="heights of foil are an array"):
-        recipe_of(plan_table(traced[1], 1e-3), "plate.xml")
+        recipe_of(plan_table(lit, 1e-3), "plate.xml")
 
 
 def test_scenes_without_anything_to_plan_are_refused(tmp_path):
@@ -257,9 +293,9 @@ def test_scenes_without_anything_to_plan_are_refused(tmp_path):
     ):
         parts = {"type": "scene", "ball": {"type": "sphere", "bsdf": bsdf}}
         with pytest.raises(DiffractionError, match=expected):
-            record(lambda parts=parts: mi.load_dict(parts), sensor, 100)
+            light_of_tables(lambda parts=parts: mi.load_dict(parts), sensor, 100)
 
 
 def test_a_scene_in_the_dark_is_refused():
     with pytest.raises(DiffractionError, match="none of 100 paths through the scene carries light"):
-        record(lambda: plate(polar(120.0, 25.0)), sensor, 100)
+        light_of_tables(lambda: plate(polar(120.0, 25.0)), sensor, 100)

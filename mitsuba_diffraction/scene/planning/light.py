@@ -1,0 +1,295 @@
+"""Light of a picture by table, spatial frequency, κ and wavelength: a derivative of its brightness.
+
+While the picture is rendered, the light of a surface has a factor of 1 for each bin of a quantity.
+The derivative of the picture's brightness by the factor is the light that the bin adds to the
+picture, on all paths. Light that several surfaces reflect counts at each of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...optics.colour import linear_srgb
+from ...plugin.description import Surface, describe
+from ...plugin.directions import Pair, Site
+from ...plugin.memory import upload
+from ...plugin.types import BSDF, Colour, Context, Float, Mask, Powers, Spectrum, Vector3f
+from ...tables.source import TableRequest, providing
+from ...tables.table import DiffractionTable
+from ..elements import own_id, parts_of
+from ..load import shrink
+
+Reals = NDArray[np.float64]
+Load = Callable[[], Any]
+
+#: Longest paths that are followed, vertices and camera included.
+MOST_BOUNCES = 12
+#: The brightest pixels count no more than this percentile of those with light. A display shows
+#: mirror images of the sun as mere white, but their light would outweigh all other.
+BRIGHTEST = 99.0
+#: Bins along either axis of frequency, and of κ.
+BINS = 256
+#: Ends of bins of wavelength, nm.
+WAVELENGTHS = np.arange(360.0, 831.0)
+# Pixels of the rendered picture, at most; paths share them.
+_PIXELS = 1 << 12
+# Pixels in which the turn of ωi is looked at.
+_PAIRS = 1 << 12
+
+
+@dataclass(frozen=True)
+class TableLight:
+    """Light that the surfaces of one table add to a picture, whose light is 1.
+
+    Attributes
+    ----------
+    request : the heights and settings, as the scene has them.
+    table : of all orders.
+    surfaces : names of the BSDFs that look it up.
+    total : light of these surfaces, nested BSDFs included.
+    frequency : (BINS, BINS) light by |β| and |α|, of even bins up to the table's `q_limit`.
+    kappa : (BINS,) light by κ, of even bins up to the table's largest.
+    wavelength : (470,) light between `WAVELENGTHS`.
+    lobe_turn : median of how far ωi turns within a pixel, in direction cosines, the largest of the
+        surfaces'; NaN where the camera sees none.
+    """
+
+    request: TableRequest
+    table: DiffractionTable
+    surfaces: tuple[str, ...]
+    total: float
+    frequency: Reals
+    kappa: Reals
+    wavelength: Reals
+    lobe_turn: float
+
+    @property
+    def share(self) -> float:
+        """Share of the surfaces' light that is diffracted."""
+        return float(self.frequency.sum()) / self.total if self.total > 0.0 else 0.0
+
+    @property
+    def edges(self) -> tuple[Reals, Reals]:
+        """Upper ends (BINS,), (BINS, 1) of the bins along |α| and |β|, rad/µm."""
+        ends = self.table.q_limit / BINS * np.arange(1.0, BINS + 1.0)
+        return ends, ends[:, None]
+
+
+@dataclass(eq=False)
+class _Factors:
+    """Factors of 1 on the light of all surfaces that share a table."""
+
+    request: TableRequest
+    table: DiffractionTable
+    bsdfs: list[BSDF] = field(default_factory=list)
+    shapes: list[Any] = field(default_factory=list)
+    names: dict[str, None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.frequency, self.kappa, self.wavelength, self.whole = (
+            dr.ones(mi.Float, count) for count in (BINS**2, BINS, len(WAVELENGTHS) - 1, 1)
+        )
+        dr.enable_grad(self.all)
+
+    @property
+    def all(self) -> list[Float]:
+        """The factors by frequency, κ, wavelength and of all light."""
+        return [self.frequency, self.kappa, self.wavelength, self.whole]
+
+    def put_on(self, bsdf: BSDF) -> None:
+        """Multiply the light of a BSDF by the factors."""
+        light, evaluated = bsdf.light, bsdf.evaluated
+
+        def weighed(ctx: Context, site: Site, pair: Pair, power: Powers, active: Mask) -> Spectrum:
+            return light(ctx, site, pair, power, active) * mi.Spectrum(self._at(site, pair))
+
+        def whole(
+            ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
+        ) -> tuple[Spectrum, Float]:
+            value, density = evaluated(ctx, site, wo, active, kinds)
+            return value * dr.gather(mi.Float, self.whole, mi.UInt32(0)), density
+
+        bsdf.light, bsdf.evaluated = weighed, whole
+        self.bsdfs.append(bsdf)
+
+    def take_off(self) -> None:
+        """Leave the BSDFs as they were: functions that know them would keep them alive."""
+        for bsdf in self.bsdfs:
+            del bsdf.light, bsdf.evaluated
+
+    def _at(self, site: Site, pair: Pair) -> Colour:
+        """Return the product of the factors of each channel."""
+        result = mi.UnpolarizedSpectrum(1.0)
+        table, first = self.table, float(WAVELENGTHS[0])
+        for n, k in enumerate(site.wavenumbers):
+            x, y = (_bin(dr.abs(k * part), table.q_limit, BINS) for part in pair.uv)
+            kappa = _bin(k * pair.w * site.scale, table.expansion.kappa_max, BINS)
+            nm = mi.UInt32(dr.clip(2e3 * dr.pi / k - first, 0.0, len(WAVELENGTHS) - 2.0))
+            result[n] = (
+                dr.gather(mi.Float, self.frequency, y * BINS + x)
+                * dr.gather(mi.Float, self.kappa, kappa)
+                * dr.gather(mi.Float, self.wavelength, nm)
+            )
+        return result
+
+
+def _bin(value: Float, end: float, count: int) -> Any:
+    """Return the number of a value's bin among even ones from 0 to the end."""
+    return mi.UInt32(dr.clip(value * (count / end), 0.0, count - 1.0))
+
+
+def light_of_tables(
+    load: Load, sensor: Callable[[Any], Any], paths: int, seed: int = 0
+) -> list[TableLight]:
+    """Load a scene and render it; return the light of each table, in the order of loading.
+
+    load : loads the scene in the variant that is set, `llvm_ad_spectral` or `cuda_ad_spectral`.
+    sensor : returns the sensor of the loaded scene.
+    paths : number of paths, about.
+
+    Raises a DiffractionError if no surface diffracts, none has a table of heights, or no path
+    carries light of one.
+    """
+    made: list[_Factors] = []
+
+    def table_of(request: TableRequest) -> DiffractionTable:
+        table = request.cached(request.settings)
+        if not any(each.table is table for each in made):
+            made.append(_Factors(request, table))
+        return table
+
+    with providing(table_of):
+        scene = load()
+    names = _take_surfaces(scene, made)
+    try:
+        view = sensor(scene)
+        turns = _turns(scene, view, seed)
+        _render(scene, view, paths, seed, made)
+    finally:
+        for each in made:
+            each.take_off()
+    found = [_light_of(each, turns) for each in made]
+    if not any(each.share for each in found):
+        raise DiffractionError(
+            f"none of {paths} paths carries light of a surface that diffracts "
+            f"({names}): the camera does not see it lit; check camera and lights, or raise paths"
+        )
+    return found
+
+
+def _take_surfaces(scene: Any, made: list[_Factors]) -> str:
+    """Put the factors on all surfaces with a table of heights; return the surfaces' names."""
+    surfaces: dict[int, tuple[BSDF, Surface]] = {}
+    names: dict[str, None] = {}
+    for shape in scene.shapes():
+        for part in parts_of(shape.bsdf()):
+            described = describe(part)
+            if not isinstance(described, Surface) or described.solved or described.transmits:
+                continue
+            heights = described.patch.source.get("name") or "heights without a name"
+            name = own_id(part.id()) or f"a diffraction BSDF without id (of {heights})"
+            names[name] = None
+            for each in made:
+                if each.table is described.patch:
+                    each.names[name] = None
+                    each.shapes.append(shape)
+                    if id(part) not in surfaces:
+                        each.put_on(part)
+            surfaces[id(part)] = part, described
+    if not surfaces:
+        raise DiffractionError(
+            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    listed = ", ".join(sorted(names))
+    if not made:
+        raise DiffractionError(
+            f"the tables of {listed} come from files and stay as they are; give the scene "
+            "the height field, or its recipe, to have smaller ones planned"
+        )
+    return listed
+
+
+def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]) -> None:
+    """Compute the derivative of the picture's brightness by all factors.
+
+    Raises a DiffractionError if the picture is black.
+    """
+    pixels = int(np.prod(sensor.film().crop_size()))
+    shrink(sensor, max(1.0, (pixels / _PIXELS) ** 0.5))
+    spp = max(1, round(paths / int(np.prod(sensor.film().crop_size()))))
+    match = re.search(r"max_depth = (-?\d+)", str(scene.integrator()))
+    depth = int(match[1]) if match else -1
+    depth = MOST_BOUNCES if depth < 0 else min(max(depth, 1), MOST_BOUNCES)
+    integrator: Any = mi.load_dict({"type": "prb", "max_depth": depth})
+    picture = np.array(integrator.render(scene, sensor, seed=seed, spp=spp), np.float64)
+    weights = _brightness(sensor.film(), picture.shape[-1])
+    brightness = np.maximum(picture @ weights, 0.0)
+    if not (lit := brightness > 0.0).any():
+        raise DiffractionError(
+            f"none of {paths} paths through the scene carries light; check its camera and emitters"
+        )
+    most = np.percentile(brightness[lit], BRIGHTEST)
+    clipped = np.minimum(1.0, np.divide(most, brightness, out=np.ones(lit.shape), where=lit))
+    gradient = clipped[..., None] * weights / (clipped * brightness).sum()
+    integrator.render_backward(
+        scene, [each.all for each in made], mi.TensorXf(gradient.astype(np.float32)),
+        sensor=sensor, seed=seed + 1, spp=spp,
+    )  # fmt: skip
+
+
+def _brightness(film: Any, channels: int) -> Reals:
+    """Return the weights (channels,) of a film's channels in X + Y + Z; of bands all are alike."""
+    kind = film.bitmap().pixel_format().name
+    if not kind.startswith(("RGB", "XYZ", "Y")):
+        return np.ones(channels)
+    rgb = np.linalg.inv(linear_srgb(np.eye(3))).sum(axis=1)
+    weights = rgb if kind.startswith("RGB") else np.ones(3 if kind.startswith("XYZ") else 1)
+    return np.concatenate([weights, np.zeros(channels - len(weights))])
+
+
+def _light_of(factors: _Factors, turns: dict[int, float]) -> TableLight:
+    """Return the light of a table by the derivatives of its factors."""
+    frequency, kappa, wavelength, whole = (
+        np.maximum(np.array(dr.grad(part), np.float64), 0.0) for part in factors.all
+    )
+    seen = [turns[number] for shape in factors.shapes if (number := _number(shape)) in turns]
+    return TableLight(
+        factors.request, factors.table, tuple(sorted(factors.names)), float(whole[0]),
+        frequency.reshape(BINS, BINS), kappa, wavelength, max(seen, default=float("nan")),
+    )  # fmt: skip
+
+
+def _number(shape: Any) -> int:
+    """Return the number of a shape among those that kernels know."""
+    return int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)))[0])
+
+
+def _turns(scene: Any, sensor: Any, seed: int) -> dict[int, float]:
+    """Return the median of how far ωi turns between two places of a pixel, by number of the shape.
+
+    The turn is in direction cosines.
+    """
+    film, rng = sensor.film(), np.random.default_rng(seed)
+    pixels = np.floor(rng.random((_PAIRS, 2)) * np.array(film.crop_size(), float))
+    places = np.repeat(pixels + np.array(film.crop_offset(), float), 2, axis=0)
+    places = (places + rng.random(places.shape)) / np.array(film.size(), float)
+    place = mi.Point2f(*(upload(mi.Float, axis) for axis in places.T))
+    ray, _ = sensor.sample_ray(0.0, mi.Float(0.5), place, mi.Point2f(0.5), mi.Mask(True))
+    si = scene.ray_intersect(mi.Ray3f(ray))
+    shape = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(-1, 2)
+    wi = np.stack([np.array(si.wi.x), np.array(si.wi.y)], axis=-1).reshape(-1, 2, 2)
+    turned = np.hypot(*(wi[:, 0] - wi[:, 1]).T)
+    same = shape[:, 0] == shape[:, 1]
+    return {
+        int(number): float(np.median(turned[same & (shape[:, 0] == number)]))
+        for number in np.unique(shape[same])
+    }
