@@ -13,8 +13,9 @@ from typing import Any
 from urllib.parse import urlencode
 
 from ..errors import DiffractionError
-from ..realtime.glsl.source import METHODS, WEB_METHODS
+from ..realtime.glsl.methods import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
+from ..thesis import shaders  # noqa: F401 - registers its methods
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say, say_warning
@@ -109,7 +110,7 @@ def compare(args: argparse.Namespace) -> Figures:
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
             args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
         )  # fmt: skip
-        figures = comparison.run(METHODS if every else args.method, leave_out=every)
+        figures = comparison.run(tuple(METHODS) if every else args.method, leave_out=every)
     figures = {"scene": figures["scene"], "parameters": parameters, **figures}
     save_json(folder / "compare.json", figures)
     print(markdown(plain(figures)))

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .context import clock_of, compile_program, set_uniforms
-from .methods import vertex_array
+from .context import clock_of, compile_program, set_uniforms, vertex_array
 from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Uniform
@@ -73,7 +72,7 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
     """
     surfaces = renderer.scene.surfaces
     number = next(n for n, s in enumerate(surfaces) if s.material.diffraction is not None)
-    surface, tables = renderer.bindings[number], renderer.prepared(method).tables[number]
+    surface, tables = renderer.bindings[number], renderer.tables(method)[number]
     program = compile_program(renderer.context, method, surface.definitions | tables.definitions)
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
     vertices = np.zeros((3, 17), np.float32)
@@ -84,7 +83,7 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
     buffer = renderer.context.buffer(vertices.tobytes())
     uniforms: dict[str, Uniform] = {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,
-        "view_axis": (0.0, 0.0, 0.0), "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
+        "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
         "light_colour": np.ones((LIGHTS, 3), np.float32), "height_scale": 1.0,
     }  # fmt: skip
 

@@ -138,7 +138,7 @@ class Comparison:
         """Prepare a method's tables, and return whether it supports the surfaces."""
         self.progress(0, 0, f"preparing {method}")
         try:
-            self.renderer.prepared(method)
+            self.renderer.tables(method)
         except DiffractionError as error:
             if not leave_out:
                 raise
