@@ -45,7 +45,7 @@ SUN, IRRADIANCE = (0.45, 0.0, 0.893), 3.0
 #: Pixels along a side of the squares whose means are compared, which have less noise.
 BLOCK = 2
 #: Samples of the path tracer and of Cycles, frames of GLSL and samples of the page.
-SAMPLES, CYCLES, FRAMES, PAGE = 512, 768, 128, 128
+SAMPLES, CYCLES, FRAMES, PAGE = 512, 1536, 128, 128
 
 
 class Halves(NamedTuple):

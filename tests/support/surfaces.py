@@ -14,10 +14,10 @@ from tests.support.crossed import table as crossed_table
 from tests.support.directions import rough_patch
 from tests.support.orders import thin_grating
 
-#: µm; lobes of 2° are wide enough for few samples.
-WIDTH = 10.0
+#: µm; lobes of 3° are wide enough for few samples.
+WIDTH = 6.0
 #: Wider: the shaders read one efficiency for all wavelengths of a lobe of solved orders.
-SOLVED_WIDTH = 30.0
+SOLVED_WIDTH = 20.0
 _PHASE = 2.0 * np.pi * np.arange(128) / 16.0
 #: Asymmetric grooves without edges, which need few terms: period 1.5 µm.
 GROOVES = md.HeightField(
