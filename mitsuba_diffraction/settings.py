@@ -1,4 +1,4 @@
-"""Settings of a table, declared once: names, defaults, allowed values and help.
+"""Parameters, declared once: default, check, allowed values and help; the settings of a table.
 
 The builder, the plugin, recipes, the commands and the header of a table's file all read them here.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from .errors import DiffractionError, quoted
@@ -31,9 +31,47 @@ USUAL_WIDTH = 65.0
 MAX_COHERENCE_WIDTH = 500.0
 
 
-def _setting(default: Any, check: Callable[[Any], Any], help: str, must: str, **more: Any) -> Any:
-    """Declare a field; `check` returns the value in its type, or raises ValueError."""
-    return field(default=default, metadata={"check": check, "help": help, "must": must, **more})
+@dataclass(frozen=True)
+class Parameter:
+    """Parameter of a record, declared in its field.
+
+    Attributes
+    ----------
+    default : value where none is given.
+    check : function that returns a value in its type; raises ValueError, or a DiffractionError.
+    help : meaning of the parameter.
+    must : allowed values, for the error.
+    metavar : name of its value, or of each of several values; None without an option.
+    choices : allowed words, or None.
+    type : type of its value on a command line: int, float or str.
+    """
+
+    default: Any
+    check: Callable[[Any], Any]
+    help: str
+    must: str = ""
+    metavar: str | tuple[str, ...] | None = None
+    choices: tuple[str, ...] | None = None
+    type: type = float
+
+    @property
+    def default_text(self) -> str:
+        """Default in words."""
+        if self.default is None:
+            return "as many as the tolerance requires"
+        values = self.default if isinstance(self.default, tuple) else (self.default,)
+        return ":".join(v if isinstance(v, str) else f"{v:g}" for v in values)
+
+
+def parameter(default: Any, check: Callable[[Any], Any], help: str, *rest: Any, **more: Any) -> Any:
+    """Return the field of a record's class for a parameter; values as of `Parameter`."""
+    described = Parameter(default, check, help, *rest, **more)
+    return field(default=default, metadata={"parameter": described})
+
+
+def parameters_of(record: type) -> dict[str, Parameter]:
+    """Return the parameters of a record's class by name."""
+    return {item.name: item.metadata["parameter"] for item in fields(record)}
 
 
 def _number(value: Any) -> float:
@@ -69,16 +107,19 @@ def _between(low: float, high: float) -> Callable[[Any], float]:
     return check
 
 
-def _count(most: int) -> Callable[[Any], int | None]:
-    def check(value: Any) -> int | None:
-        if value is None:
-            return None
+def _count(most: int) -> Callable[[Any], int]:
+    def check(value: Any) -> int:
         number = _whole(value)
         if not 1 <= number <= most:
             raise ValueError
         return number
 
     return check
+
+
+def _or(word: str | None, check: Callable[[Any], Any], *also: None) -> Callable[[Any], Any]:
+    """Return a check that also allows a word, or None, and what is the same as the word."""
+    return lambda value: word if value in (word, *also) else check(value)
 
 
 def _pair(value: Any) -> tuple[float, float]:
@@ -93,28 +134,10 @@ def _wavelengths(value: Any) -> tuple[float, float]:
     return low, high
 
 
-def _half_axes(value: Any) -> tuple[float, float] | None:
-    if value is None:
-        return None
+def _half_axes(value: Any) -> tuple[float, float]:
     x, y = (value, value) if isinstance(value, (str, numbers.Real)) else value
     positive = _between(0.0, math.inf)
     return positive(x), positive(y)
-
-
-def _width(value: Any) -> str | float:
-    return "auto" if value == "auto" else _between(0.0, MAX_COHERENCE_WIDTH)(value)
-
-
-def _window_width(value: Any) -> float | None:
-    return None if value is None else _between(0.0, MAX_COHERENCE_WIDTH)(value)
-
-
-def _taper_width(value: Any) -> float | None:
-    return None if value is None else _between(0.0, math.inf)(value)
-
-
-def _windows(value: Any) -> str | float:
-    return "auto" if value in (None, "auto") else _between(0.0, math.inf)(value)
 
 
 def _choices(*names: str) -> dict[str, Any]:
@@ -151,56 +174,58 @@ class TableSettings:
         so that light has the lobe of that window. Tables have it; users do not give it.
     """
 
-    coherence_width: str | float = _setting(
-        "auto", _width, "coherence width, µm, 4σ of its window; auto is 65",
+    coherence_width: str | float = parameter(
+        "auto", _or("auto", _between(0.0, MAX_COHERENCE_WIDTH)),
+        "coherence width, µm, 4σ of its window; auto is 65",
         f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
         metavar="auto|W", type=str,
     )  # fmt: skip
-    coherence: str = _setting(
+    coherence: str = parameter(
         "ensemble", help="average over window positions, or one window on the patch",
         **_choices(*COHERENCES),
     )  # fmt: skip
-    basis: str = _setting("auto", help="series in κ; auto is svd", **_choices(*BASES, "auto"))
-    tolerance: float = _setting(
-        1e-3, lambda value: _between(math.nextafter(1e-6, 0), math.nextafter(1.0, 0.0))(value),
-        "relative error that is met", "between 1e-6 (single precision) and 1 (1e-3 is usual)",
-        metavar="E",
+    basis: str = parameter("auto", help="series in κ; auto is svd", **_choices(*BASES, "auto"))
+    tolerance: float = parameter(
+        1e-3, _between(math.nextafter(1e-6, 0), math.nextafter(1.0, 0.0)),
+        "relative error that is met", "between 1e-6 (single precision) and 1 (1e-3 is usual)", "E",
     )  # fmt: skip
-    terms: int | None = _setting(
-        None, _count(MAX_TERMS), "terms of the series", f"a whole number from 1 to {MAX_TERMS}",
-        metavar="N",
+    terms: int | None = parameter(
+        None, _or(None, _count(MAX_TERMS)), "terms of the series",
+        f"a whole number from 1 to {MAX_TERMS}", "N", type=int,
     )  # fmt: skip
-    taps: int | None = _setting(
-        None, _count(MAX_TAPS), "orders read in each direction",
-        f"a whole number from 1 to {MAX_TAPS}", metavar="N",
+    taps: int | None = parameter(
+        None, _or(None, _count(MAX_TAPS)), "orders read in each direction",
+        f"a whole number from 1 to {MAX_TAPS}", "N", type=int,
     )  # fmt: skip
-    wavelength_range: tuple[float, float] = _setting(
+    wavelength_range: tuple[float, float] = parameter(
         (360.0, 830.0), _wavelengths, "nm",
-        "two rising wavelengths in nm, between 10 and 100000", metavar=("FIRST", "LAST"),
+        "two rising wavelengths in nm, between 10 and 100000", ("FIRST", "LAST"),
     )  # fmt: skip
-    height_scale_max: float = _setting(
+    height_scale_max: float = parameter(
         1.5, _between(0.0, MAX_HEIGHT_SCALE), "largest height_scale that the table serves",
-        f"a positive factor, at most {MAX_HEIGHT_SCALE:g}", metavar="S",
+        f"a positive factor, at most {MAX_HEIGHT_SCALE:g}", "S",
     )  # fmt: skip
-    frequency_limit: tuple[float, float] | None = _setting(
-        None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
-    )
-    windows: str | float = _setting(
-        "auto", _windows, "width of the windows of a scan, µm; auto: the smaller side up to 32 µm, "
-        "or half the side", "auto, or a positive number of µm",
-        metavar="auto|W", type=str,
+    frequency_limit: tuple[float, float] | None = parameter(
+        None, _or(None, _half_axes), "largest spatial frequency",
+        "a positive number, or two, in rad/µm",
     )  # fmt: skip
-    window_width: float | None = _setting(
-        None, _window_width, "µm, 4σ of the window of all orders but 0",
-        "a positive number of µm, at most coherence_width", metavar="W", type=float,
+    windows: str | float = parameter(
+        "auto", _or("auto", _between(0.0, math.inf), None), "width of the windows of a scan, µm; "
+        "auto: the smaller side up to 32 µm, or half the side", "auto, or a positive number of µm",
+        "auto|W", type=str,
     )  # fmt: skip
-    taper_width: float | None = _setting(
-        None, _taper_width, "µm, 4σ of the lobes that orders of a scan have",
-        "a positive number of µm, above window_width", metavar="W", type=float,
+    window_width: float | None = parameter(
+        None, _or(None, _between(0.0, MAX_COHERENCE_WIDTH)),
+        "µm, 4σ of the window of all orders but 0",
+        "a positive number of µm, at most coherence_width", "W",
+    )  # fmt: skip
+    taper_width: float | None = parameter(
+        None, _or(None, _between(0.0, math.inf)), "µm, 4σ of the lobes that orders of a scan have",
+        "a positive number of µm, above window_width", "W",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name in _BY_NAME:
+        for name in SETTINGS:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
         if self.window_width is not None and not self.window_width < self.light_width:
             object.__setattr__(self, "window_width", None)
@@ -229,11 +254,12 @@ class TableSettings:
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings by name, except None."""
-        values = ((name, getattr(self, name)) for name in _BY_NAME)
+        values = ((name, getattr(self, name)) for name in SETTINGS)
         return {name: value for name, value in values if value is not None}
 
 
-_BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
+#: Parameters of `TableSettings` by name.
+SETTINGS = parameters_of(TableSettings)
 
 #: Settings that scenes and recipes may give.
 SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
@@ -245,42 +271,9 @@ def checked(name: str, value: Any) -> Any:
 
     Raises a DiffractionError if it is not allowed.
     """
-    described = _BY_NAME[name].metadata
+    described = SETTINGS[name]
     try:
-        return described["check"](value)
+        return described.check(value)
     except (TypeError, ValueError, OverflowError):
         shown = f"{value:g}" if isinstance(value, float) else quoted(value)
-        raise DiffractionError(f"{name}={shown} must be {described['must']}") from None
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Description of a field of `TableSettings` for help texts.
-
-    Attributes
-    ----------
-    help, default_text : meaning of the setting, and its default in words.
-    choices : allowed words, or None.
-    metavar : name of its value, or of each of several values.
-    type : type of its value: int, float or str.
-    """
-
-    help: str
-    default_text: str
-    choices: tuple[str, ...] | None
-    metavar: str | tuple[str, ...] | None
-    type: type
-
-
-def described_setting(name: str) -> Setting:
-    """Describe the field of this name."""
-    default, described = _BY_NAME[name].default, _BY_NAME[name].metadata
-    values = default if isinstance(default, tuple) else (default,)
-    text = ":".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
-    return Setting(
-        help=described["help"],
-        default_text=text or described.get("text", "as many as the tolerance requires"),
-        choices=described.get("choices"),
-        metavar=described.get("metavar"),
-        type=described.get("type", int if default is None else float),
-    )
+        raise DiffractionError(f"{name}={shown} must be {described.must}") from None

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
+from ..heights.read import OPTIONS, LoadOptions
 from ..optics.display import VIEWS
-from ..settings import TableSettings, checked, described_setting
+from ..settings import SETTINGS, TableSettings, checked
 from .report import Figures
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
-    from ..heights.read import LoadOptions
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
@@ -44,32 +44,8 @@ LIMITS = (
 #: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
-#: Options for reading heights: the name of the value, and help.
-HEIGHTS: dict[str, tuple[str, str]] = {
-    "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
-    "max_height": (
-        "H",
-        "µm, height of white in an image; other heights are scaled to span it from end to end",
-    ),
-    "height_unit": ("U", "unit of the numbers in the file, e.g. nm; overrides what it states"),
-    "channel": ("C", "name or index of the channel; default: the heights"),
-    "crop": (
-        "W[,H[,X,Y]]",
-        "size of the region to keep, µm, central or with the lower left corner X, Y; default: all",
-    ),
-    "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
-    "level": (
-        "METHOD",
-        "surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then a plane) or "
-        "none; default: plane if a tilt shows",
-    ),
-    "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
-    "periodic": (
-        "METHOD",
-        "edges: exact, whole periods of a surface that repeats; open, part of a larger surface; "
-        "default: open, of a file",
-    ),
-}
+#: Names of the options for reading heights.
+HEIGHTS = tuple(OPTIONS)
 #: Settings of a table.
 TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
@@ -295,7 +271,7 @@ def refuse(
 
 def heights() -> Group:
     """Return the options for reading a file of heights; `load_options` checks their values."""
-    rows = ((f"{_option(name)} {metavar}", text) for name, (metavar, text) in HEIGHTS.items())
+    rows = ((f"{_option(name)} {each.metavar}", each.help) for name, each in OPTIONS.items())
     return Group("reading heights", tuple(rows))
 
 
@@ -304,9 +280,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
 
     Raises a DiffractionError if a value does not fit.
     """
-    from ..heights.read import LoadOptions
-
-    return LoadOptions.parse(**{name: getattr(args, name) for name in HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in OPTIONS})
 
 
 def files(kinds: str, nargs: str = "+") -> Row:
@@ -318,7 +292,7 @@ def files(kinds: str, nargs: str = "+") -> Row:
 def table(names: Sequence[str] = TABLE, **defaults: str) -> Iterator[Row]:
     """Yield rows of a table's settings. defaults: texts for the help in place of the defaults."""
     for name in names:
-        item = described_setting(name)
+        item = SETTINGS[name]
         kind: Any = item.choices or (whole_number(1) if item.type is int else item.type)
         values = (item.metavar,) if isinstance(item.metavar, str) else ()
         if isinstance(item.metavar, tuple):

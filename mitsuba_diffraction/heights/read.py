@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import numbers
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from ..errors import DiffractionError, warn
 from ..files import FileKind, beginning, kind_of, readable_file
 from ..retired import retired_value
+from ..settings import parameter, parameters_of
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
@@ -44,38 +44,6 @@ LEVELS = {
 #: Statements about the edges of a patch: whole periods of a surface that repeats, or a part of a
 #: larger surface.
 PERIODICS = ("exact", "open")
-
-
-@dataclass(frozen=True)
-class LoadOptions:
-    """Checked parameters of `HeightField.load`; `None` means the file's value, or the default."""
-
-    pixel_size: tuple[float, float] | None = None
-    max_height: float | None = None
-    height_unit: str | None = None
-    channel: str | int | None = None
-    crop: tuple[float, ...] | None = None
-    fill: str | None = None
-    level: str | None = None
-    clip: float | None = None
-    periodic: str | None = None
-
-    @classmethod
-    def parse(cls, **options: Any) -> LoadOptions:
-        """Check options as users write them (see `load.load`) and convert their types.
-
-        Raises a DiffractionError if a value is not valid; the message names the parameter and the
-        choices.
-        """
-        return cls(**{name: _CHECKS[name](value) for name, value in options.items()})
-
-    def updated(self, other: LoadOptions) -> LoadOptions:
-        """Return these options, replaced by those that `other` sets."""
-        return replace(self, **other.specified())
-
-    def specified(self) -> dict[str, Any]:
-        """Return the options that are set, by name."""
-        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 def _channel(value: object) -> str | int | None:
@@ -115,17 +83,66 @@ def _sigmas(value: object) -> float | None:
     return sigmas[0]
 
 
-_CHECKS: dict[str, Callable[[Any], Any]] = {
-    "pixel_size": pixel_size_of,
-    "max_height": height_of,
-    "height_unit": height_unit_of,
-    "channel": _channel,
-    "crop": crop_of,
-    "fill": partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
-    "level": partial(_choice, name="level", choices=("none", *LEVELS)),
-    "clip": _sigmas,
-    "periodic": _periodic,
-}
+@dataclass(frozen=True)
+class LoadOptions:
+    """Checked parameters of `HeightField.load`; `None` means the file's value, or the default."""
+
+    pixel_size: tuple[float, float] | None = parameter(
+        None, pixel_size_of, "µm between samples; overrides what the file states",
+        metavar="DX[,DY]",
+    )  # fmt: skip
+    max_height: float | None = parameter(
+        None, height_of, "µm, height of white in an image; other heights are scaled to span it "
+        "from end to end", metavar="H",
+    )  # fmt: skip
+    height_unit: str | None = parameter(
+        None, height_unit_of, "unit of the numbers in the file, e.g. nm; overrides what it states",
+        metavar="U",
+    )  # fmt: skip
+    channel: str | int | None = parameter(
+        None, _channel, "name or index of the channel; default: the heights", metavar="C"
+    )
+    crop: tuple[float, ...] | None = parameter(
+        None, crop_of, "size of the region to keep, µm, central or with the lower left corner X, "
+        "Y; default: all", metavar="W[,H[,X,Y]]",
+    )  # fmt: skip
+    fill: str | None = parameter(
+        None, partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
+        "points without data: nearest or harmonic; default: refuse them", metavar="METHOD",
+    )  # fmt: skip
+    level: str | None = parameter(
+        None, partial(_choice, name="level", choices=("none", *LEVELS)),
+        "surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then a plane) or "
+        "none; default: plane if a tilt shows", metavar="METHOD",
+    )  # fmt: skip
+    clip: float | None = parameter(
+        None, _sigmas, "clip heights beyond N robust standard deviations (dust)", metavar="N"
+    )
+    periodic: str | None = parameter(
+        None, _periodic, "edges: exact, whole periods of a surface that repeats; open, part of a "
+        "larger surface; default: open, of a file", metavar="METHOD",
+    )  # fmt: skip
+
+    @classmethod
+    def parse(cls, **options: Any) -> LoadOptions:
+        """Check options as users write them (see `load.load`) and convert their types.
+
+        Raises a DiffractionError if a value is not valid; the message names the parameter and the
+        choices.
+        """
+        return cls(**{name: OPTIONS[name].check(value) for name, value in options.items()})
+
+    def updated(self, other: LoadOptions) -> LoadOptions:
+        """Return these options, replaced by those that `other` sets."""
+        return replace(self, **other.specified())
+
+    def specified(self) -> dict[str, Any]:
+        """Return the options that are set, by name."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+#: Parameters of `LoadOptions` by name.
+OPTIONS = parameters_of(LoadOptions)
 
 _READERS = {FileKind.IMAGE: read_image, FileKind.NPY: read_npy, FileKind.TEXT: read_text}
 

@@ -21,7 +21,7 @@ SHADOWINGS = ("none", "vcavity")
 #: Least |w|: where n cosθt and cosθi are alike the power of an order other than 0 over w² has a
 #: limit, which single precision loses in the difference of all orders and order 0.
 _LEAST_W = 0.01
-#: Sums of directions that tables reach, in units of k.
+#: Sums of directions on the surface, in units of k, that tables reach at any stretch.
 _FARTHEST = 2.0 - 1e-5
 
 
@@ -213,7 +213,7 @@ class PairWithin(PairBelow):
     @property
     def reached(self) -> Mask:
         """Whether tables hold these frequencies."""
-        return dr.squared_norm(self.uv) < _FARTHEST**2
+        return dr.squared_norm(self.uv) < dr.square(_FARTHEST * self.frame.stretch)
 
     def visible(self, sigma_0: Float, k: Float) -> Float:
         """See `Pair.visible`: within the cone of the critical angle, or between it and horizon."""
@@ -267,7 +267,7 @@ class PairThrough:
         self.q0, self.q = self.above.z, -n * self.inside.z
         total = frame.to_table(self.above + n * self.inside)
         w = self.q - self.q0
-        reached = dr.squared_norm(total) < _FARTHEST**2
+        reached = dr.squared_norm(total) < dr.square(_FARTHEST * frame.stretch)
         self.active = active & reached
         self.place = TablePoint(
             dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0),

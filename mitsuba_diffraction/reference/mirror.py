@@ -1,9 +1,6 @@
-"""A mirror's lobe at the horizon, and its equations, the judge of the fits of `optics.mirror`.
+"""A mirror's lobe at the horizon, and the equation of C, the judge of its fit in `optics.mirror`.
 
-C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1, and then, with p(Y|X) the integrand and
-cosθm = cosθh − (h(X_i) + h(X_o))/√(kσ₀),
-
-    ∫ p(Y|X) exp(−X/2 − Y/2 + h(X) + h(Y)) dY = exp(−X).
+C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1.
 """
 
 from __future__ import annotations
@@ -20,24 +17,20 @@ from ..optics.geometry import wavenumber
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Nodes of X up to _REACH, beyond which C is 1 and h is 0; steps of the iterations
+# Nodes of X up to _REACH, beyond which C is 1; steps of the iteration
 _NODES, _REACH, _STEPS = 600, 8.0, 200
 
 
 @cache
-def solution() -> tuple[Real, Real, Real]:
-    """Return X, C and h, (n,): the fixed points, by the geometric mean of two steps."""
+def solution() -> tuple[Real, Real]:
+    """Return X and C, (n,): the fixed point, by the geometric mean of two steps."""
     x = (np.arange(_NODES) + 0.5) * _REACH / _NODES
     kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4) / np.sqrt(np.pi) * x * _REACH / _NODES
     inside = x < _REACH - 1.0  # the rest misses what lies beyond _REACH
-    c, falls = np.ones_like(x), np.exp(-x)
+    c = np.ones_like(x)
     for _ in range(_STEPS):
         c = np.where(inside, np.sqrt(c / (kernel @ c)), 1.0)
-    density, root = c[:, None] * kernel * c, np.sqrt(falls)
-    g = root
-    for _ in range(_STEPS):
-        g = np.where(inside, np.sqrt(g * falls / (density @ g)), root)
-    return x, c, np.log(g / root)
+    return x, c
 
 
 def horizon_correction(light: Any, sigma: float) -> Real:

@@ -18,7 +18,8 @@ from mitsuba_diffraction.reference import mirror as judge
 WAVENUMBER = 2e3 * np.pi / 550.0
 #: Widths of windows in µm at 550 nm, as kσ₀.
 SHARPNESS = [2e3 * np.pi / 550.0 * width / 4.0 for width in (6.4, 12.0, 65.0)]
-INDICES = {"perfect": None, "Al": 0.96 + 6.69j, "Au": 0.43 + 2.4j, "glass": 1.5, "water": 1.33}
+INDICES = {"perfect": None, "Al": 0.96 + 6.69j, "Au": 0.43 + 2.4j, "own": 2.2 + 1.5j}
+INDICES |= {"glass": 1.5, "water": 1.33, "diamond": 2.42}
 
 
 def albedo(sharp: float, degrees: float, index: complex | None) -> float:
@@ -42,24 +43,18 @@ def albedo(sharp: float, degrees: float, index: complex | None) -> float:
     return float(lobe.sum() * (last - first) * 2.0 * half / nodes**2)
 
 
-def test_the_fits_are_those_of_the_fixed_points():
-    x, c, h = judge.solution()
-    far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 and h = 0 at the other end
+def test_the_fit_is_that_of_the_fixed_point():
+    x, c = judge.solution()
+    far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 at the other end
     fitted = horizon_correction(x**2, far, one)
     assert np.abs(fitted / c - 1.0).max() < 0.001
-    there = x < 10.0  # X = 20 cosθ
-    shift = 0.5 - mirror_cosine(0.5, x[there] / 20.0, far[there], np.float64(400.0))
-    assert np.abs(20.0 * shift - h[there]).max() < 0.01
 
 
 def test_the_solution_is_a_fixed_point():
-    x, c, h = judge.solution()
+    x, c = judge.solution()
     kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4.0) / np.sqrt(np.pi) * x * (x[1] - x[0])
-    inside, root = x < 6.0, np.exp(h - x / 2.0)
-    # convergence of the iterations
-    np.testing.assert_allclose((c * (kernel @ c))[inside], 1.0, 1e-6)
-    mean = c * root * (kernel @ (c * root))
-    np.testing.assert_allclose(mean[inside], np.exp(-x)[inside], 1e-6)
+    # convergence of the iteration
+    np.testing.assert_allclose((c * (kernel @ c))[x < 6.0], 1.0, 1e-6)
 
 
 @pytest.mark.parametrize("name", INDICES)
@@ -69,9 +64,9 @@ def test_a_flat_mirror_reflects_what_fresnel_says(name, sharp):
     for degrees in (0.0, 30.0, 60.0, 70.0, 80.0, 85.0, 88.0):
         flat = 1.0 if index is None else float(reflectance(np.cos(np.radians(degrees)), index))
         ratio = albedo(sharp, degrees, index) / flat
-        # h is that of one steepness of R: 3 % of the mean over the lobe where others bend
-        assert 1.0 - (0.10 if degrees > 85.0 else 0.03) < ratio < 1.03
-        assert ratio * flat < 1.006  # never more than is received, but for C's fit
+        # the fit of h: no h is right for all shapes of R within a lobe
+        assert 1.0 - (0.10 if degrees > 85.0 else 0.03) < ratio < 1.012
+        assert ratio * flat < 1.004  # never more than is received, but for C of a straight horizon
 
 
 def test_the_lobe_is_reciprocal_and_that_of_fresnel_in_the_mirror_direction():

@@ -74,6 +74,29 @@ def test_light_that_goes_through_is_the_reference_s(some_variant):
     assert error.sum() < 1e-3 * exact.sum()
 
 
+def test_steep_light_within_is_that_of_stretched_heights(mono):
+    """Sums of directions reach further than tables do, whatever the factor."""
+    factor, rng = 0.65, np.random.default_rng(5)
+    patch = md.HeightField(0.1 * rng.random((12, 12)), 0.1, periodic=True)
+    parameters = {"plugin": "diffraction_dielectric", "int_ior": 2.5, "ext_ior": 1.0}
+    parameters |= {"energy_conserving": False, "model": "kirchhoff"}
+    given, made = (
+        mi.load_dict(md.bsdf_dict(heights, **parameters, **more))
+        for heights, more in (
+            (patch, {"lateral_scale": factor, "coherence_width": 1.2}),
+            (patch.stretched(factor), {"coherence_width": 1.2 * factor}),
+        )
+    )
+    wi, wo = rng.standard_normal((2, 500, 3)) * (1.0, 1.0, 0.5)
+    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
+    wi[:, 2] = -np.abs(wi[:, 2])
+    sums = 2.5 * np.linalg.norm((wi + wo)[wo[:, 2] < 0.0][:, :2], axis=1)
+    assert np.sum((sums > 2.0) & (sums < 2.0 / factor)) > 20
+    values = [evaluated(bsdf, wi, wo, 550.0) for bsdf in (given, made)]
+    # both tables have a relative error of 1e-3 of the mean power
+    np.testing.assert_allclose(*values, rtol=0.02, atol=2e-3 * values[1].max())
+
+
 def test_values_at_each_place_are_the_reference_s_of_its_factor(mono):
     varying = load(lateral_scale=bitmap())
     for factor, uv in zip(FACTORS.ravel(), UV, strict=True):

@@ -15,7 +15,7 @@ from types import ModuleType
 import mitsuba_diffraction as md
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli.main import build_parser
-from mitsuba_diffraction.cli.options import HEIGHTS
+from mitsuba_diffraction.heights.read import OPTIONS
 
 from . import pages
 
@@ -49,8 +49,8 @@ def commands_page() -> str:
         ]
         sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
     rows = [
-        (f"`--{name.replace('_', '-')} {value}`", _cell(text))
-        for name, (value, text) in HEIGHTS.items()
+        (f"`--{name.replace('_', '-')} {each.metavar}`", _cell(each.help))
+        for name, each in OPTIONS.items()
     ]
     sections += [
         "## Options for reading heights",

@@ -69,11 +69,11 @@ def lobe(degrees: float, width: float) -> tuple[Array, Array]:
 
 
 def check(found: Array, name: str, noise: Array | float = 0.0) -> None:
-    """Within 3 % of Fresnel, and 10 % at 88°; never more by more than the noise and 3 %."""
+    """Within 3 % of Fresnel, and 10 % at 88°; not above but for the fits of `optics.mirror`."""
     ratio = found / expected(*MIRRORS[name][1:])
     least = np.where(np.array(ANGLES) > 85.0, 0.90, 0.97)
     assert np.all(ratio > least - noise), ratio
-    assert np.all(ratio < 1.03 + noise), ratio
+    assert np.all(ratio < 1.012 + noise), ratio
 
 
 @pytest.mark.parametrize("width", WIDTHS)
