@@ -15,22 +15,26 @@ All of them follow these rules:
 
 Exports of spectrometers (Ocean Optics, SpectraSuite, JAZ, Avantes, StellarNet, ProcSpec's text)
 follow them. Their columns of raw counts are left out where a processed one is beside them.
+
+`save_rows` and `save_numbers` write the CSV files of the package.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .errors import DiffractionError, quoted
+from .atomic import atomic_path
+from .errors import DiffractionError, printable, quoted
 from .files import readable_file
 from .limits import LARGEST_LISTING, bounded_lines
 
@@ -50,6 +54,8 @@ _UNIT = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")
 _END = ">>>>>"
 # Units that a name may end in without brackets.
 _LENGTHS = {*WAVELENGTH_UNITS, "pm", "mm"} - {"a", "m"}
+# First characters of formulas.
+_FORMULAS = ("=", "+", "-", "@", "\t")
 # Columns of raw counts in exports of JAZ, Avantes and others.
 _RAW = {"w", "d", "r", "s", "dark", "ref", "reference", "sample", "scope", "raw"}
 
@@ -349,3 +355,46 @@ def _without_empty(
         tuple(names[start:stop]), tuple(units[start:stop]), numbers[:, start:stop],
         np.array(places, np.int64), header, kept, shown,
     )  # fmt: skip
+
+
+def save_rows(
+    path: Path, names: Sequence[str], rows: Iterable[Mapping[str, Any]], digits: int = 17
+) -> None:
+    """Write rows as CSV with these columns; values that a row lacks, and NaN, are empty.
+
+    Raises a DiffractionError if the file cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: _cell(v, digits) for k, v in row.items()} for row in rows)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), "utf-8")
+
+
+def _cell(value: Any, digits: int) -> Any:
+    """Return a cell; a text that a spreadsheet would take for a formula begins with an apostrophe.
+
+    Names of files come from anywhere, and programs of spreadsheets run what formulas say.
+    """
+    if isinstance(value, float):
+        return "" if not math.isfinite(value) else f"{value:.{digits}g}" if digits < 17 else value
+    if not isinstance(value, str):
+        return value
+    text = printable(value)  # the line end of a name is not the row's
+    return f"'{text}" if text.startswith(_FORMULAS) else text
+
+
+def save_numbers(
+    path: Path, names: Sequence[str], rows: ArrayLike, digits: str | Sequence[str] = "%.7g"
+) -> None:
+    """Write numbers (n, columns) as CSV.
+
+    digits : format of all columns, or of each.
+
+    Raises a DiffractionError if the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        np.savetxt(
+            temporary, rows, digits, ",", header=",".join(names), comments="", encoding="utf-8"
+        )

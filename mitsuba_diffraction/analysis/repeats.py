@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ..columns import save_rows
 from ..errors import DiffractionError
 from ..scene.parameters import note_files
 from .iridescence import HUES
-from .survey_files import write_table
 
 #: How repeated scans are told: by names that differ in their last number, or by folders.
 REPEATS = ("name", "folder")
@@ -83,7 +83,7 @@ def write_repeats(path: Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[st
     averaged = [_averaged(sample, scans) for sample, scans in samples.items()]
     columns = [f"{name}{end}" for name in AVERAGED for end in ("", "_se")]
     names = ["sample", "scans", "failed", *columns]
-    write_table(path, names, averaged)
+    save_rows(path, names, averaged)
     return averaged
 
 

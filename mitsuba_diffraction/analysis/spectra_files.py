@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..columns import save_numbers, save_rows
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, luminance_contrasts, noises, quantum_catches
 from .spectra import Reals, Spectra
 from .spectral_variables import colours_of, daylit
-from .survey_files import write_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,7 +85,7 @@ def save_colours(groups: Groups, path: Any) -> None:
         for name, row in zip(each.names(group), colours_of(each), strict=True)
     ]
     columns = ("spectrum", "srgb", "hue", "chroma", "B1", "B2", "B3", "S8", "H1", "FWHM")
-    write_table(path, columns, rows)
+    save_rows(path, columns, rows)
 
 
 def save_angular(groups: Groups, path: Any) -> None:
@@ -95,7 +95,7 @@ def save_angular(groups: Groups, path: Any) -> None:
         for group, each in groups.items()
         for number, row in enumerate(each.angular, 1)
     ]
-    write_table(path, ("group", "scan", *VARIABLES), rows)
+    save_rows(path, ("group", "scan", *VARIABLES), rows)
 
 
 def save_catches(
@@ -110,26 +110,22 @@ def save_catches(
         [quantum_catches(eye, each.wavelength, each.value, illuminant) for each in groups.values()]
     )
     rows = [
-        {"spectrum": name, **{r: f"{q:.6g}" for r, q in zip(eye.names, row, strict=True)}}
-        for name, row in zip(names, catches, strict=True)
+        {"spectrum": name, **dict(zip(eye.names, row, strict=True))}
+        for name, row in zip(names, catches.tolist(), strict=True)
     ]
-    write_table(catches_path, ("spectrum", *eye.names), rows)
+    save_rows(catches_path, ("spectrum", *eye.names), rows, digits=6)
     distances, steps = contrasts(catches, noises(eye)), luminance_contrasts(eye, catches)
     columns = ("patch1", "patch2", "dS", "dL")
     pairs = [
-        dict(zip(columns, (names[i], names[j], f"{distances[i, j]:.6g}", f"{steps[i, j]:.6g}"),
-                 strict=True))
+        dict(zip(columns, (names[i], names[j], distances[i, j], steps[i, j]), strict=True))
         for i, j in itertools.combinations(range(len(names)), 2)
-    ]  # fmt: skip
-    write_table(contrasts_path, columns, pairs)
+    ]
+    save_rows(contrasts_path, columns, pairs, digits=6)
 
 
 def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
-    rows = [
-        {"wl": f"{lam:g}", **{name: f"{100.0 * each[n]:.6g}" for name, each in columns.items()}}
-        for n, lam in enumerate(wavelength)
-    ]
-    write_table(Path(path), ["wl", *columns], rows)
+    rows = np.column_stack([wavelength, *(100.0 * each for each in columns.values())])
+    save_numbers(Path(path), ["wl", *columns], rows, "%.6g")
 
 
 def colour_of(spectra: Spectra) -> Reals:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from ..atomic import atomic_path
-from ..errors import printable
+from ..columns import save_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,8 +19,6 @@ FILES = {".exr": "table", ".png": "map"}
 # Columns that are texts, and those that contact sheets and summaries need.
 _TEXTS = ("reason", "warnings", "surface", "tiling", "ranked_among", *FILES.values())
 _NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light", "tiling")
-# First characters of formulas.
-_FORMULAS = ("=", "+", "-", "@", "\t")
 _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
@@ -39,29 +35,8 @@ def write_rows(
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     first = ("file", "sample", "reason")
     names = [*first, *(name for name in columns if name not in first)]
-    write_table(path, names, rows)
+    save_rows(path, names, rows)
     return rows
-
-
-def write_table(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV with these columns; values that a row lacks are empty."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: _cell(v) for k, v in row.items()} for row in rows)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
-
-
-def _cell(value: Any) -> Any:
-    """Return a cell; a text that a spreadsheet would take for a formula begins with an apostrophe.
-
-    Names of files come from anywhere, and programs of spreadsheets run what formulas say.
-    """
-    if not isinstance(value, str):
-        return value
-    text = printable(value)  # the line end of a name is not the row's
-    return f"'{text}" if text.startswith(_FORMULAS) else text
 
 
 def is_row(row: object) -> TypeGuard[dict[str, Any]]:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..columns import save_numbers
 from . import options
 from .console import Bar
 from .report import Figures, check_outputs, output_name, save_figure
@@ -39,7 +40,6 @@ def run(args: argparse.Namespace) -> Figures:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from ..atomic import atomic_path
     from ..heights.scatter import abg_model, power_spectrum, rayleigh_rice_scatter
     from ..settings import TableSettings
     from ..tables.build.build import build_with
@@ -60,11 +60,8 @@ def run(args: argparse.Namespace) -> Figures:
             "tis_table": 1.0 - float(order_0_power(table, kappa)),
             **model._asdict(),
         })  # fmt: skip
-    with atomic_path(output) as temporary:
-        np.savetxt(
-            temporary, np.column_stack([spectrum.frequency, spectrum.density]), "%.7g", ",",
-            header="frequency_per_um,psd_um4", comments="", encoding="utf-8",
-        )  # fmt: skip
+    numbers = np.column_stack([spectrum.frequency, spectrum.density])
+    save_numbers(output, ("frequency_per_um", "psd_um4"), numbers)
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.loglog(spectrum.frequency, spectrum.density, label="heights")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import warnings
 from pathlib import Path
 from typing import Any
 
+from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
 from ..scene.load import set_variant
 from . import options
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> Figures:
         title=f"{patch.name}: {args.kind}{where}", exposure=exposure,
     )  # fmt: skip
     save_figure(output, sheet)
-    _save(numbers, result)
+    save_rows(numbers, _COLUMNS, map(_row, result.steps), digits=6)
     print(f"{output}, {numbers}: {elapsed(args):.1f} s")
     for line in [*_lines(result), *compiled]:
         print(f"  {line}")
@@ -147,19 +147,6 @@ def _lines(result: Any) -> list[str]:
             )
         lines.append(text)
     return lines
-
-
-def _save(path: Path, result: Any) -> None:
-    from ..atomic import atomic_path
-
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream)
-        writer.writerow(_COLUMNS)
-        for value, *numbers in (_row(step).values() for step in result.steps):
-            writer.writerow([value, *(f"{n:.6g}" if math.isfinite(n) else "" for n in numbers)])
 
 
 def _row(step: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.io import netcdf_file
 
 from ..atomic import atomic_path
+from ..columns import save_numbers
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
@@ -60,11 +61,7 @@ class Listing(NamedTuple):
             self._save_netcdf(Path(path))
             return
         numbers = ["%d" if name.startswith("order") else "%.7g" for name in self.columns[3:]]
-        with atomic_path(Path(path)) as temporary:
-            np.savetxt(
-                temporary, self.rows, ["%.9g", "%.9g", "%.9g", *numbers], ",",
-                header=",".join(self.columns), comments="", encoding="utf-8",
-            )  # fmt: skip
+        save_numbers(Path(path), self.columns, self.rows, ["%.9g", "%.9g", "%.9g", *numbers])
 
     def _save_netcdf(self, path: Path) -> None:
         """Write the numbers over wavelength, theta, phi and order; NaN where none propagates."""

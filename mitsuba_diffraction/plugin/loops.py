@@ -1,4 +1,4 @@
-"""Sums in loops inside a Dr.Jit kernel, which derivatives pass in both directions."""
+"""Loops and branches inside a Dr.Jit kernel, which derivatives pass in both directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from .types import Index
+from .types import Index, Mask
 
 
 def sum_of(
@@ -28,3 +28,18 @@ def sum_of(
         lambda n, inputs, total: (n + 1, inputs, add(n, inputs, total)),
         max_iterations=-1,
     )[2]
+
+
+def only_in(lanes: Mask, value: Callable[[], Any]) -> Any:
+    """Return a value in some lanes, and zero in all others.
+
+    Vectors without such a lane skip its operations, but for values that have derivatives: Dr.Jit
+    fails at derivatives of loops in a branch.
+
+    value : called once or twice.
+    """
+    plain = value()
+    nothing = dr.zeros(type(plain))
+    if not dr.is_jit_v(lanes) or dr.grad_enabled(plain):
+        return dr.select(lanes, plain, nothing)
+    return dr.if_stmt((), lanes, value, lambda: nothing)

@@ -18,6 +18,7 @@ from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
+from .loops import only_in
 from .materials import Material, tinted
 from .power import power_model
 from .properties import flag
@@ -169,9 +170,13 @@ class DiffractingSurface(SurfaceBSDF):
         zeroth : ⟨|P_0|²⟩ / (4π²σ⁴ λ²), per channel.
         """
         width = self.table.sigma_0 * pair.frame.stretch
-        factor = boundary.mirror(pair, site.wavenumbers, width, indices, ctx.mode)
         level = zeroth * (self.area_factor * pair.frame.area * pair.outer.cos_o)
-        return dr.select(active, tinted(mi.Spectrum(level) * factor, boundary.material), 0.0)
+
+        def reflected() -> Spectrum:
+            factor = boundary.mirror(pair, site.wavenumbers, width, indices, ctx.mode)
+            return tinted(mi.Spectrum(level) * factor, boundary.material)
+
+        return only_in(active & dr.any(level != 0.0), reflected)  # the lobe is narrow
 
     def face(
         self, ctx: Context, site: Site, pair: Pair, mirror: Boundary, active: Mask

@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.analysis.survey import _stored_row
-from mitsuba_diffraction.analysis.survey_files import write_sheets, write_table
+from mitsuba_diffraction.analysis.survey_files import write_sheets
+from mitsuba_diffraction.columns import save_rows
 
 JOB = SimpleNamespace(key="0" * 32)
 ROW = {
@@ -78,7 +79,7 @@ def test_a_map_that_is_a_link_or_no_picture_is_measured_again(scans, tmp_path):
 
 @pytest.mark.parametrize("text", ["=cmd()", "+1", "-a.npy", "@x", "\tx"])
 def test_no_cell_begins_a_formula(tmp_path, text):
-    write_table(tmp_path / "a.csv", ["file", "number"], [{"file": text, "number": -1.5}])
+    save_rows(tmp_path / "a.csv", ["file", "number"], [{"file": text, "number": -1.5}])
     with open(tmp_path / "a.csv", newline="") as file:
         _, (shown, number) = csv.reader(file)
     assert shown == f"'{text}"
@@ -86,6 +87,6 @@ def test_no_cell_begins_a_formula(tmp_path, text):
 
 
 def test_a_name_with_line_ends_is_one_cell(tmp_path):
-    write_table(tmp_path / "a.csv", ["file", "number"], [{"file": "a\r=x\nb", "number": 1}])
+    save_rows(tmp_path / "a.csv", ["file", "number"], [{"file": "a\r=x\nb", "number": 1}])
     with open(tmp_path / "a.csv", newline="") as file:
         assert len([*csv.reader(file)]) == 2

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...atomic import atomic_path
+from ...columns import save_numbers
 from ...progress import Progress, silent
 from ..maps.hemisphere import polar
 from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
@@ -70,12 +71,7 @@ def save_csv(
     bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write the CSV, with the directions of `save_bird`; text is not in it."""
-    rows = _columns(bsdf, grid, progress)
-    with atomic_path(path) as temporary:
-        np.savetxt(
-            temporary, rows, "%.7g", ",", header=",".join(CSV_COLUMNS), comments="",
-            encoding="utf-8",
-        )  # fmt: skip
+    save_numbers(path, CSV_COLUMNS, _columns(bsdf, grid, progress))
 
 
 def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Reals:

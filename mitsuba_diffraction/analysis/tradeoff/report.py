@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...atomic import atomic_path
+from ...columns import save_rows
 from ...errors import DiffractionError
 from .accuracy import Depths, Spectral
 from .measuring import MeasuredSetting, rows
@@ -87,14 +87,7 @@ def plain(results: list[MeasuredSetting], depths: Depths) -> dict[str, Any]:
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
     """Write a CSV with a row for each setting of `plain`."""
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        columns = [name for name in settings[0] if name != "arguments"]
-        writer = csv.DictWriter(file, columns, extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows(settings)
+    save_rows(path, [name for name in settings[0] if name != "arguments"], settings)
 
 
 def lines(

@@ -17,9 +17,9 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import SmoothMesh, mesh_arrays
+from ..meshes import MeshArrays, SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
-from .mesh_indices import CODES, any_line_begins, check_mesh, ply_header
+from .mesh_indices import CODES, Element, any_line_begins, check_mesh, parsed_header, ply_header
 from .trimesh import TriangleMesh, vertex_normals
 
 Floats = NDArray[np.float64]
@@ -44,36 +44,40 @@ def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
 
     Raises a DiffractionError if the file cannot be read, or is not a mesh of these kinds.
     """
-    file = Path(path)
-    if file.suffix.lower() not in MESHES:
-        raise DiffractionError(
-            f"mesh '{file}': its name must end in {', '.join(MESHES)}; convert it to PLY or OBJ"
-        )
-    readable_file(file)
-    if _is_interchange(file):
-        mesh = interchange_mesh(file)
-    else:
-        if mi.variant() is None:
-            mi.set_variant("scalar_rgb")
-        mesh = mesh_arrays(_load(file))
-        if not _states_normals(file):  # Mitsuba's have seams where texture coordinates have
-            mesh = mesh._replace(normals=None)
-    positions, normals, uv, faces = mesh
+    (positions, normals, uv, faces), _ = _arrays(Path(path))
     if normals is None:
         normals = vertex_normals(positions, faces)
     return SmoothMesh(positions, normals, uv, faces)
 
 
-def _is_interchange(file: Path) -> bool:
-    return file.suffix.lower() in (*GLTF, *USD)
-
-
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
     """Whether the file of a mesh holds vertex normals; otherwise `load_mesh` makes smooth ones."""
-    file = Path(path)
-    if _is_interchange(file):
-        return interchange_mesh(file).normals is not None
-    return _states_normals(file)
+    return _arrays(Path(path))[0].normals is not None
+
+
+def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
+    """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
+    return _arrays(Path(path))[1]
+
+
+def _arrays(file: Path) -> tuple[MeshArrays, Floats | None]:
+    """Return the arrays of a mesh file as it has them, and its attribute vertex_orientation."""
+    if file.suffix.lower() not in MESHES:
+        raise DiffractionError(
+            f"mesh '{file}': its name must end in {', '.join(MESHES)}; convert it to PLY or OBJ"
+        )
+    readable_file(file)
+    if file.suffix.lower() in (*GLTF, *USD):
+        return interchange_mesh(file), None
+    if mi.variant() is None:
+        mi.set_variant("scalar_rgb")
+    mesh, turns = _load(file), None
+    if mesh.has_attribute(ORIENTATION):
+        turns = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)
+        turns = turns.reshape(mesh.vertex_count(), -1)[:, :2]
+    arrays = mesh_arrays(mesh)
+    # Mitsuba's normals have seams where texture coordinates have
+    return arrays if _states_normals(file) else arrays._replace(normals=None), turns
 
 
 def _states_normals(file: Path) -> bool:
@@ -109,18 +113,6 @@ def _load(file: Path) -> mi.Mesh:
 
 def _read(file: Path, kind: str) -> mi.Mesh:
     return mi.load_dict({"type": kind, "filename": str(file)})
-
-
-def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
-    """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
-    file = readable_file(path)
-    if _is_interchange(file):
-        return None
-    mesh = _load(file)
-    if not mesh.has_attribute(ORIENTATION):
-        return None
-    values = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)
-    return values.reshape(mesh.vertex_count(), -1)[:, :2]
 
 
 def write_ply(
@@ -168,67 +160,62 @@ def triangulated_ply(data: bytes) -> bytes | None:
 
 
 def _triangulated(data: bytes) -> bytes | None:
-    match = re.match(rb"ply\r?\n(?:.*\n)*?end_header\r?\n", data)
-    if match is None:
+    header = parsed_header(data, "")
+    if header is None or [e.name for e in header.elements[:2]] != ["vertex", "face"]:
         return None
-    header = match[0].decode("latin-1").splitlines()
-    starts = [n for n, line in enumerate(header) if line.startswith("element ")]
-    elements = [header[a:b] for a, b in zip(starts, [*starts[1:], -1], strict=True)]
-    if [e[0].split()[1] for e in elements[:2]] != ["vertex", "face"]:
-        return None
-    read = _read_ascii if any("format ascii" in line for line in header) else _read_binary
-    order = ">" if any("binary_big_endian" in line for line in header) else "<"
-    vertices, polygons = read(data[match.end() :], elements[0], elements[1], order)
-    if len(polygons) < int(elements[1][0].split()[2]):
-        return None
+    (vertex, face), body = header.elements[:2], data[header.size :]
+    text = header.format == "ascii"
+    read = _rows_of_text if text else _rows_of_bytes
+    end, polygons = read(body, vertex, face, header.order)
     triangles = [(p[0], p[n], p[n + 1]) for p in polygons for n in range(1, len(p) - 1)]
-    kept = [
-        *header[: starts[1]], f"element face {len(triangles)}",
-        "property list uchar int vertex_indices", "end_header", "",
+    lines = [
+        "ply", f"format {header.format} 1.0", f"element vertex {vertex.number}",
+        *(f"property {' '.join(words)}" for words in vertex.properties),
+        f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header",
+        "",
     ]  # fmt: skip
-    if read is _read_ascii:
+    if text:
         faces = "".join(f"3 {a} {b} {c}\n" for a, b, c in triangles).encode()
     else:
-        faces = b"".join(struct.pack(f"{order}B3i", 3, *triangle) for triangle in triangles)
-    return "\n".join(kept).encode("latin-1") + vertices + faces
+        faces = b"".join(struct.pack(f"{header.order}B3i", 3, *each) for each in triangles)
+    return "\n".join(lines).encode("latin-1") + body[:end] + faces
 
 
-def _read_ascii(
-    body: bytes, vertex: list[str], face: list[str], _: str
-) -> tuple[bytes, list[list[int]]]:
-    """Return the vertices' part of the file, and the corners of each face."""
-    count, faces = (int(e[0].split()[2]) for e in (vertex, face))
+def _rows_of_text(
+    body: bytes, vertex: Element, face: Element, _: str
+) -> tuple[int, list[tuple[int, ...]]]:
+    """Return where the vertices end, and the corners of each face."""
     lines = body.splitlines(keepends=True)
-    if not face[1].startswith("property list"):
+    if face.properties[0][0] != "list":
         raise ValueError
     polygons = []
-    for line in lines[count : count + faces]:
+    for line in lines[vertex.number : vertex.number + face.number]:
         size, *corners = (int(float(word)) for word in line.split())
-        polygons.append(corners)
+        polygons.append(tuple(corners))
         if len(corners) != size:
             raise ValueError
-    return b"".join(lines[:count]), polygons
+    if len(polygons) < face.number:
+        raise ValueError
+    return sum(map(len, lines[: vertex.number])), polygons
 
 
-def _read_binary(
-    body: bytes, vertex: list[str], face: list[str], order: str
-) -> tuple[bytes, list[list[int]]]:
-    """Return the vertices' part of the file, and the corners of each face."""
-    count, faces = (int(e[0].split()[2]) for e in (vertex, face))
+def _rows_of_bytes(
+    body: bytes, vertex: Element, face: Element, order: str
+) -> tuple[int, list[tuple[int, ...]]]:
+    """Return where the vertices end, and the corners of each face."""
     # lists at vertices are none of these codes: KeyError
-    row = order + "".join(_CODES[line.split()[1]] for line in vertex[1:])
-    at = end = count * struct.calcsize(row)
-    properties = [line.split() for line in face[1:]]
+    at = end = vertex.number * struct.calcsize(
+        order + "".join(_CODES[w[0]] for w in vertex.properties)
+    )
     polygons = []
-    for _ in range(faces):
-        for words in properties:
-            if words[1] != "list":
+    for _ in range(face.number):
+        for words in face.properties:
+            size = 1
+            if words[0] == "list":
+                (size,) = struct.unpack_from(order + _CODES[words[1]], body, at)
                 at += struct.calcsize(order + _CODES[words[1]])
-                continue
-            (size,) = struct.unpack_from(order + _CODES[words[2]], body, at)
-            at += struct.calcsize(order + _CODES[words[2]])
-            corners = f"{order}{size}{_CODES[words[3]]}"
-            if words[4] in ("vertex_indices", "vertex_index"):
-                polygons.append(list(struct.unpack_from(corners, body, at)))
-            at += struct.calcsize(corners)
-    return body[:end], polygons
+            values = f"{order}{size}{_CODES[words[-2]]}"
+            if words[-1] in ("vertex_indices", "vertex_index"):
+                polygons.append(struct.unpack_from(values, body, at))
+            at += struct.calcsize(values)
+    return end, polygons

@@ -98,15 +98,19 @@ def any_line_begins(file: Path, word: bytes) -> bool:
 
 
 def ply_header(file: Path, shown: str = "") -> Header | None:
-    """Return the header of a PLY file; None for other files.
+    """Return the header of a PLY file; None for other files; errors as of `parsed_header`."""
+    with file.open("rb") as stream:
+        return parsed_header(stream.read(_LONGEST_HEADER), shown or f"mesh '{file}'")
+
+
+def parsed_header(start: bytes, shown: str) -> Header | None:
+    """Return the header at the beginning of a PLY file; None for other files.
 
     Raises a DiffractionError if it has no end, or an element has no properties or an unknown type.
     """
-    with file.open("rb") as stream:
-        start = stream.read(_LONGEST_HEADER)
     if not re.match(rb"ply\s", start):
         return None
-    shown, form, elements = shown or f"mesh '{file}'", "", []
+    form, elements = "", []
     end = re.search(rb"\nend_header[ \t\r]*\n", start)
     if end is None:
         raise DiffractionError(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...atomic import atomic_path
+from ...columns import save_rows
 from .ridge import Response, Ridge
 
 #: Dynamic range of the picture in powers of ten.
@@ -92,14 +93,9 @@ def save_csv(path: str | os.PathLike[str], ridge: Ridge, period: float) -> None:
     """
     expected, wavelengths = ridge.grating_angles(period), ridge.response.wavelengths
     columns = wavelengths, ridge.angles, expected, ridge.angles - expected, ridge.heights
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream)
-        writer.writerow(COLUMNS)
-        for row in zip(*columns, strict=True):
-            writer.writerow([f"{value:.8g}" if np.isfinite(value) else "" for value in row])
+    lines = np.stack(columns, axis=-1).tolist()
+    rows = (dict(zip(COLUMNS, line, strict=True)) for line in lines)
+    save_rows(Path(path), COLUMNS, rows, digits=8)
 
 
 def save_npz(
