@@ -24,6 +24,7 @@ from .listed import Lights, listed_response, listed_table, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .response import LARGEST_SUM, ListedResponse, orders_between
 from .table import OrderTable, check_outline
+from .table_error import table_error
 
 #: Difference between light and reversed light above which a file hardly holds powers: grids of 5 to
 #: 45° have 0.02 to 0.14, efficiencies without the ratio of cosines 0.4 to 0.8.
@@ -31,6 +32,8 @@ _ONE_WAY = 0.2
 #: Distance from grazing, in squared cosines, within which rounding decides whether an order
 #: propagates.
 _EDGE = 1e-6
+#: Efficiency from which on relative errors are measured.
+_COUNTED = 1e-9
 
 
 def imported_table(
@@ -195,11 +198,14 @@ def _errors(
         got.append(table.polarised_efficiency(*light, transmitted=True))
     truth = np.nan_to_num(values)
     found = np.concatenate(got, axis=-1)
-    lit = truth > 1e-9
-    relative = np.where(lit, np.abs(found - truth) / np.maximum(truth, 1e-9), 0.0)
-    worst = np.unravel_index(int(relative.argmax()), relative.shape)
-    missed, total = np.abs(found - truth).sum(axis=(-2, -1)), truth.sum(axis=(-2, -1))
-    floor = max(0.05 * float(total.mean()), 1e-12)
+    shape = (-1, len(orders), truth.shape[-1])
+    every = np.ones(truth.size // truth.shape[-1], bool).reshape(-1, len(orders))
+
+    def place(light: int, order: int, kind: int) -> str:
+        shown = _shown(orders[order], table.crossed)
+        return f"{grid.light(light)}, order {shown}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
+
+    error = table_error(found.reshape(shape), truth.reshape(shape), every, _COUNTED, place)
     others = (orders != 0).any(axis=1)
     shift = [part * light[2] / (1e3 * period * table.superstrate)
              for part, period in zip(orders.T, table.periods, strict=True)]  # fmt: skip
@@ -208,17 +214,8 @@ def _errors(
     forth = table.efficiency(*light)
     back = np.where(known, table.efficiency(-out[0], -out[1], *light[2:]), forth)
     sent = float(forth[np.broadcast_to(known, forth.shape)].sum())
-    return {
-        "error_mean": float(missed.sum()) / max(float(total.sum()), 1e-12),
-        "error_worst": float(np.quantile(missed / np.maximum(total, floor), 0.95)),
-        "error_relative": float(relative.max()),
-        "error_place": (
-            f"{grid.wavelengths[worst[0]]:g} nm, theta {grid.theta[worst[1]]:g}°, phi "
-            f"{grid.phi[worst[2]]:g}°, order {_shown(orders[worst[3]], table.crossed)}, "
-            f"{'RT'[worst[4] // 2]}_{'sp'[worst[4] % 2]}"
-        ),
-        "reciprocity_error": float(np.abs(back - forth).sum()) / max(sent, 1e-12),
-    }
+    reciprocity = float(np.abs(back - forth).sum()) / max(sent, 1e-12)
+    return {**error.facts(), "reciprocity_error": reciprocity}
 
 
 def read_orders(

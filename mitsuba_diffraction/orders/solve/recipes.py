@@ -32,6 +32,7 @@ from typing import Any
 
 from ...errors import DiffractionError, check_keys, quoted
 from ...files import path_within, read_toml
+from ...heights.field import HeightField
 from ...heights.lengths import number_between
 from ...heights.recipes import SOLVED
 from ..table import WAVELENGTHS
@@ -57,7 +58,7 @@ class SolvedRecipe:
     output : path of the table.
     """
 
-    profile: Profile
+    profile: Profile | HeightField
     material: str
     superstrate: float
     thin: bool
