@@ -19,13 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..heights.lengths import numbers_of
 from ..inputs import note_input
 from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
-from .parameters import check_includes, check_parameters, files_of, numbers_in, parameters_of
+from .parameters import check_includes, check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
@@ -178,8 +179,9 @@ def _check_parameters_act(
 
 def _same(value: str, default: str) -> bool:
     """Return whether two values of a parameter are equal, as texts or as numbers."""
-    numbers = numbers_in(value)
-    return value == default or (numbers is not None and numbers == numbers_in(default))
+    return value == default or (
+        bool(numbers := numbers_of(value)) and numbers == numbers_of(default)
+    )
 
 
 def _instantiated(
