@@ -184,6 +184,7 @@ class _Trial:
         self._spectrum = Spectrum(field, (last[0], last[1]), double=True)
         self._centre = (last[1], last[0])
         self._lengths: dict[int, int] = {}
+        self._values: dict[tuple[float, str], NDArray[Any]] = {}
 
     def length(self, make: _Maker, intervals: int, budget: float) -> int:
         """Terms of a Chebyshev series that is so good that the functions' number is what counts."""
@@ -247,9 +248,14 @@ class _Trial:
         return np.asarray((bins[:, None] * parts + np.arange(parts)).ravel())
 
     def _value(self, kappa: float, expansion: Expansion) -> NDArray[Any]:
-        amplitude = self._spectrum.of_phase(kappa, minus_one=True)
-        amplitude[self._centre] += 1.0
-        return np.abs(amplitude) ** 2 if expansion.kind == "power" else amplitude
+        """Powers or amplitudes of all bins; trials of several numbers of functions share nodes."""
+        key = float(kappa), expansion.kind
+        if key not in self._values:
+            amplitude = self._spectrum.of_phase(kappa, minus_one=True)
+            amplitude[self._centre] += 1.0
+            power = expansion.kind == "power"
+            self._values[key] = np.abs(amplitude) ** 2 if power else amplitude
+        return self._values[key]
 
     def _parts(self, bins: NDArray[np.floating]) -> tuple[float, float]:
         row, column = self._centre
