@@ -47,8 +47,7 @@ def _wave(lookup: AnyLookup, row: Any, order: Any, y: Float, active: Mask) -> Wa
     elements = lookup.elements(row, order, y, active)
     share = mi.Float(1.0)
     if lookup.coated:
-        port, active = lookup.port(row, order, active & row.lit)
-        within = lookup.at_port(row, port, 0, active)
+        within = lookup.repeated(row, order, active & row.lit)
         share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
     return Wave(_nearest(elements), share)
 
