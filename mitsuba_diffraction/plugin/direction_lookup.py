@@ -162,7 +162,7 @@ def _ones(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:
 
 
 def between(
-    tables: Sequence[DirectionalTable], nodes: tuple[float, float], height_scale: float
+    tables: Sequence[DirectionalTable], nodes: Sequence[float], height_scale: float
 ) -> DirectionalTable:
     """Interpolate between two height scales."""
     low, high = tables

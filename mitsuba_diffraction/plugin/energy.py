@@ -149,7 +149,7 @@ class EnergyModel:
         """Return the function that a look-up shows above the surface; None where it is 1."""
         centre = self._factors.centre
         height_scale /= centre
-        nodes = self._energy.nodes(height_scale)
+        nodes = self._energy.nodes(height_scale, height_scale)
         tables = scales_of([sides_of(self._energy.at(node)) for node in nodes])
         if tables is None:
             return None

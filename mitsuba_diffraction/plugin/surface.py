@@ -189,10 +189,6 @@ class DiffractingSurface(SurfaceBSDF):
         """See `SurfaceBSDF.reflected_share`."""
         return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
 
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `SurfaceBSDF.normal_reflectance`."""
-        return mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), site.si, active))
-
     def site_at(self, si: Interaction, active: Mask) -> Site:
         """See `SurfaceBSDF.site_at`."""
         scale = self.height_scale.at(si, active)

@@ -8,7 +8,8 @@ Contents
 model         the default model in one file: the equations, numbered as in docs/theory.md
 bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
 coat          wrapper of the model
-fresnel, boundary, through  float64 judges of the formulas of the same names in `optics`
+fresnel, through  float64 judges of the formulas of the same names in `optics`
+boundary      Jones and Mueller matrices, and the axes that they are about
 mirror        the correction of order 0 at the horizon, by its equation
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders

@@ -194,9 +194,9 @@ def _lit(
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:
     """J of the heights, in the medium where `light` and `index` are given."""
     if name == "kirchhoff":
-        return boundary.kirchhoff(light.wi, light.wo, index)
+        return models.kirchhoff(light.wi, light.wo, index)
     if name == "small_slope":
-        return boundary.blended(light.wi, light.wo, index, models.share(field, light, index))
+        return models.blended(light.wi, light.wo, index, models.share(field, light, index))
     return registered(registered_model(name), field, light, index)
 
 

@@ -44,7 +44,7 @@ def reflected(
     ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
     others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
     beneath = beneath_amplitudes(mirror_cosine(light, sigma_0), coat, index)
-    mirror = model.facets_of(inside, *beneath)
+    mirror = model.facets(inside.wi, inside.wo, *beneath)
     visible = horizon_correction(light, sigma_0)
     area = (light.wavelength * 1e-3) ** 2 * np.pi * sigma**2
     zeroth = (visible * powers[1] / area * measure(mirror).T).T

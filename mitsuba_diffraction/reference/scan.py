@@ -73,10 +73,10 @@ def tapers(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     return found[0], found[1]
 
 
-def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex | None]:
-    """Return f with the zeros around it, and a_0; the screen itself and None without tapers."""
+def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex]:
+    """Return f with the zeros around it, and a_0; the screen itself and its mean without tapers."""
     if along is None:
-        return screen, None
+        return screen, complex(screen.mean())
     t_y, t_x = (np.ones(n) if t is None else t for n, t in zip(screen.shape, along, strict=True))
     t = np.outer(t_y, t_x)
     mean = complex(np.sum(t**2 * screen) / np.sum(t**2))
