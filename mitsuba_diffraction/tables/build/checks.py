@@ -30,10 +30,10 @@ HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
 
 
 def check_patches(patches: Sequence[HeightField], settings: TableSettings) -> None:
-    """Refuse patches whose powers cannot be averaged."""
+    """Refuse patches that tile the plane if their powers cannot be averaged."""
     if not patches:
         raise build_error("there is no height field; give at least one")
-    if len(patches) == 1:
+    if len(patches) == 1 or settings.taper_width is not None:
         return
     taylor = settings.basis == "taylor"
     if settings.coherent or taylor:

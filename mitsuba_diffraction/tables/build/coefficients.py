@@ -15,7 +15,7 @@ from ..expansion import Expansion, principal_functions
 from ..layout import Grid
 from .error import alternate
 from .powers import PatchSpectra
-from .spectrum import GLOSSY_RADIUS, Spectrum
+from .spectrum import GLOSSY_RADIUS
 
 #: Fills an array (nodes, …) with the expanded values of all bins at the nodes of an interval, one
 #: after the other; gives order 0's.
@@ -96,7 +96,7 @@ def _taylor(
     result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
     for n in range(1, expansion.terms + 1):
         amplitude = spectra.first.of(partial(_height_power, expansion.half_range, n))
-        amplitude = amplitude[_inner(spectra.first, grid)]
+        amplitude = amplitude[_inner(spectra, grid)]
         if grid.coherent:
             alternate(amplitude, grid.last)
         amplitude *= 1j**n
@@ -131,7 +131,7 @@ def _powers_at(
     altogether, so that it takes double precision.
     """
     specular = float(expansion.order_0_offset(interval))
-    inner = _inner(spectra.first, grid)
+    inner = _inner(spectra, grid)
     for out, power in zip(values, spectra.powers(expansion.nodes(interval).tolist()), strict=True):
         out[..., 0] = power.bins[inner]
         yield (power.change if specular else power.order_0,)
@@ -148,7 +148,7 @@ def _amplitudes_at(
     specular, spectrum = float(expansion.order_0_offset(interval)), spectra.first
     for out, kappa in zip(values, expansion.nodes(interval), strict=True):
         # The transform is of exp(iκh) − 1, so this is a_0 − 1
-        amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
+        amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectra, grid)]
         less = complex(amplitude[grid.middle])
         amplitude[grid.middle] = 0.0
         if grid.coherent:
@@ -158,11 +158,11 @@ def _amplitudes_at(
         yield less.real + 1.0 - specular, less.imag
 
 
-def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:
+def _inner(spectra: PatchSpectra, grid: Grid) -> tuple[slice, slice]:
     """Slices of the grid's bins within a spectrum, whose margin serves the error estimate."""
     rows, columns = (
         slice(outer - last, outer + last + 1)
-        for outer, last in zip(spectrum.last[::-1], grid.last[::-1], strict=True)
+        for outer, last in zip(spectra.last[::-1], grid.last[::-1], strict=True)
     )
     return rows, columns
 
