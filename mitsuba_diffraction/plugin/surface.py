@@ -88,7 +88,6 @@ class DiffractingSurface(SurfaceBSDF):
         self.window_positions = read.window_positions(props, self.table)
         self.power = power_model(self.table, self.wavelength, self.window_positions)
         material = read.layered(props, material, self.table)
-        read.check_combination(props, material, nested)
         read.warn_of_film(material, self.table, largest)
         self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
