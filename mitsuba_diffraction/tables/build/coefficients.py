@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -13,13 +13,8 @@ from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
 from ..layout import Grid
-from .error import alternate
-from .powers import PatchSpectra
+from .powers import PatchSpectra, alternate
 from .spectrum import GLOSSY_RADIUS
-
-#: Fills an array (nodes, …) with the expanded values of all bins at the nodes of an interval, one
-#: after the other; gives order 0's.
-ValuesAt = Callable[[int, NDArray[np.float32]], Iterable[Sequence[float]]]
 
 
 class Coefficients(NamedTuple):
@@ -37,31 +32,25 @@ class Coefficients(NamedTuple):
     expansion: Expansion
 
 
-def series_of(
-    values_at: ValuesAt,
-    shape: tuple[int, int, int],
-    expansion: Expansion,
-    functions: int | None,
-    near: NDArray[np.int64],
+def coefficients_of(
+    spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
 ) -> Coefficients:
-    """Series coefficients (intervals, ny, nx, components, terms) of whatever has values at nodes.
+    """Series coefficients of every bin, and of order 0.
 
-    Parameters
-    ----------
-    values_at : values to expand, at the nodes of an interval.
-    shape : (ny, nx, components) of the values.
-    functions : number of functions of basis "svd", or None; the
-        expansion returned then has them.
-    near : indices of the values close to order 0, see `principal_functions`.
+    functions : number of functions of basis "svd", or None; the expansion returned then has them.
     """
-    terms = functions or expansion.terms
+    if expansion.basis == "taylor":
+        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
+    values_at, components = (_powers_at, 1) if expansion.kind == "power" else (_amplitudes_at, 2)
+    terms, near = functions or expansion.terms, _near(grid, components)
+    shape = *grid.shape, components
     result = np.empty((expansion.intervals, *shape, terms), np.float32)
-    order_0 = np.empty((expansion.intervals, shape[2], expansion.terms))
-    values = np.empty((expansion.terms, *shape), np.float32)
+    order_0 = np.empty((expansion.intervals, components, expansion.terms))
+    values = np.empty((expansion.terms, *shape), np.float32)  # at the nodes of an interval
     flat = values.reshape(expansion.terms, -1)
     all_series = []
     for interval in range(expansion.intervals):
-        at_nodes = list(values_at(interval, values))
+        at_nodes = list(values_at(spectra, grid, expansion, interval, values))
         fit = expansion.fit(interval)
         order_0[interval] = np.transpose(at_nodes) @ fit
         if functions is not None:
@@ -71,22 +60,6 @@ def series_of(
     if functions is not None:
         expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(all_series))
     return Coefficients(result, order_0, expansion)
-
-
-def coefficients_of(
-    spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
-) -> Coefficients:
-    """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
-
-    functions : see `series_of`.
-    """
-    if expansion.basis == "taylor":
-        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
-    components = 1 if expansion.kind == "power" else 2
-    of_kind = _powers_at if expansion.kind == "power" else _amplitudes_at
-    values_at = partial(of_kind, spectra, grid, expansion)
-    near = _near(grid, components)
-    return series_of(values_at, (*grid.shape, components), expansion, functions, near)
 
 
 def _taylor(
@@ -145,16 +118,12 @@ def _amplitudes_at(
     values: NDArray[np.float32],
 ) -> Iterator[tuple[float, float]]:
     """Real and imaginary parts of the only patch's (ny, nx, 2), likewise."""
-    specular, spectrum = float(expansion.order_0_offset(interval)), spectra.first
-    for out, kappa in zip(values, expansion.nodes(interval), strict=True):
-        # The transform is of exp(iκh) − 1, so this is a_0 − 1
-        amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectra, grid)]
-        less = complex(amplitude[grid.middle])
+    specular = float(expansion.order_0_offset(interval))
+    for out, kappa in zip(values, expansion.nodes(interval).tolist(), strict=True):
+        amplitude = spectra.amplitudes(kappa, grid.coherent)[_inner(spectra, grid)]
+        less = complex(amplitude[grid.middle])  # a_0 − 1
         amplitude[grid.middle] = 0.0
-        if grid.coherent:
-            alternate(amplitude, grid.last)
         out[..., 0], out[..., 1] = amplitude.real, amplitude.imag
-        spectra.tick()
         yield less.real + 1.0 - specular, less.imag
 
 

@@ -145,11 +145,8 @@ class ErrorMeter:
                 yield bins
             return
         for kappa in kappas:
-            amplitude = self.spectra.first.of_phase(kappa, minus_one=True)
+            amplitude = self.spectra.amplitudes(kappa, self.grid.coherent)
             amplitude[middle] += 1.0
-            if self.grid.coherent:
-                alternate(amplitude, self._outer)
-            self.spectra.tick()
             yield amplitude
 
     def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
@@ -198,13 +195,6 @@ def worst(kappas: Sequence[float], parts: Sequence[Parts]) -> dict[str, float]:
         "kappa_near": float(kappas[where[0]]),
         "kappa_far": float(kappas[where[1]]),
     }
-
-
-def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
-    """Multiply bin (jx, jy) by (−1)^(jx+jy), in place: exp(−i q_j·x₀) for x₀ = half the patch."""
-    parity = (last[0] + last[1]) % 2
-    amplitude[0::2, 1 - parity :: 2] *= -1
-    amplitude[1::2, parity::2] *= -1
 
 
 def _power(amplitude: NDArray[Any]) -> NDArray[np.floating]:

@@ -96,6 +96,14 @@ class PatchSpectra:
         """Calls of `tick` for a κ."""
         return len(self._batches)
 
+    def amplitudes(self, kappa: float, centred: bool) -> NDArray[np.complexfloating]:
+        """Amplitudes a_j − δ_j0 of the only patch; centred : under a window on its middle."""
+        amplitudes = self.first.of_phase(kappa, minus_one=True)
+        if centred:
+            alternate(amplitudes, self.last)
+        self.tick()
+        return amplitudes
+
     def powers(self, kappas: Sequence[float]) -> Iterator[Power]:
         """The mean over all screens, at one κ after the other."""
         size = max(1, _GROUP // (8 * math.prod(self.shape)))
@@ -110,6 +118,13 @@ class PatchSpectra:
                 mean = power.over(len(self._screens))
                 mean.bins = self._screens.sharpened(mean.bins)
                 yield mean
+
+
+def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
+    """Multiply bin (jx, jy) by (−1)^(jx+jy), in place: exp(−i q_j·x₀) for x₀ = half the patch."""
+    parity = (last[0] + last[1]) % 2
+    amplitude[0::2, 1 - parity :: 2] *= -1
+    amplitude[1::2, parity::2] *= -1
 
 
 def _batch_sums(
