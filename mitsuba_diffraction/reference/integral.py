@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..heights.field import HeightField
-from .model import Light, Orders, Sigmas, Sums, ensemble_power, orders_near, window_sums
+from .model import Light, ensemble_power, window_sums
+from .screens import Orders, Sigmas, Sums, orders_near
 
 Real = NDArray[np.float64]
 

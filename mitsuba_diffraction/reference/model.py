@@ -21,13 +21,13 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
-window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
-orders alone. C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p at θm,
-whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's r_s,
-r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
-d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order small
-slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py and
-transmission.py wrap this.
+window has the light's σ₀; a small scan, which is seen through windows, limits σ of other orders
+alone (screens.py). C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p
+at θm, whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's
+r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light
+along d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order
+small slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py
+and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Filmed, Index
-from . import scan
 from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
 from .fresnel import amplitudes, faces, reflectance
 from .mirror import horizon_correction, mirror_cosine
+from .screens import Orders, Sigmas, Sums, patch_power, sharpened
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,17 +56,6 @@ class Light(NamedTuple):
     wi: Real
     wo: Real
     wavelength: Real
-
-
-class Sigmas(NamedTuple):
-    """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
-
-    `windows`: a scan's, which does not tile the plane.
-    """
-
-    orders: float
-    zeroth: float
-    windows: scan.ScanWindows | None = None
 
 
 def default_brdf(
@@ -102,21 +91,6 @@ def mirrored(
     return (factor * measure(facets(light.wi, light.wo, *r)).T).T
 
 
-class Orders(NamedTuple):
-    """Orders about q: q_j along x and y, a_j (y, x), and a_0; `tapers`: of a scan's windows."""
-
-    qx: Real
-    qy: Real
-    a: Complex
-    zeroth: complex
-    tapers: scan.Tapers | None = None
-
-
-#: Function of orders about q that returns Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ in µm⁴, and the cosine of the
-#: phase between both under one window.
-Sums = Callable[[Orders, tuple[float, float], Sigmas], tuple[float, float, float]]
-
-
 def window_sums(
     orders: Orders, q: tuple[float, float], sigmas: Sigmas
 ) -> tuple[float, float, float]:
@@ -126,7 +100,7 @@ def window_sums(
     powers, mirror = np.abs(orders.a) ** 2, (orders.qy == 0, orders.qx == 0)
     powers[np.ix_(*mirror)] = 0.0
     if orders.tapers is not None:
-        powers = scan.sharpened(powers, mirror, orders.tapers)
+        powers = sharpened(powers, mirror, orders.tapers)
     lobe, unit = np.exp(-(sigmas.zeroth**2) * (q[0] ** 2 + q[1] ** 2)), 4 * np.pi**2 * sigma**4
     zeroth = ratio * lobe * abs(orders.zeroth) ** 2 * np.any(np.outer(*mirror))  # within reach
     return float(unit * (window_y @ powers @ window_x)), float(unit * zeroth), 0.0
@@ -139,39 +113,6 @@ def ensemble_power(
     total = (2e3 * np.pi / light.wavelength)[:, None] * (light.wi + light.wo)  # (1): q, κ
     powers = [patch_power(field, kappa, (x, y), sigmas, sums) for x, y, kappa in total]
     return np.reshape(powers, (-1, 3)).T
-
-
-def patch_power(
-    field: HeightField, kappa: float, q: tuple[float, float], sigmas: Sigmas, sums: Sums
-) -> Real:
-    """`sums` at q and κ, (3,); means over the windows of a scan."""
-    parts, tapers = scan.parts(field, sigmas.windows), scan.tapers(field, sigmas.windows)
-    screens = (np.exp(1j * kappa * part) for part in parts)
-    orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
-    others, *rest = np.mean([sums(each, q, sigmas) for each in orders], axis=0)
-    return np.array([max(others, 0.0), *rest])  # sharpened powers dip below 0 between strong orders
-
-
-def orders_near(
-    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float],
-    tapers: scan.Tapers | None = None,
-) -> Orders:  # fmt: skip
-    """Orders (2) of a screen (ny, nx), or of a faded one, that the window about q reaches."""
-    screen, zeroth = scan.faded(screen, tapers)
-    qx, waves_x = plane_waves(screen.shape[1], pixel_size[0], q[0], sigma)
-    qy, waves_y = plane_waves(screen.shape[0], pixel_size[1], q[1], sigma)
-    return Orders(qx, qy, waves_y @ screen @ waves_x.T / screen.size, zeroth, tapers)
-
-
-def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
-    """Frequencies q_j of a DFT of n pixels near q, and exp(i q_j x) at the pixels."""
-    # exp(−8.6²/2) = 9e-17: amplitudes farther from q are below the last bit of the sum
-    spacing, reach = 2 * np.pi / (n * pixel), 8.6 / sigma
-    first, last = np.ceil((q - reach) / spacing), np.floor((q + reach) / spacing)
-    # A DFT of an even number of points has −n/2 but not +n/2
-    j = np.arange(max(first, -(n // 2)), min(last, (n - 1) // 2) + 1)
-    turns = np.outer(j, np.arange(n)) % n  # exact integers keep the phase exact
-    return j * spacing, np.exp(2j * np.pi / n * turns)
 
 
 def share(field: HeightField, light: Light, index: Index) -> Real:

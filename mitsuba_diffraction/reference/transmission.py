@@ -15,7 +15,8 @@ from . import boundary, mirror, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
 from .coat import refracted
 from .integral import sums_of
-from .model import Light, patch_power, small_slope_weight
+from .model import Light, small_slope_weight
+from .screens import patch_power
 
 
 def btdf(

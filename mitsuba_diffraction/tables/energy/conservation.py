@@ -14,14 +14,13 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
 from functools import partial
 
 import numpy as np
 
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
-from ..fields import check_names, mapping
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, cached, key_of
 from ..table import DiffractionTable
@@ -69,11 +68,9 @@ class Conservation:
 
     @classmethod
     def from_record(cls, record: Record) -> Conservation:
-        """Return the functions of such a record; raises a ValueError for what does not fit."""
-        document = mapping(record.document, "energy")
-        check_names(document, (field.name for field in fields(cls)), ())
-        pairs = zip(document.items(), record.arrays, strict=True)
-        return cls(**{name: DirectionalTable.parse(lam, values) for (name, lam), values in pairs})
+        """Return the functions of such a record."""
+        pairs = zip(record.document.items(), record.arrays, strict=True)
+        return cls(**{name: DirectionalTable(np.array(lam), a) for (name, lam), a in pairs})
 
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
