@@ -12,6 +12,7 @@ from . import model
 from .fresnel import amplitudes
 from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light
+from .screens import Sigmas
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,7 +25,7 @@ def refracted_light(light: Light, coat: float) -> Light:
 
 def reflected(
     light: Light,
-    sigmas: model.Sigmas,
+    sigmas: Sigmas,
     coat: float,
     index: Complex,
     powers: Real,

@@ -75,8 +75,7 @@ def power_series(
     table.require_whole("a list of powers is made of")
     old = table.expansion
     if old.kind == "power":
-        order_0 = table.order_0[:, 0]
-        return table.coefficients[:, :, :, 0], order_0, table.scale, old
+        return table.coefficients[:, :, :, 0], table.order_0[:, 0], table.scale, old
     new = power_expansion(table)
     coefficients = fitted(new, lambda kappa: powers_at(table, kappa))
     order_0 = fitted(

@@ -46,7 +46,7 @@ def test_the_reference_s_default_is_the_model():
     light = {"eta": 1.5, "coherence_width": 2.0}
     found = reference.brdf(FIELD, WI, WO, LIGHT.wavelength, **light)
     expected = model.default_brdf(
-        FIELD, LIGHT, INDICES[0], model.Sigmas(sigma_of(2.0), sigma_of(2.0))
+        FIELD, LIGHT, INDICES[0], reference.Sigmas(sigma_of(2.0), sigma_of(2.0))
     )
     assert np.array_equal(found, expected)
     matrices = reference.mueller(FIELD, WI, WO, LIGHT.wavelength, **light)

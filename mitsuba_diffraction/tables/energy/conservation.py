@@ -245,8 +245,8 @@ class Energy:
         # of scales in single precision
         first = min(math.floor(low * steps + 1e-4), math.ceil(most * steps - 1e-4) - 1)
         last = max(math.ceil(high * steps - 1e-4), first + interval)
-        ends = (min(max(n / steps, _FLAT), most) for n in (first, last))
-        return np.linspace(*ends, 1 + max(1, last - first)).tolist()
+        start, end = (min(max(n / steps, _FLAT), most) for n in (first, last))
+        return np.linspace(start, end, 1 + max(1, last - first)).tolist()
 
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""
