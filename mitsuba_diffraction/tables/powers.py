@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +30,7 @@ def power_expansion(table: DiffractionTable) -> Expansion:
     )
 
 
-def fitted(
-    expansion: Expansion, values_at: Callable[[float], NDArray[np.floating]]
-) -> NDArray[np.floating]:
+def fitted(expansion: Expansion, values_at: Callable[[float], NDArray[Any]]) -> NDArray[Any]:
     """Series (intervals, …, terms) of a function of κ, in the precision of its values (…)."""
     series = []
     for interval in range(expansion.intervals):
