@@ -10,7 +10,6 @@ OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
-solve_crossed      orders of a crossed grating
 read_orders        orders from a file of efficiencies
 profiles           one period of a grating's grooves
 tradeoff           accuracy against speed and memory, setting by setting
@@ -59,7 +58,6 @@ if TYPE_CHECKING:
     from .orders import OrderTable
     from .orders.imported import read_orders
     from .orders.solve import profiles
-    from .orders.solve.crossed import solve_crossed
     from .orders.solve.orders import solve_orders
     from .plugin.dictionary import bsdf_dict
     from .plugin.presets import preset
@@ -91,7 +89,6 @@ __all__ = [
     "read_orders",
     "reference",
     "shader_comparison",
-    "solve_crossed",
     "solve_orders",
     "spectrum",
     "tradeoff",
@@ -123,7 +120,6 @@ _NAMES = {
     "hologram": "scene.hologram",
     "preset": "plugin.presets",
     "read_orders": "orders.imported",
-    "solve_crossed": "orders.solve.crossed",
     "solve_orders": "orders.solve.orders",
     "spectrum": "analysis.spectra",
 }
@@ -135,6 +131,8 @@ def __getattr__(name: str) -> Any:
 
         return version(__name__)
     if name in _MODULES:
+        if name in ("glsl", "shader_comparison"):
+            importlib.import_module(f"{__name__}.thesis.shaders")  # registers its methods
         return importlib.import_module(f"{__name__}.{_MODULES[name]}")
     if name in _NAMES:
         return getattr(importlib.import_module(f"{__name__}.{_NAMES[name]}"), name)

@@ -21,7 +21,6 @@ class _Need(NamedTuple):
 
 _NEEDS = {
     "SurfaceTopography": _Need("instrument files need SurfaceTopography", "afm"),
-    "ikarus": _Need("solving crossed gratings needs ikarus-rcwa", "crossed"),
     "distributed": _Need("workers need Dask", "cluster"),
     "flip_evaluator": _Need("FLIP needs flip-evaluator", "gl"),
     "h5py": _Need(

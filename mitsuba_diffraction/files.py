@@ -12,10 +12,12 @@ import contextlib
 import os
 import re
 import stat
+import struct
 import tomllib
+from collections.abc import Collection
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from .errors import DiffractionError, one_line, quoted
 from .inputs import note_input
@@ -85,20 +87,39 @@ def kind_of(path: str | os.PathLike[str]) -> FileKind:
         if content.startswith(begins) and attribute in content:
             return kind
     if content.startswith((b"II*\0", b"MM\0*")) and Path(path).suffix.lower() != ".lext":
-        instrument = not _INSTRUMENT_TAGS.isdisjoint(_tiff_tags(Path(path)))
+        instrument = not _INSTRUMENT_TAGS.isdisjoint(tiff_tags(Path(path)))
         return FileKind.INSTRUMENT if instrument else FileKind.IMAGE
     return _SUFFIXES.get(Path(path).suffix.lower(), FileKind.INSTRUMENT)
 
 
-def _tiff_tags(file: Path) -> list[int]:
-    """Return the tags of a TIFF's first page; an incomplete directory gives zeros."""
-    with file.open("rb") as stream:
+# Letters of `struct` of TIFF's types: BYTE, SHORT, LONG, UNDEFINED and DOUBLE.
+_TIFF_TYPES = {1: "B", 3: "H", 4: "I", 7: "B", 12: "d"}
+
+
+def tiff_tags(file: Path, wanted: Collection[int] = ()) -> dict[int, tuple[float, ...]]:
+    """Return the tags of a TIFF's first page: wanted ones with their numbers, others with none.
+
+    An incomplete directory gives the tags that are whole.
+    """
+    found: dict[int, tuple[float, ...]] = {}
+    with file.open("rb") as stream, contextlib.suppress(struct.error):
         head = stream.read(8)
-        order: Literal["little", "big"] = "little" if head.startswith(b"II") else "big"
-        stream.seek(int.from_bytes(head[4:], order))
-        count = int.from_bytes(stream.read(2), order)
+        order = "<" if head.startswith(b"II") else ">"
+        (start,) = struct.unpack(f"{order}I", head[4:])
+        stream.seek(start)
+        (count,) = struct.unpack(f"{order}H", stream.read(2))
         entries = stream.read(12 * count)
-    return [int.from_bytes(entries[n : n + 2], order) for n in range(0, len(entries), 12)]
+        for at in range(0, len(entries), 12):
+            tag, kind, number = struct.unpack_from(f"{order}HHI", entries, at)
+            found[tag], letter = (), _TIFF_TYPES.get(kind)
+            if tag not in wanted or letter is None:
+                continue
+            value, size = entries[at + 8 : at + 12], struct.calcsize(letter) * number
+            if size > len(value):
+                stream.seek(struct.unpack(f"{order}I", value)[0])
+                value = stream.read(size)
+            found[tag] = struct.unpack(f"{order}{number}{letter}", value[:size])
+    return found
 
 
 def readable_file(path: str | os.PathLike[str]) -> Path:
@@ -145,8 +166,8 @@ def beginning(path: str | os.PathLike[str], count: int) -> bytes:
     return first
 
 
-def path_within(file: Path, name: str) -> Path:
-    """Return the path of an output that a file names, relative to the file's folder.
+def path_beside(file: Path, name: str, *, output: bool = False) -> Path:
+    """Return the path of an input, or output, that a file names, relative to the file's folder.
 
     Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
     """
@@ -154,20 +175,9 @@ def path_within(file: Path, name: str) -> Path:
     if not path.resolve().is_relative_to(file.parent.resolve()):
         raise DiffractionError(
             f"{str(file)!r}: output: {name!r} is outside the file's folder; name a path in it"
-        )
-    return path
-
-
-def path_beside(file: Path, name: str) -> Path:
-    """Return the path of an input that a file names, relative to the file's folder.
-
-    Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
-    """
-    path = file.parent / name
-    if not path.resolve().is_relative_to(file.parent.resolve()):
-        raise DiffractionError(
+            if output else
             f"{str(file)!r} names {quoted(name)}, which is outside of its folder; copy that there"
-        )
+        )  # fmt: skip
     return path
 
 

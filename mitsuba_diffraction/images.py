@@ -8,11 +8,13 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import IO
 
 from PIL import EpsImagePlugin, Image, UnidentifiedImageError
 
-from .errors import DiffractionError
+from .errors import DiffractionError, one_line
+from .files import readable_file
 from .limits import check_content
 
 #: Formats of images, in Pillow's names; the content decides, not the suffix.
@@ -52,3 +54,17 @@ def open_image(
             image.close()
             raise
     return image
+
+
+def read_picture(path: Path) -> Image.Image:
+    """Return a picture, decoded.
+
+    Raises a DiffractionError if the file cannot be read as one.
+    """
+    readable_file(path)
+    try:
+        with open_image(path) as picture:
+            return picture.copy()
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        reason = one_line(str(error))
+        raise DiffractionError(f"'{path}' cannot be read as a picture: {reason}") from error

@@ -45,6 +45,8 @@ CHANCES = 3
 #: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
 #: lobe from one to the next.
 SHORTEST, LONGEST, STEP = 380.0, 780.0, 10.0
+# Values of κ at which series are evaluated: phases of relief are off by κH/20000.
+_NODES = 10000
 # Side of a direction's cell, in sines: at most the narrowest lobe's standard deviation, a scan's.
 _CELL = 0.008
 # Luminance, relative to the brightest direction, below which a direction has no colour.
@@ -261,6 +263,9 @@ def _by_direction(
     width = min(WINDOW, table.window_width)
     # the orders of a scan have its taper's lobes already
     sigma = (sigma_of(width) ** -2 - table.inverse_taper) ** -0.5
+    kappas = np.arange(_NODES + 1) * (expansion.kappa_max / _NODES)
+    factors = (expansion.weights(kappas) / scale).astype(np.float32)
+    intervals, coefficients = expansion.interval(kappas), coefficients.astype(np.float32)
     qx, qy = (
         spacing * np.arange(-last, last + 1)
         for spacing, last in zip(table.spacing, table.grid.last, strict=True)
@@ -270,9 +275,11 @@ def _by_direction(
     mirror = frequency < (1.0 + 1e-6) * 2.0 * math.pi / width
     rings = np.round(frequency / min(table.spacing)).astype(int)
     count = 2 * math.ceil(1.15 / _CELL)
-    xyz = np.zeros((1 + len(speckles), count, count, 3))
-    central = np.zeros((1 + len(speckles), 3))
-    for wavelength in np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP):
+    wavelengths = np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP)
+    responses = np.array([response(wavelength) for wavelength in wavelengths]) * STEP
+    beside = np.empty((len(wavelengths), 1 + len(speckles), count, count), np.float32)
+    central = np.empty((len(wavelengths), 1 + len(speckles)))
+    for n, wavelength in enumerate(wavelengths):
         k = float(wavenumber(wavelength))
         x, y = qx / k - light.direction[0], qy / k - light.direction[1]
         z2 = 1.0 - x**2 - y[:, None] ** 2
@@ -284,25 +291,25 @@ def _by_direction(
         if factor is not None:
             reflected, w = factor(sines, float(wavelength))
             r_0, w_0 = factor(light.mirror[None, :2], float(wavelength))
-        factors = expansion.weights(k * w) / scale
-        interval = expansion.interval(k * w)
-        power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
-        powers = [np.maximum(power, 0.0)]
+        node = np.minimum(np.round(k * w * (_NODES / expansion.kappa_max)).astype(int), _NODES)
+        terms = coefficients[intervals[node], rows, columns]
+        power = np.einsum("nt,nt->n", terms, factors[node]).astype(np.float64)
+        powers = [power]
         if speckles:
             ring = rings[rows, columns]
-            medians = median(powers[0], ring, np.arange(rings.max() + 1))
-            unordered = np.nan_to_num(medians)[ring]
+            medians = median(power, ring, np.arange(rings.max() + 1))
+            unordered = np.maximum(np.nan_to_num(medians), 0.0)[ring]
             powers += [unordered * speckle[rows, columns] for speckle in speckles]
         reflected = reflected * _obliquity(sines, cosine, light)
         near = mirror[rows, columns]
-        weights = response(wavelength) * STEP
         order_0 = float(r_0[0] * order_0_power(table.averaged, k * w_0)[0])
         lobe = 1.0 / (math.sqrt(2.0) * k * sigma)  # standard deviation of its power
         sent = np.stack(powers) * reflected
-        central += weights * (sent[:, near].sum(axis=1) + order_0)[:, None]
-        xyz += _spread(sines[~near], sent[:, ~near], lobe, count)[..., None] * weights
-    diffracted = xyz[..., 1].sum(axis=(1, 2))
-    shares = diffracted / np.maximum(diffracted + central[:, 1], 1e-300)
+        central[n] = sent[:, near].sum(axis=1) + order_0
+        _spread(sines[~near], sent[:, ~near], lobe, beside[n])
+    xyz = np.moveaxis(np.tensordot(responses.astype(np.float32), beside, (0, 0)), 0, -1)
+    diffracted = xyz[..., 1].sum(axis=(1, 2), dtype=np.float64)
+    shares = diffracted / np.maximum(diffracted + responses[:, 1] @ central, 1e-300)
     return [DiffractedLight(*both) for both in zip(xyz, shares.tolist(), strict=True)]
 
 
@@ -318,23 +325,25 @@ def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
     return np.asarray((dot / w) ** 2 / (cos_i * cosine))
 
 
-def _spread(sines: Reals, powers: Reals, lobe: float, count: int) -> Reals:
+def _spread(sines: Reals, powers: Reals, lobe: float, out: NDArray[np.float32]) -> None:
     """Distribute powers (m, n) at sines (n, 2) over cells (m, count, count), with their lobes."""
+    count = out.shape[-1]
     position = sines / _CELL + 0.5 * count
     nearest = np.round(position).astype(int)
     part = position - nearest
     # quadratic B-splines, whose variance is 1/4 wherever the position lies between cells
     weights = 0.5 * (0.5 - part) ** 2, 0.75 - part**2, 0.5 * (0.5 + part) ** 2
-    cells = np.zeros((len(powers), count * count))
-    for right, along in enumerate(weights):
-        for up, across in enumerate(weights):
-            index = (nearest[:, 1] + up - 1) * count + nearest[:, 0] + right - 1
-            share = along[:, 0] * across[:, 1]
-            for n, power in enumerate(powers):
-                cells[n] += np.bincount(index, power * share, minlength=count * count)
+    three = np.arange(-1, 2)
+    rows, columns = (nearest[:, axis] + three[:, None] for axis in (1, 0))
+    across, along = (np.stack([each[:, axis] for each in weights]) for axis in (1, 0))
+    index = (rows[:, None] * count + columns).ravel()
+    share = (across[:, None] * along).reshape(9, -1)
     deviation = math.sqrt((lobe / _CELL) ** 2 - 0.25)
-    fields = cells.reshape(-1, count, count)
-    return np.stack([gaussian_filter(each, deviation, mode="constant") for each in fields])
+    for power, field in zip(powers, out, strict=True):
+        cells = np.bincount(index, (share * power).ravel(), minlength=count * count)
+        gaussian_filter(cells.reshape(count, count), deviation, output=field, mode="constant")
+        # sharpened powers of a scan dip below 0 between strong orders, as look-ups do
+        np.maximum(field, 0.0, out=field)
 
 
 def _chromaticity(xyz: Reals) -> Reals:

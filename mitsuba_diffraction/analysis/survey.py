@@ -13,6 +13,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -42,7 +43,7 @@ from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 10
+VERSION = 11
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -149,12 +150,15 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     phi = gratings[0].direction if gratings else 0.0
     # the energy of a metal is solved for some ten seconds; neither map nor index need it
     surface = {**dict(job.surface), "energy_conserving": False}
-    bsdf = bsdf_of(bsdf_dict(table, **surface))
-    row["surface"] = bsdf.describe().summary
-    measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
-    row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     light = LightDirection(job.theta, phi)
-    diffracted, floor = light_and_chance(table, light, _material(job, table).at(light))
+    factor = _material(job, table).at(light)
+    with ThreadPoolExecutor(1) as beside:  # the index takes about as long as BSDF and map
+        colours = beside.submit(light_and_chance, table, light, factor)
+        bsdf = bsdf_of(bsdf_dict(table, **surface))
+        measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
+        diffracted, floor = colours.result()
+    row["surface"] = bsdf.describe().summary
+    row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     row["diffracted"] = diffracted.share
     brightest, theta, phi = diffracted.brightest()
     row |= {"brightest": brightest, "brightest_theta_deg": theta, "brightest_phi_deg": phi}

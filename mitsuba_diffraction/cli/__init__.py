@@ -7,7 +7,6 @@ precompute             from heights to a table
 info                   summary of a file
 tangents               a patch laid smoothly over any mesh
 solve                  orders of a periodic profile
-solve_crossed          orders of a crossed grating, for `solve`
 orders                 efficiencies of solved orders as a CSV
 presets                the presets of --preset
 hologram               a logo as textures and a scene

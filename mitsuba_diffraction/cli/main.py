@@ -73,7 +73,7 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **how: Any) -> None:
         super().__init__(**how)
-        self._negative_number_matcher = re.compile(r"^-[\d.]+(:-?[\d.]+)*$")
+        self._negative_number_matcher = re.compile(r"^-[\d.]+([:,]-?[\d.]+)*$")
 
     def error(self, message: str) -> NoReturn:
         line = shortened(printable(message))

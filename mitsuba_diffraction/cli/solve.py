@@ -14,10 +14,10 @@ from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_name
-from .solve_crossed import solve_crossed_cell
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
+    from ..heights.field import HeightField
     from ..orders import OrderTable
     from ..orders.solve.films import Layers
     from ..orders.solve.recipes import SolvedRecipe
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _SOLVED_ONLY = (
     "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
     "wavelength_range", "tolerance", "solver", "resolution", "polarised", "theta", "phi", "step",
-    "jobs", "workers", "scheduler",
+    "jobs", "workers", "scheduler", "crossed",
 )  # fmt: skip
 #: Options that override fields of a recipe.
 _OF_A_RECIPE = (
@@ -71,8 +71,8 @@ def _layer(text: str) -> Layers:
     options.Group("the grating", (
         ("--period D", "µm", number_between(0.01, 1000)),
         ("--crossed", "SOURCE is one period of heights in x and y: an array (.npy) in µm, or an "
-         "image with --depth from black to white; needs --period; reflection in air, by "
-         "ikarus-rcwa (extra crossed), for dielectrics", bool),
+         "image with --depth from black to white; needs --period; reflection in air, for "
+         "dielectrics; default of --material: 1.5", bool),
         ("--period-y D", "µm, of a crossed grating, along y; default: --period",
          number_between(0.01, 1000)),
         ("--depth H", "µm, of a generator", number_between(0, 100)),
@@ -101,7 +101,7 @@ def _layer(text: str) -> Layers:
          "waves, for dielectrics; default: auto, the first that suits",
          ("auto", "chandezon", "integral", "coupled")),
         ("--resolution N", "points on the boundary, or harmonics; default: chosen by convergence",
-         whole_number(4)),
+         whole_number(3)),
         ("--polarised", "with Mueller matrices, for polarised variants; about 20 times as large",
          bool),
         ("--theta DEG", "solve light from these directions alone, angles from the normal within "
@@ -109,7 +109,8 @@ def _layer(text: str) -> Layers:
          options.numbers),
         ("--phi DEG", "with --theta: azimuths from x, across the grooves, towards y; default: 0",
          options.numbers),
-        ("--step NM", "with --theta: between wavelengths; default: 5", number_between(0.01, 1000)),
+        ("--step NM", "with --theta or --crossed: between wavelengths; default: 5, of all "
+         "directions of crossed gratings 20", number_between(0.01, 1000)),
         ("--import", "SOURCE holds efficiencies of another program or a bench: a long CSV of "
          "wavelength_nm, theta_deg, phi_deg, order, R_s, R_p, or NetCDF, of one angle of incidence "
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
@@ -137,9 +138,6 @@ def run(args: argparse.Namespace) -> Figures:
         check_outputs([output])
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
-    elif args.crossed:
-        check_outputs([output])
-        table = solve_crossed_cell(source, output, args)
     else:
         recipe = recipe_of(args)
         output = recipe.output
@@ -173,6 +171,11 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     from ..orders.solve.settings import Settings
 
     source = Path(args.source)
+    if args.crossed:
+        options.refuse(args, ("duty", "direction"), ": not allowed with --crossed")
+        cell, output = _unit_cell(source, args), args.output or Path(f"{source.stem}.nc")
+        recipe = SolvedRecipe(cell, "1.5", 1.0, False, Settings(), Path(output))
+        return _changed(recipe, args)
     options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
     shape = options.given(args, ("period", "depth", "duty", "direction"))
     if source.suffix.lower() == ".toml":
@@ -185,6 +188,26 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             )
         profile = profile_of(args.source, shape)
         recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
+    return _changed(recipe, args)
+
+
+def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
+    """Read one period of heights in x and y."""
+    from ..heights.read import LoadOptions, read_heights
+
+    if args.period is None:
+        args.parser.error("argument --crossed: needs --period, µm")
+    cell = read_heights(
+        source,
+        LoadOptions(pixel_size=(1.0, 1.0), max_height=args.depth, level="none", periodic="exact"),
+    )
+    rows, columns = cell.heights.shape
+    sizes = args.period / columns, (args.period_y or args.period) / rows
+    return replace(cell, pixel_size=sizes)
+
+
+def _changed(recipe: SolvedRecipe, args: argparse.Namespace) -> SolvedRecipe:
+    """Return a recipe with the options that override it."""
     changed = options.given(args, _OF_A_RECIPE)
     for name in ("layers", "beneath"):
         if name in changed:
@@ -203,8 +226,8 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     if recipe.block:
         _check_block(recipe, args)
     if args.theta is not None:
-        light = {"theta": args.theta, "phi": args.phi or 0.0, "step": args.step or 5.0}
-    elif args.phi is not None or args.step is not None:
+        light = {"theta": args.theta, "phi": args.phi or 0.0}
+    elif args.phi is not None or (args.step is not None and not args.crossed):
         args.parser.error("arguments --phi, --step: only with --theta")
     tolerance = recipe.settings.tolerance
     limits = (
@@ -232,6 +255,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             beneath=recipe.beneath,
             substrate=recipe.substrate,
             **light,
+            step=args.step,
             settings=recipe.settings,
             jobs=Jobs(folder, executor, bar),
             announce=announce,
@@ -276,18 +300,12 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
         )
         if table.polarised and "error_polarised" in facts:
             yield "", f"{facts['error_polarised']:.2%} with its polarisation"
-        if "error_largest" in facts:
-            yield (
-                "",
-                f"of an order above 1e-4, relative: {facts['error_relative']:.2%} in 95 %, at most "
-                f"{facts['error_largest']:.2%} ({facts['error_place']})",
-            )
-        elif "error_relative" in facts:
-            yield (
-                "",
-                f"of a listed number, relative: at most {facts['error_relative']:.2g} "
-                f"({facts['error_place']})",
-            )
+        yield (
+            "",
+            f"of a single order, relative: {facts['error_relative']:.2g} in 95 %, at most "
+            f"{facts['error_largest']:.2g} ({facts['error_place']})",
+        )
+    if "reciprocity_error" in facts:
         yield "reciprocity", f"kept within {facts['reciprocity_error']:.2g} of the light"
     if "energy_error" in facts:
         yield "energy", f"R + T is 1 within {facts['energy_error']:.2g} on average"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -29,17 +28,6 @@ _NOTHING = 1e-3
 _SEEN = ("catches", "contrasts")
 
 
-def _angles(text: str) -> list[float]:
-    """Parse a number, or FIRST:LAST:STEP, in degrees."""
-    with contextlib.suppress(ValueError):
-        found = options.numbers_of(text, 1000)
-        if found[-1] - found[0] <= 180.0:
-            return [round(angle, 6) for angle in found]
-    raise argparse.ArgumentTypeError(
-        f"expected degrees, or FIRST:LAST:STEP such as 0:60:5, got {text!r}"
-    )
-
-
 def azimuth(text: str) -> float | str:
     """Parse an angle, or auto."""
     return text if text == "auto" else float(text)
@@ -59,7 +47,7 @@ _SPECTROMETER = (
     ("--light-azimuth --azimuth DEG", "azimuth of the lamp from x towards y, degrees, or auto: "
      "across the grooves of the strongest grating", azimuth, 0.0),
     ("--detector DEG ...", "angles of the detectors from the normal, positive away from the lamp, "
-     "or ranges FIRST:LAST:STEP; default: the mirror direction", _angles),
+     "or ranges FIRST:LAST:STEP; default: the mirror direction", options.numbers),
     ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
     ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
      ("white", "mirror", "none"), "white"),

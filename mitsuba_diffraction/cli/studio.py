@@ -10,8 +10,9 @@ from pathlib import Path
 
 from ..errors import DiffractionError, quoted
 from ..files import MESHES
+from ..heights.lengths import numbers_of
 from ..scene.orbit import ORBIT
-from ..scene.parameters import numbers_in, parameters_of
+from ..scene.parameters import parameters_of
 from ..scene.pictures import check_panorama
 from ..scene.stage import STUDIO
 from .options import number_between
@@ -28,8 +29,8 @@ _FRAMES, _IRRADIANCE = 24, 3.0
 
 def _angles(text: str) -> tuple[str, str]:
     """Type of argument: azimuth and elevation in degrees."""
-    angles = numbers_in(text)
-    if angles is None or len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
+    angles = numbers_of(text) or ()
+    if len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
         raise argparse.ArgumentTypeError(
             f"expected azimuth and elevation in degrees, such as 120,40, got {quoted(text)}"
         )

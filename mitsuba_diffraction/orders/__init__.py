@@ -15,6 +15,7 @@ lookup         look-up of cells and blocks, in NumPy and in kernels
 listed_lookup  the same of listed light
 response       elements of Mueller matrices over cells, or of listed light
 listed         tables of listed light
+table_error    the error of a table beside known efficiencies
 imported       `read_orders`: of another program's efficiencies, or of a bench
 lists          files of efficiencies, CSV and NetCDF, and their conventions
 listing        `list_orders`: a table's efficiencies as such a file

@@ -30,7 +30,7 @@ from .response import Band
 from .table import OrderTable
 
 #: Least normal parts, within over n and above, from which on reduced efficiencies are known at a
-#: node; nearer to grazing, where solutions keep a distance, they have the next node's.
+#: node; nearer to grazing they have the next node's.
 _LEAST_WITHIN, _LEAST_ABOVE = 0.04, 0.05
 
 

@@ -11,7 +11,8 @@ Global attributes hold the rest: `period` (µm), `period_y` (of a crossed gratin
 `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
 ports of `cells`), `block` (index of a block, with the ports of `blocks`), `even` (1 for even nodes,
 else Chebyshev nodes), `in_plane` (1 for listed light of one plane), `header` (JSON), `version`, and
-`sha256` of all of these and the numbers. Attributes that do not apply are left out.
+`sha256` of the table's digest and header.
+Attributes that do not apply are left out.
 """
 
 from __future__ import annotations
@@ -37,8 +38,7 @@ from ..tables.fields import mapping
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
-#: Raised whenever the meaning of the numbers changes. Version 1 is read, too, but imported tables
-#: and crossed gratings, which have other lights now.
+#: Raised whenever the meaning of the numbers changes; files of other versions are refused.
 FORMAT_VERSION = 2
 SUFFIX = ".nc"
 _AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
@@ -54,10 +54,10 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         raise DiffractionError(
             f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
         )
-    content = io.BytesIO()
+    content, header = io.BytesIO(), json.dumps(dict(table.header), sort_keys=True)
     with netcdf_file(content, "w") as file:
         file.title = "Efficiencies of the orders of a grating"
-        file.header = json.dumps(dict(table.header), sort_keys=True)
+        file.header = header
         setattr(file, ORDERS_ATTRIBUTE, np.int32(FORMAT_VERSION))
         file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
         file.period, file.period_units = np.float64(table.periods[0]), "um"
@@ -69,7 +69,7 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
         if table.block:
             file.block = np.float64(table.block)
         _add_response(file, table)
-        file.sha256 = _checksum(file)
+        file.sha256 = _checksum(table.digest(), header)
         file.flush()
         data = content.getvalue()
     with atomic_path(path) as temporary:
@@ -131,7 +131,7 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
                 return _first_version(file)
             if version != FORMAT_VERSION:
                 raise DiffractionError(
-                    f"its format version is {version}, this program reads 1 and {FORMAT_VERSION}"
+                    f"its format version is {version}, this program reads {FORMAT_VERSION}"
                 )
             return _table(file)
     except DiffractionError as error:
@@ -159,9 +159,9 @@ def _advice(path: Path) -> str:
 
 def _table(file: Any) -> OrderTable:
     """Return the table of an open file."""
-    _check_sizes(file)
-    if file.sha256 != _checksum(file).encode():
-        raise ValueError("its checksum is of another one")
+    for name, variable in file.variables.items():
+        if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
+            raise ValueError(f"{name} claims {variable.shape} numbers")
     if _LISTED in file.variables:
         axes = [np.array(file.variables[name][:], float) for name in ("wavelength", "theta", "phi")]
         orders = [file.variables[name][:].astype(np.int64) for name in ("order_x", "order_y")]
@@ -171,13 +171,19 @@ def _table(file: Any) -> OrderTable:
         )  # fmt: skip
     else:
         response = CellResponse(_bands(file), even=bool(getattr(file, "even", False)))
-    return _with_outline(file, response)
-
-
-def _check_sizes(file: Any) -> None:
-    for name, variable in file.variables.items():
-        if np.prod(variable.shape, dtype=float) > MOST_EFFICIENCIES:
-            raise ValueError(f"{name} claims {variable.shape} numbers")
+    header, (low, high) = file.header.decode("utf-8"), map(float, file.wavelengths)
+    table = OrderTable(
+        (float(file.period), float(getattr(file, "period_y", math.inf))),
+        (low, high),
+        response,
+        float(file.superstrate),
+        mapping(json.loads(header), "header"),
+        bool(getattr(file, "thin", False)),
+        float(file.block) if hasattr(file, "block") else None,
+    )
+    if file.sha256 != _checksum(table.digest(), header).encode():
+        raise ValueError("its checksum is of another one")
+    return table
 
 
 def _floats(file: Any, name: str) -> NDArray[np.float32]:
@@ -196,38 +202,9 @@ def _bands(file: Any) -> tuple[Band, ...]:
     )
 
 
-def _with_outline(file: Any, response: CellResponse | ListedResponse) -> OrderTable:
-    """Return the table with the attributes of an open file."""
-    header = mapping(json.loads(_text(file.header)), "header")
-    low, high = map(float, file.wavelengths)
-    return OrderTable(
-        (float(file.period), float(getattr(file, "period_y", math.inf))),
-        (low, high),
-        response,
-        float(file.superstrate),
-        header,
-        bool(getattr(file, "thin", False)),
-        float(file.block) if hasattr(file, "block") else None,
-    )
-
-
-def _text(attribute: str | bytes) -> str:
-    """Return an attribute of a file that is written, or read: bytes then."""
-    return attribute if isinstance(attribute, str) else attribute.decode("utf-8")
-
-
-def _checksum(file: Any) -> str:
-    """Return the checksum of an open file's attributes and numbers."""
-    content = hashlib.sha256(_text(file.header).encode())
-    for name in ("wavelengths", "period", "period_y", "superstrate", "thin", "block", "even",
-                 "in_plane"):  # fmt: skip
-        if hasattr(file, name):
-            content.update(name.encode() + np.asarray(getattr(file, name), ">f8").tobytes())
-    for name in sorted(file.variables):
-        variable = file.variables[name]
-        content.update(repr((name, tuple(map(int, variable.shape)))).encode())
-        content.update(np.ascontiguousarray(variable[:]).data)
-    return content.hexdigest()
+def _checksum(digest: str, header: str) -> str:
+    """Return the checksum of a table's digest and header."""
+    return hashlib.sha256(f"{digest}{header}".encode()).hexdigest()
 
 
 # ---------------------------------------------------------------------- version 1
@@ -244,7 +221,6 @@ def _first_version(file: Any) -> OrderTable:
             "it holds imported efficiencies, or a crossed grating, of a former format, whose "
             "listed light was not kept"
         )
-    _check_sizes(file)
     numbers = {name: variable[:] for name, variable in file.variables.items()}
     if file.sha256 != _first_checksum(file, numbers).encode():
         raise ValueError("its checksum is of another one")
@@ -267,13 +243,18 @@ def _first_version(file: Any) -> OrderTable:
         if a is None:
             raise ValueError(f"it lacks kind A of band {k}")
         bands.append(Band(k, a, kind("b", k)))
-    return _with_outline(file, CellResponse(tuple(bands), even=block))
+    return OrderTable(
+        (float(file.period), math.inf), (float(file.wavelengths[0]), float(file.wavelengths[1])),
+        CellResponse(tuple(bands), even=block), float(file.superstrate),
+        mapping(json.loads(file.header.decode("utf-8")), "header"),
+        bool(getattr(file, "thin", False)), float(file.block) if block else None,
+    )  # fmt: skip
 
 
 def _first_checksum(file: Any, numbers: dict[str, NDArray[Any]]) -> str:
     always = (
         float(file.period), tuple(map(float, file.wavelengths)), float(file.superstrate),
-        _text(file.header),
+        file.header.decode("utf-8"),
     )  # fmt: skip
     content = hashlib.sha256(repr(always).encode())
     if getattr(file, "thin", False):

@@ -20,10 +20,11 @@ from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
 from .cells import Array
 from .efficiency import MIN_ANGLE, turned_axes
-from .listed import Lights, listed_response, listed_table, warn_of_gaps
+from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .response import LARGEST_SUM, ListedResponse, orders_between
 from .table import OrderTable, check_outline
+from .table_error import table_error
 
 #: Difference between light and reversed light above which a file hardly holds powers: grids of 5 to
 #: 45° have 0.02 to 0.14, efficiencies without the ratio of cosines 0.4 to 0.8.
@@ -31,6 +32,8 @@ _ONE_WAY = 0.2
 #: Distance from grazing, in squared cosines, within which rounding decides whether an order
 #: propagates.
 _EDGE = 1e-6
+#: Efficiency from which on relative errors are measured.
+_COUNTED = 1e-9
 
 
 def imported_table(
@@ -70,11 +73,10 @@ def imported_table(
     return replace(table, header=header)
 
 
-def _mirror(theta: Array, phi: Array, crossed: bool) -> tuple[Array, Array]:
-    """Return (x, y) of the mirror direction of light; of grooves the image with y at least 0."""
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    y = -sine * np.sin(turn)
-    return -sine * np.cos(turn), y if crossed else np.abs(y)
+def _placed(theta: Array, phi: Array, crossed: bool) -> tuple[Array, Array]:
+    """Return the mirror direction of light; of grooves the image with y at least 0."""
+    x, y = mirror_of(theta, phi)
+    return x, y if crossed else np.abs(y)
 
 
 def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
@@ -85,7 +87,7 @@ def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
     theta, phi = np.meshgrid(
         np.where(grid.theta == 0.0, MIN_ANGLE, grid.theta), grid.phi, indexing="ij"
     )
-    turned = turned_axes(*_mirror(theta, phi, crossed))
+    turned = turned_axes(*_placed(theta, phi, crossed))
     cosine, sine = (part[:, :, None, None] for part in turned)
     elements = np.stack([mean, half * cosine, half * sine], axis=-1)
     for row in np.flatnonzero(grid.theta == 0.0):
@@ -109,7 +111,7 @@ def _sheet(
     through = replace(response, values=response.values[..., count:, :])
     alone = OrderTable(periods, ends, through)
     lam, theta, phi = (axis[..., None] for axis in np.meshgrid(*response.axes, indexing="ij"))
-    x, y = _mirror(theta, phi, False)
+    x, y = _placed(theta, phi, False)
     orders = response.orders[:, 0]
     steps = orders * lam / (1e3 * periods[0])
     # reversed light enters along the order that it left by
@@ -135,7 +137,7 @@ def _check_orders(
     lam, theta, phi = (
         axis.ravel() for axis in np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     )
-    x, y = _mirror(theta, phi, crossed)
+    x, y = _placed(theta, phi, crossed)
     steps = [1e-3 * lam / (superstrate * period) for period in periods]
 
     def square(some: NDArray[np.int64]) -> Array:
@@ -188,18 +190,21 @@ def _errors(
     """
     lam, theta, phi = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     level = np.where(theta == 0.0, MIN_ANGLE, theta)
-    x, y = (part[..., None] for part in _mirror(level, phi, table.crossed))
+    x, y = (part[..., None] for part in _placed(level, phi, table.crossed))
     light = x, y, lam[..., None], orders[:, 0], orders[:, 1]
     got = [table.polarised_efficiency(*light)]
     if table.thin:
         got.append(table.polarised_efficiency(*light, transmitted=True))
     truth = np.nan_to_num(values)
     found = np.concatenate(got, axis=-1)
-    lit = truth > 1e-9
-    relative = np.where(lit, np.abs(found - truth) / np.maximum(truth, 1e-9), 0.0)
-    worst = np.unravel_index(int(relative.argmax()), relative.shape)
-    missed, total = np.abs(found - truth).sum(axis=(-2, -1)), truth.sum(axis=(-2, -1))
-    floor = max(0.05 * float(total.mean()), 1e-12)
+    shape = (-1, len(orders), truth.shape[-1])
+    every = np.ones(truth.size // truth.shape[-1], bool).reshape(-1, len(orders))
+
+    def place(light: int, order: int, kind: int) -> str:
+        shown = _shown(orders[order], table.crossed)
+        return f"{grid.light(light)}, order {shown}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
+
+    error = table_error(found.reshape(shape), truth.reshape(shape), every, _COUNTED, place)
     others = (orders != 0).any(axis=1)
     shift = [part * light[2] / (1e3 * period * table.superstrate)
              for part, period in zip(orders.T, table.periods, strict=True)]  # fmt: skip
@@ -208,17 +213,8 @@ def _errors(
     forth = table.efficiency(*light)
     back = np.where(known, table.efficiency(-out[0], -out[1], *light[2:]), forth)
     sent = float(forth[np.broadcast_to(known, forth.shape)].sum())
-    return {
-        "error_mean": float(missed.sum()) / max(float(total.sum()), 1e-12),
-        "error_worst": float(np.quantile(missed / np.maximum(total, floor), 0.95)),
-        "error_relative": float(relative.max()),
-        "error_place": (
-            f"{grid.wavelengths[worst[0]]:g} nm, theta {grid.theta[worst[1]]:g}°, phi "
-            f"{grid.phi[worst[2]]:g}°, order {_shown(orders[worst[3]], table.crossed)}, "
-            f"{'RT'[worst[4] // 2]}_{'sp'[worst[4] % 2]}"
-        ),
-        "reciprocity_error": float(np.abs(back - forth).sum()) / max(sent, 1e-12),
-    }
+    reciprocity = float(np.abs(back - forth).sum()) / max(sent, 1e-12)
+    return {**error.facts(), "reciprocity_error": reciprocity}
 
 
 def read_orders(

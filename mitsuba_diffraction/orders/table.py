@@ -194,7 +194,8 @@ class OrderTable:
 
     @cached_property
     def _digest(self) -> str:
-        outline = [self.periods, self.wavelengths, self.superstrate, self.thin, self.block]
+        media = self.superstrate, self.thin, self.block or 0.0
+        outline: list[Any] = [float(x) for x in (*self.periods, *self.wavelengths, *media)]
         content = hashlib.sha256()
         if isinstance(self.response, ListedResponse):
             outline.append(self.response.in_plane)

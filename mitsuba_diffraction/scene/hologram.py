@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line, quoted
-from ..files import readable_file
-from ..images import open_image
+from ..errors import DiffractionError, quoted
+from ..images import read_picture
 from ..tables.exr import write_channels
 
 Floats = NDArray[np.float32]
@@ -187,13 +186,8 @@ def _picture(image: ArrayLike | str | os.PathLike[str]) -> tuple[NDArray[Any], f
 
 
 def _read(path: Path) -> NDArray[Any]:
-    readable_file(path)
-    try:
-        with open_image(path) as picture:
-            mode, values = picture.mode, np.array(picture)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        reason = one_line(str(error))
-        raise DiffractionError(f"hologram: cannot read '{path}' as a picture: {reason}") from error
+    picture = read_picture(path)
+    mode, values = picture.mode, np.array(picture)
     if values.ndim != 2:
         raise DiffractionError(
             f"hologram: '{path}' has colours ({mode}); save it in grey, or with a palette whose "

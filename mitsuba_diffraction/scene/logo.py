@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import distance_transform_edt, grey_dilation, grey_erosion
 
-from ..errors import DiffractionError, one_line
-from ..files import readable_file
-from ..images import open_image
+from ..errors import DiffractionError
+from ..images import read_picture
 from ..optics.colour import decode_srgb, linear_srgb, response
 from .hologram import Hologram, hologram
 
@@ -96,13 +95,7 @@ def areas(file: Path, *, colours: int = 6, dots: int = 512, keep_ground: bool = 
 
 def _read(file: Path, dots: int) -> NDArray[np.uint8]:
     """Return RGBA (ny, nx, 4) with so many pixels along the longer side."""
-    readable_file(file)
-    try:
-        with open_image(file) as picture:
-            rgba = picture.convert("RGBA")
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        reason = one_line(str(error))
-        raise DiffractionError(f"'{file}' cannot be read as a picture: {reason}") from error
+    rgba = read_picture(file).convert("RGBA")
     scale = dots / max(rgba.size)
     width, height = (max(1, round(scale * length)) for length in rgba.size)
     return np.asarray(rgba.resize((width, height), Image.Resampling.BICUBIC))

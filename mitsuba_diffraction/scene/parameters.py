@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import math
 import os
 import re
 import xml.etree.ElementTree as ElementTree
@@ -16,6 +15,7 @@ from typing import Any
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
 from ..gltf import note_named
+from ..heights.lengths import numbers_of
 from ..inputs import note_input
 from ..limits import DEEPEST_ELEMENT, DEEPEST_INCLUDE, MOST_INCLUDES, check_count
 from .stage import STUDIO
@@ -307,21 +307,12 @@ def change_of(text: str) -> Change:
     start, colon, end = values.partition(":")
     if not (name and equals and colon):
         raise DiffractionError(f"expected KEY=FROM:TO, e.g. sun_azimuth=0:90, got {quoted(text)}")
-    pair = numbers_in(start), numbers_in(end)
-    if pair[0] is None or pair[1] is None or len(pair[0]) != len(pair[1]):
+    pair = numbers_of(start), numbers_of(end)
+    if not (pair[0] and pair[1] and len(pair[0]) == len(pair[1])):
         raise DiffractionError(
             f"expected numbers, as many before as after the colon, got {quoted(text)}"
         )
     return Change(name, pair[0], pair[1])
-
-
-def numbers_in(text: str) -> Numbers | None:
-    """The finite numbers of a list with commas between, or None if it is not one."""
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        return None
-    return values if all(map(math.isfinite, values)) else None
 
 
 def values_of_frames(
@@ -344,8 +335,8 @@ def values_of_frames(
     around = []
     for name in turns:
         start = fixed.get(name) or (parameters_of(scene, fixed) or {}).get(name, "0")
-        begin = numbers_in(start or "")
-        if begin is None or len(begin) != 1:
+        begin = numbers_of(start or "") or ()
+        if len(begin) != 1:
             raise DiffractionError(
                 f"the turn of {name} begins at {start!r}, which is not an angle in degrees; give a "
                 f"number: {name}=0"

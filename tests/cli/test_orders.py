@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
 from tests.support import crossed
 from tests.support.orders import thin_grating
@@ -103,10 +104,16 @@ def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkey
 def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("flat.npy", np.zeros((4, 4)))
-    flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500:500", "--resolution", 4)
-    solved = run("solve", "flat.npy", *flags, "-o", "flat.nc")
+    flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500:500", "--resolution", 3)
+    light = ("--theta", "0,60", "--polarised")
+    solved = run("solve", "flat.npy", *flags, *light, "-o", "flat.nc")
     assert "1 orders" in solved.out
+    run("orders", "flat.nc", "--theta", 60, "--polarised", "-o", "flat.csv")
+    s, p = np.loadtxt("flat.csv", delimiter=",", skiprows=1)[-2:].tolist()
+    inside = np.sqrt(1.5**2 - 0.75)
+    assert s == pytest.approx(((0.5 - inside) / (0.5 + inside)) ** 2, rel=1e-6)  # Fresnel
+    assert p == pytest.approx(((1.125 - inside) / (1.125 + inside)) ** 2, rel=1e-6)
     assert run("solve", "flat.npy", "--crossed").err.count("--period") > 0
-    assert "not allowed with --crossed" in run("solve", "flat.npy", *flags, "--polarised").err
-    assert "not square" in run("solve", "flat.npy", *flags, "--period-y", 0.3).err
+    assert "not allowed with --crossed" in run("solve", "flat.npy", *flags, "--duty", 0.3).err
+    assert "leave out" in run("solve", "flat.npy", *flags, "--thin").err
     assert "one-dimensional" in run("solve", "flat.npy", "--period", 0.2).err

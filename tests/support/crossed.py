@@ -9,7 +9,6 @@ from mitsuba_diffraction.optics.orders import crossed_square
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.imported import imported_table
 from mitsuba_diffraction.orders.lists import Efficiencies
-from mitsuba_diffraction.orders.solve.crossed import most_orders
 
 PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
 #: Reflectance; and amplitudes of the sine waves along x and y, µm.
@@ -28,7 +27,7 @@ def efficiency(x, y, wavelength, m, n):
 
 def listed(theta, phi, wavelengths):
     """Efficiencies on a grid, as a file has them."""
-    m_x, m_y = most_orders(PERIODS, (wavelengths[0], wavelengths[-1]))
+    m_x, m_y = (int(2e3 * period / wavelengths[0]) for period in PERIODS)
     pairs = np.mgrid[-m_x : m_x + 1, -m_y : m_y + 1].reshape(2, -1)
     lam, polar, azimuth, m = np.meshgrid(
         wavelengths, theta, phi, np.arange(pairs.shape[1]), indexing="ij"

@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ...files import tiff_tags
 from ..lengths import micrometres_of
 
 _HEADER = 1 << 17  # bytes, more than any header
@@ -201,6 +202,55 @@ def _bcr(path: Path, head: bytes) -> Iterator[Stated]:
         yield Stated(x * factor, y * factor)
 
 
+def _ibw(path: Path, head: bytes) -> Iterator[Stated]:
+    """Points `nDim` times steps `sfA` of the first two dimensions, in `dimUnits` (version 5)."""
+    order = "<" if head.startswith(b"\5\0") else ">"
+    points = struct.unpack_from(f"{order}2i", head, 132)
+    steps = struct.unpack_from(f"{order}2d", head, 148)
+    units = [micrometres_of(head[at : at + 4].split(b"\0")[0].decode()) for at in (216, 220)]
+    width, height = (n * abs(step) for n, step in zip(points, steps, strict=True))
+    if units[0] and units[1]:
+        yield Stated(width * units[0], height * units[1])
+
+
+def _nid(path: Path, head: bytes) -> Iterator[Stated]:
+    """`Dim0Range` and `Dim1Range` of the data sets whose values are lengths."""
+    for section in re.split(rb"^\[", head.split(b"#!")[0], flags=re.MULTILINE):
+        fields = dict(re.findall(rb"^(Dim\d\w+)=(.*?)\r?$", section, re.MULTILINE))
+        units = [fields.get(b"Dim%dUnit" % n, b"").decode("latin-1") for n in range(3)]
+        x, y, z = map(micrometres_of, units)
+        if x and y and z:
+            yield Stated(float(fields[b"Dim0Range"]) * x, float(fields[b"Dim1Range"]) * y)
+
+
+def _tiff(path: Path, head: bytes) -> Iterator[Stated]:
+    """Sizes in the header of Park Systems, µm, or the grid's lengths of JPK, m."""
+    park, width, height = 50435, 0x8042, 0x8043
+    tags = tiff_tags(path, (park, width, height))
+    if park in tags:
+        yield Stated(*struct.unpack_from("<2d", bytes(map(int, tags[park][:156])), 140))
+    elif width in tags:
+        yield Stated(tags[width][0] * 1e6, tags[height][0] * 1e6)
+
+
+def _mdt(path: Path, head: bytes) -> Iterator[Stated]:
+    """Steps of each scanned frame times its points; units are m, cm, mm, µm, nm and Å."""
+    units = dict(zip(range(-5, 1), (1e6, 1e4, 1e3, 1.0, 1e-3, 1e-4), strict=True))
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as file:
+        at, (count,) = 33, struct.unpack_from("<H", file, 12)
+        for _ in range(count + 1):
+            size, kind = struct.unpack_from("<IH", file, at)
+            if kind == 0:
+                (fields,) = struct.unpack_from("<H", file, at + 20)
+                (x, x_unit), (y, y_unit) = (
+                    struct.unpack_from("<fh", file, at + place) for place in (26, 36)
+                )
+                nx, ny = struct.unpack_from("<2H", file, at + 24 + fields)
+                if x_unit in units and y_unit in units:
+                    yield Stated(nx * abs(x) * units[x_unit], ny * abs(y) * units[y_unit])
+            at += size
+
+
 def _value(head: bytes, pattern: str) -> float:
     """Return the number that a pattern finds in a header of lines."""
     match = re.search(pattern.encode(), head, re.MULTILINE)
@@ -213,5 +263,7 @@ _WITNESSES: tuple[tuple[bytes, Callable[[Path, bytes], Iterator[Stated]]], ...] 
     *((begins, _nanoscope) for begins in (b"\\*File list", b"\\*Force file list", b"?*File list")),
     (b"GWYP", _gwyddion), (b"PK\x03\x04", _x3p), (b"aISO-1.0", _sdf), (b"bISO-1.0", _sdf),
     (b"fileType", _mi), (b"WSxM file copyright", _wsxm), (b"fileformat = bcr", _bcr),
+    (b"\5\0", _ibw), (b"\0\5", _ibw), (b"[DataSet]", _nid), (b"\x01\xb0\x93\xff", _mdt),
+    (b"II*\0", _tiff), (b"MM\0*", _tiff),
     *((mark + "fileformat = bcr".encode("utf-16-le"), _bcr) for mark in (b"", b"\xff\xfe")),
 )  # fmt: skip

@@ -15,7 +15,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
-from ...files import read_bytes
+from ...files import read_bytes, tiff_tags
 from ...images import open_image
 from ...limits import check_content
 from ...streams import without_chatter
@@ -109,21 +109,8 @@ def _doubles(path: Path, shown: str) -> npt.NDArray[np.float64] | None:
     if order is None:
         return None
     try:
-        (start,) = struct.unpack(f"{order}I", content[4:8])
-        (count,) = struct.unpack(f"{order}H", content[start : start + 2])
-        tags = {}
-        for n in range(count):
-            at = start + 2 + 12 * n
-            tag, kind, number = struct.unpack(f"{order}HHI", content[at : at + 8])
-            letter = {3: "H", 4: "I"}.get(kind)
-            if letter is None:
-                continue
-            size = struct.calcsize(letter) * number
-            place = (
-                at + 8 if size <= 4 else struct.unpack(f"{order}I", content[at + 8 : at + 12])[0]
-            )
-            tags[tag] = struct.unpack(f"{order}{number}{letter}", content[place : place + size])
         doubles = {258: (64,), 277: (1,), 339: (3,)}
+        tags = tiff_tags(path, {*doubles, 256, 257, 259, 273, 279, _ORIENTATION})
         if any(tags.get(tag, (1,)) != value for tag, value in doubles.items()):
             return None
         if tags.get(259, (1,)) != (1,) or 273 not in tags:
@@ -131,16 +118,16 @@ def _doubles(path: Path, shown: str) -> npt.NDArray[np.float64] | None:
                 f"{shown} has 64-bit floats that are compressed or in tiles; save it uncompressed, "
                 "or as 32-bit float in µm"
             )
-        (nx,), (ny,) = tags[256], tags[257]
+        nx, ny = int(tags[256][0]), int(tags[257][0])
         check_pixel_count(ny, nx, shown)
-        strips = zip(tags[273], tags[279], strict=True)
+        strips = (map(int, pair) for pair in zip(tags[273], tags[279], strict=True))
         data = b"".join(content[place : place + size] for place, size in strips)
         heights = np.frombuffer(data, f"{order}f8").reshape(ny, nx).astype(np.float64)
-    except (struct.error, KeyError, ValueError) as error:
+    except (KeyError, IndexError, ValueError) as error:
         if isinstance(error, DiffractionError):
             raise
         raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
-    return np.asarray(_TURNED.get(tags.get(_ORIENTATION, (1,))[0], _TURNED[1])(heights))
+    return np.asarray(_TURNED.get(int(tags.get(_ORIENTATION, (1,))[0]), _TURNED[1])(heights))
 
 
 def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:

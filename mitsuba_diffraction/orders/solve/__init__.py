@@ -4,7 +4,7 @@ Contents
 --------
 orders      `solve_orders`: from a profile and a material to a table
 directions  the same of some directions of light alone, as of an echelle
-crossed     `solve_crossed`: orders of crossed gratings
+crossed     solver: coupled waves of crossed gratings
 settings    settings of a solution, and estimates of its stages
 accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
@@ -19,7 +19,6 @@ coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
 nodes       stations at nodes, and along lines across a band
 node_counts  numbers of nodes, by series along lines
-block       stations of a block's face near grazing
 sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`

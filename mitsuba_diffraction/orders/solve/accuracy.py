@@ -7,11 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...errors import warn
+from ..efficiency import turned_axes
 from ..polarised import mueller_of
-from ..response import UNPOLARISED
+from ..response import UNPOLARISED, CellResponse
 from ..table import OrderTable
+from ..table_error import TableError, table_error, unpolarised
 from .jobs import Jobs, Problem
-from .nodes import places_at
+from .nodes import Place, located
 from .stations import Complex, Real
 
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
@@ -25,35 +28,25 @@ _COUNTED = 1e-4
 class InterpolationError(NamedTuple):
     """Error of interpolation, over random directions and wavelengths.
 
-    mean : of the light in all orders but 0, which the table has too much or too little in an order.
-    most : the same of a direction, which 95 % of them keep.
+    table : of all orders but 0; relative errors are of orders above 1e-4 of the light.
     bands : of each band, from k = 0, as a share of all light.
     polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the same light (½‖M‖ is the
         efficiency); None without them.
-    relative : of an order above 1e-4 of the light, and of a polarisation where the table has them,
-        relative to its efficiency, which 95 % of them keep.
-    largest, place : largest of these, and its light.
     """
 
-    mean: float
-    most: float
+    table: TableError
     bands: Real
     polarised: float | None
-    relative: float
-    largest: float
-    place: str
+
+    @property
+    def mean(self) -> float:
+        """Larger one of the mean errors, of efficiencies and of matrices."""
+        return max(self.table.mean, self.polarised or 0.0)
 
     def facts(self) -> dict[str, Any]:
         """Return the entries of a header."""
         polarised = {} if self.polarised is None else {"error_polarised": self.polarised}
-        return {
-            "error_mean": self.mean,
-            "error_worst": self.most,
-            "error_relative": self.relative,
-            "error_largest": self.largest,
-            "error_place": self.place,
-            **polarised,
-        }
+        return self.table.facts() | polarised
 
 
 def missed_tolerance(header: Mapping[str, Any]) -> bool:
@@ -65,6 +58,17 @@ def missed_tolerance(header: Mapping[str, Any]) -> bool:
     return bool(mean > tolerance or header["error_worst"] > WORST * tolerance)
 
 
+def warn_of_error(header: Mapping[str, Any]) -> None:
+    """Warn of a table that misses its tolerance."""
+    if missed_tolerance(header):
+        tolerance = header["tolerance"]
+        warn(
+            f"the table misses {header['error_mean']:.2%} of the light in its orders on average "
+            f"(tolerance {tolerance:.2%}) and {header['error_worst']:.2%} in 5 % of directions "
+            f"(tolerance {WORST * tolerance:.2%}); use a larger tolerance, or fewer wavelengths"
+        )
+
+
 def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> InterpolationError:
     """Compare a table, as the renderer reads it, with solutions at random lights.
 
@@ -73,64 +77,66 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Interpola
     block, the light that goes through.
     """
     x, y, lam = diffuse_light(SAMPLES, table.wavelengths)
-    cell, places = places_at(x, y, lam, table.wavelengths, table.optical_period)
-    solved = jobs.amplitudes(problem, places, "measuring the error")
-    missed, light, turned = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
-    relative, where = [np.zeros(0)], [""]
+    lights = located(problem.grating, x, y, lam)
+    solved = jobs.amplitudes(problem, [light.place for light in lights], "measuring the error")
     index = table.block or 1.0  # light of a table has its direction above the surface
     guided = index * np.hypot(x, y) >= 1.0
-    for n, place in enumerate(places):
-        j, count = int(cell.channel[n]), int(cell.channels[n])
+    most = table.sides * max(len(light.orders) for light in lights)
+    truth, found = np.zeros((2, SAMPLES, most, 1 if table.response.elements == UNPOLARISED else 2))
+    coloured, turned = np.zeros((SAMPLES, most), bool), 0.0
+    for n, (place, port, orders) in enumerate(lights):
+        count = len(orders)
         side = n % table.sides * int(not (table.block and guided[n]))
-        truth = powers(solved[place])[0, side * count + j]  # (ports, 2)
-        orders = j - np.arange(count)
-        at, below = (index * x[n], index * y[n], lam[n], orders), (side == 1) != bool(table.block)
-
-        def of_sides(lookup: Any, at: Any = at, below: bool = below, side: int = side) -> Real:
-            return np.concatenate([
-                lookup(*at, from_below=below, transmitted=other != side)
-                for other in range(table.sides)
-            ])  # fmt: skip
-
-        if table.response.elements == UNPOLARISED:
-            truth = truth.mean(axis=-1, keepdims=True)
-            got = of_sides(table.efficiency)[:, None]
-        else:
-            got = of_sides(table.groove_efficiency)
+        at = index * x[n], index * y[n], lam[n], *orders.T
+        below, ports = (side == 1) != bool(table.block), slice(count * table.sides)
+        truth[n, ports], found[n, ports] = by_polarisation(
+            table, solved[place], at, side * count + port, below
+        )
         alone = np.arange(table.sides) != (side if table.block else -1)
-        coloured = np.tile(orders != 0, table.sides) if count > 1 else alone
-        difference = np.abs(got.mean(axis=-1) - truth.mean(axis=-1))
-        missed[n], light[n] = difference[coloured].sum(), truth.mean(axis=-1)[coloured].sum()
-        bright = truth > _COUNTED
-        relative.append((np.abs(got - truth) / np.maximum(truth, _COUNTED))[bright])
-        where += [
-            f"{lam[n]:.1f} nm, x {x[n]:.3f}, y {y[n]:.3f}, order {np.tile(orders, table.sides)[q]}"
-            for q, _ in np.argwhere(bright)
-        ]
+        lit = np.tile(orders.any(axis=1), table.sides) if count > 1 else alone
+        coloured[n, ports] = lit
         if table.polarised:
-            matrices = table.mueller(x[n], abs(y[n]), lam[n], orders)
-            error = matrices - mueller_of(solved[place])[0, j]
-            turned += 0.5 * np.linalg.norm(error[coloured], axis=(1, 2)).sum()
-    each = np.concatenate(relative)
-    largest = int(each.argmax()) if len(each) else -1
+            matrices = table.mueller(x[n], y[n] if table.crossed else abs(y[n]), *at[2:])
+            error = matrices - mueller_of(solved[place])[0, port]
+            turned += 0.5 * np.linalg.norm(error[lit], axis=(1, 2)).sum()
+
+    def name(n: int, q: int, _: int) -> str:
+        m_x, m_y = lights[n].orders[q % len(lights[n].orders)]
+        order = f"({m_x}, {m_y})" if table.crossed else f"{m_x}"
+        return f"{lam[n]:.1f} nm, x {x[n]:.3f}, y {y[n]:.3f}, order {order}"
+
+    missed, light = unpolarised(found, truth, coloured)
+    bands = [light.place.band if isinstance(light.place, Place) else 0 for light in lights]
     return InterpolationError(
-        *missed_shares(missed, light),
-        np.bincount(cell.band, missed, len(table.bands)) / light.sum(),
+        table_error(found, truth, coloured, _COUNTED, name),
+        np.bincount(bands, missed, table.last_band + 1) / light.sum(),
         float(turned / light.sum()) if table.polarised else None,
-        float(np.quantile(each, 0.95)) if len(each) else 0.0,
-        float(each[largest]) if len(each) else 0.0,
-        where[largest + 1] if len(each) else "",
     )
 
 
-def missed_shares(missed: Real, light: Real) -> tuple[float, float]:
-    """Return the missed part of all light, and the part that 95 % of the lights (n,) keep.
+def by_polarisation(
+    table: OrderTable, amplitudes: Complex, at: tuple[Any, ...], port: int, below: bool
+) -> tuple[Real, Real]:
+    """Return solved and tabulated efficiencies of all ports, (ports, 1 or 2).
 
-    Directions with hardly any light are judged by a twentieth of the mean.
+    Of light of each polarisation along the grooves; of s and of p in tables of a list.
     """
-    floor = max(0.05 * float(light.mean()), 1e-12)
-    worst = np.quantile(missed / np.maximum(light, floor), 0.95)
-    return float(missed.sum()) / max(float(light.sum()), 1e-12), float(worst)
+
+    def of_sides(lookup: Any) -> Real:
+        return np.concatenate([
+            lookup(*at, from_below=below, transmitted=bool(other) != (below != bool(table.block)))
+            for other in range(table.sides)
+        ])  # fmt: skip
+
+    truth = powers(amplitudes)[0, port]
+    if table.response.elements == UNPOLARISED:
+        return truth.mean(axis=-1, keepdims=True), of_sides(table.efficiency)[:, None]
+    if isinstance(table.response, CellResponse):
+        return truth, of_sides(table.groove_efficiency)
+    turned = turned_axes(at[0], at[1])
+    mean, cosine, sine = mueller_of(amplitudes)[0, port].reshape(-1, 16)[:, :3].T
+    half = cosine * turned.cosine + sine * turned.sine
+    return np.stack([mean + half, mean - half], axis=-1), of_sides(table.polarised_efficiency)
 
 
 def diffuse_light(count: int, wavelengths: tuple[float, float]) -> tuple[Real, Real, Real]:

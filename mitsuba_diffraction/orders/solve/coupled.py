@@ -10,7 +10,7 @@ their own. Slopes of metal converge slowly in TM: use another method for them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -28,6 +28,8 @@ Complex = NDArray[Any]
 
 # Decimals of µm that tell edges of layers apart
 _DIGITS = 9
+# |Im q| over Re q up to which a mode travels, but for rounding
+_TRAVELLING = 1e-6
 # Number of the medium above: the last one
 _ABOVE = -1
 
@@ -108,29 +110,21 @@ class CoupledWaves:
         first = station.channels // 2 - self.harmonics
         numbers = np.arange(first, first + 2 * self.harmonics + 1)
         x = np.sqrt(1.0 - y**2) * station.sines_of(numbers)
+        waves = x, np.full(len(x), y)
         media = np.append(indices**2, 1.0)
-        below = _uniform(x, y, media[self._substrate])
-        total = _material(len(x), station.inside - first)
-        for thickness, filled in reversed(self.layers):
-            above = _layer(x, y, media, filled)
-            total = _across(above, below, total)
-            through = np.exp(2j * np.pi * thickness / wavelength * above.q)[:, None]
-            total = _Scattering(
-                through * total.back * through.T, through * total.up, total.down * through.T,
-                total.inner,
-            )  # fmt: skip
-            below = above
-        total = _across(_uniform(x, y, 1.0), below, total)
-        sides = (
-            _Side(x[np.arange(station.channels) - first], y, 1.0, -self._top / wavelength),
-            # of a sheet; a metal, whose index is complex, has no channels
-            _Side(x[station.inside - first], y, abs(indices[0]), self._bottom / wavelength),
+        layers = (
+            (thickness / wavelength, _layer(*waves, media, filled))
+            for thickness, filled in reversed(self.layers)
         )
-        rows = np.arange(station.channels) - first
-        return _amplitudes(total, np.concatenate([rows, len(x) + rows]), sides)
+        # of a sheet; a metal, whose index is complex, has no channels
+        inner = Inner(station.inside - first, abs(indices[0]), self._bottom / wavelength)
+        return scattered(
+            waves, layers, media[self._substrate], np.arange(station.channels) - first,
+            self._top / wavelength, inner,
+        )  # fmt: skip
 
 
-class _Modes(NamedTuple):
+class Modes(NamedTuple):
     """Modes exp(iqz) of a layer, z down and lengths over 2π/λ: E = W(c⁺ + c⁻), H = V(c⁺ − c⁻)."""
 
     q: Complex  # (2n,)
@@ -155,42 +149,89 @@ class _Scattering(NamedTuple):
     inner: Complex
 
 
-def _uniform(x: Real, y: float, epsilon: complex) -> _Modes:
+class Inner(NamedTuple):
+    """Channels of light from within a clear material.
+
+    harmonics : their places among all; none of a material that no light leaves.
+    refractive : index of the material.
+    height : of the lowest layer's lower side, over the wavelength.
+    """
+
+    harmonics: NDArray[np.int64]
+    refractive: float
+    height: float
+
+
+def scattered(
+    waves: tuple[Real, Real], layers: Iterable[tuple[float, Modes]], epsilon: complex,
+    above: NDArray[np.int64], top: float, inner: Inner,
+) -> Complex:  # fmt: skip
+    """Return the amplitudes (ports, 2, ports, 2) of layers on a material; see `Solver`.
+
+    Parameters
+    ----------
+    waves : x and y of all harmonics, (n,), tangential parts of wave vectors over 2π/λ.
+    layers : thickness over the wavelength, and modes, from the material upwards.
+    epsilon : ε of the material.
+    above : places of the channels above among the harmonics.
+    top : height of the uppermost layer, over the wavelength.
+    inner : channels within the material.
+    """
+    x, y = waves
+    below, total = uniform(x, y, epsilon), _material(len(x), inner.harmonics)
+    for thickness, modes in layers:
+        total = _across(modes, below, total)
+        through = np.exp(2j * np.pi * thickness * modes.q)[:, None]
+        total = _Scattering(
+            through * total.back * through.T, through * total.up, total.down * through.T,
+            total.inner,
+        )  # fmt: skip
+        below = modes
+    total = _across(uniform(x, y, 1.0), below, total)
+    sides = (
+        _Side(x[above], y[above], 1.0, -top),
+        _Side(x[inner.harmonics], y[inner.harmonics], inner.refractive, inner.height),
+    )
+    return _amplitudes(total, np.concatenate([above, len(x) + above]), sides)
+
+
+def uniform(x: Real, y: Real, epsilon: complex) -> Modes:
     """Return the plane waves of a uniform medium."""
     q = np.sqrt(epsilon - x**2 - y**2 + 0j)
     q = np.tile(np.where(q.imag < 0, -q, q), 2)
-    _, right = _products(x, y, *(epsilon * np.eye(len(x)),) * 2)
-    return _Modes(q, np.eye(len(q)), right / q)
+    _, right = _products(x, y, *(epsilon * np.eye(len(x)),) * 3)
+    return Modes(q, np.eye(len(q)), right / q)
 
 
-def _layer(x: Real, y: float, media: Complex, filled: Sequence[_Filled]) -> _Modes:
+def modes(x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex) -> Modes:
+    """Return the modes of a layer whose ε is a matrix for Ex, for Ey and for Ez."""
+    left, right = _products(x, y, across_x, across_y, along)
+    square, electric = np.linalg.eig(left @ right)
+    q = np.sqrt(square)
+    # rounding decides the sign of Im q of modes that travel: their Re q is positive
+    q = np.where((q.imag < 0) & (np.abs(q.imag) > _TRAVELLING * q.real), -q, q)
+    return Modes(q, electric, (right @ electric) / q)
+
+
+def _layer(x: Real, y: Real, media: Complex, filled: Sequence[_Filled]) -> Modes:
     """Return the modes of a layer; media : ε by number."""
     shares = [float(np.sum(part.ends[:, 1] - part.ends[:, 0])) for part in filled]
     if all(share in (0.0, 1.0) for share in shares):
-        return _uniform(x, y, complex(_summed(media, filled, shares, 1.0)))
+        return uniform(x, y, complex(_summed(media, filled, shares, 1.0)))
     direct = _toeplitz(len(x), media, filled)
     inverse = _toeplitz(len(x), 1.0 / media, filled)
-    left, right = _products(x, y, direct, np.linalg.inv(inverse))
-    square, electric = np.linalg.eig(left @ right)
-    q = np.sqrt(square)
-    q = np.where(q.imag < 0, -q, q)
-    return _Modes(q, electric, (right @ electric) / q)
+    return modes(x, y, np.linalg.inv(inverse), direct, direct)
 
 
-def _products(x: Real, y: float, along: Complex, across: Complex) -> tuple[Complex, Complex]:
-    """Return P and Q of dE/dz = iP H and dH/dz = iQ E (Maxwell's equations, E and H tangential).
-
-    along, across : ε for fields along the walls (y, z), and across them (x).
-    """
-    one, kx = np.eye(len(x)), np.diag(x)
-    scaled = np.linalg.solve(along, one)
-    p = np.block(
-        [
-            [kx @ scaled * y, one - kx @ scaled @ kx],
-            [y * scaled * y - one, -y * scaled @ kx],
-        ]
-    )
-    q = np.block([[-kx * y, kx @ kx - along], [across - y * y * one, y * kx]])
+def _products(
+    x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex
+) -> tuple[Complex, Complex]:
+    """Return P and Q of dE/dz = iP H and dH/dz = iQ E (Maxwell's equations, E and H tangential)."""
+    one, inverse = np.eye(len(x)), np.linalg.inv(along)
+    from_x, from_y = x[:, None] * inverse, y[:, None] * inverse
+    p = np.block([[from_x * y, one - from_x * x], [from_y * y - one, -from_y * x]])
+    both = np.diag(x * y)
+    q = np.block([[-both, np.diag(x * x) - across_y], [across_x - np.diag(y * y), both]])
     return p, q
 
 
@@ -201,7 +242,7 @@ def _material(size: int, inside: NDArray[np.int64]) -> _Scattering:
     return _Scattering(nothing, ports.T, ports, np.zeros((len(ports), len(ports)), complex))
 
 
-def _across(above: _Modes, below: _Modes, lower: _Scattering) -> _Scattering:
+def _across(above: Modes, below: Modes, lower: _Scattering) -> _Scattering:
     """Return the scattering above an interface from that below it.
 
     With A = W⁻¹W' and B = V⁻¹V' and light e from within the material, modes above and below are
@@ -246,13 +287,13 @@ class _Side:
 
     Attributes
     ----------
-    x, y : tangential parts of the wave vectors; x of each channel.
+    x, y : tangential parts of the wave vectors.
     index : of the medium.
     height : path over the wavelength from the end of the profile to z = 0, along the normal.
     """
 
     x: Real
-    y: float
+    y: Real
     index: float
     height: float
 
@@ -273,10 +314,10 @@ class _Side:
         (−xy, k²)/(n k), and one whose B does has (±z, 0)/k. The power is z.
         """
         # positive, for numbers that are finite where no channel propagates
-        k, z = np.sqrt(max(self.index**2 - self.y**2, 1e-12)), self.z
+        k, z = np.sqrt(np.maximum(self.index**2 - self.y**2, 1e-12)), self.z
         rows = (
             (-self.x * self.y / (self.index * k), down * z / k),
-            (np.full(len(z), k / self.index), np.zeros(len(z))),
+            (k / self.index, np.zeros(len(z))),
         )
         return np.block([[np.diag(part / np.sqrt(z)) for part in row] for row in rows])
 

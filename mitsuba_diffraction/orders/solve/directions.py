@@ -7,22 +7,23 @@ light as a file's efficiencies do.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import DiffractionError
-from ..listed import Lights, listed_table, warn_of_gaps
+from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
-from ..polarised import mueller_of
+from ..polarised import ODD, mueller_of
 from ..response import LINEAR, MUELLER, orders_between
 from ..table import OrderTable, check_outline
-from .accuracy import powers
+from .accuracy import measured_error, powers, warn_of_error
+from .crossed import folded
 from .jobs import LEAST_COSINES, Jobs, Problem
-from .nodes import places_at
+from .nodes import located
 from .resolution import resolved
 from .settings import (
     MOST_EXCESS,
@@ -39,11 +40,15 @@ _COMPARED, _MOST = 5, 100_000
 
 
 class Directions(NamedTuple):
-    """Directions to the light, degrees, a grid of θ and φ; step between wavelengths, nm."""
+    """Directions to the light, degrees, a grid of θ and φ; step between wavelengths, nm.
+
+    is_all : whether they stand for all light, so that the error between them is measured.
+    """
 
     theta: ArrayLike
     phi: ArrayLike = 0.0
     step: float = 5.0
+    is_all: bool = False
 
 
 def solve_directions(
@@ -60,23 +65,78 @@ def solve_directions(
     grating, (low, high) = problem.grating, how.wavelengths
     block = grating.superstrate if grating.block else None
     superstrate = 1.0 if block else grating.superstrate
-    periods = grating.profile.period, math.inf
+    periods = grating.periods
     check_outline(periods, how.wavelengths, superstrate, grating.thin, block, listed=True)
     count = max(int(np.ceil((high - low) / lights.step - 1e-9)), 1) + 1 if high > low else 1
     lam = np.linspace(low, high, count)
     polar, azimuth = (np.unique(np.asarray(angle, np.float64)) for angle in lights[:2])
     check_light(lam, polar, azimuth, "solve_orders")
-    sides, shape = grating.sides, (lam.size, polar.size, azimuth.size)
-    if np.prod(shape) * sides > _MOST:
+    shape = lam.size, polar.size, azimuth.size
+    if np.prod(shape) * grating.sides > _MOST:
         raise DiffractionError(
             f"{lam.size} wavelengths x {polar.size} theta x {azimuth.size} phi are over {_MOST} "
             "solutions; choose fewer directions, or a larger step"
         )
-    waves, theta, phi = (part.ravel() for part in np.meshgrid(lam, polar, azimuth, indexing="ij"))
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    number = np.tile(np.arange(azimuth.size), lam.size * polar.size)
+    waves, theta = (
+        np.repeat(part, azimuth.size) for part in np.meshgrid(lam, polar, indexing="ij")
+    )
+    bearings, steps = azimuth, np.ones((azimuth.size, 2), np.int64)
+    if grating.cell is not None:
+        bearings, steps = folded(grating.cell, azimuth)
+    phi = bearings[number]
+    _refuse_grazing(problem, waves, theta, phi)
+    factors = [1.0, 1.0 / block] if block else [1.0] * grating.sides  # side 0 of a block is within
+    x, y = (np.round(part, 12) + 0.0 for part in mirror_of(theta, phi))
+    if grating.cell is None:  # solvers take y ≥ 0, the mirror image
+        y = np.abs(y)
+    found = [located(grating, factor * x, factor * y, waves) for factor in factors]
+    every = [light.place for of_side in found for light in of_side]
+    compared = every[:: max(len(every) // _COMPARED, 1)]
+    announce_comparison(announce, problem, work, compared)
+    chosen = resolved(problem, work, compared, how.tolerance / 2)
+    ends = np.concatenate([light.orders for of_side in found for light in of_side])
+    first, last = ends.min(axis=0), ends.max(axis=0)
+    if (steps < 0).any():
+        first, last = np.minimum(first, -last), np.maximum(last, -first)
+    orders = orders_between(first.tolist(), last.tolist())
+    elements = MUELLER if how.polarised else LINEAR
+    if grating.thin and (np.abs(y) > 1e-9).any():
+        elements = 1  # without phases, which tell s from p
+    values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
+    announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
+    solved = work.amplitudes(chosen.problem, every, "solving orders")
+    for came, of_side in enumerate(found):
+        for n, light in enumerate(of_side):
+            size, step = len(light.orders), steps[number[n]]
+            rows = _elements(solved[light.place], came * size + light.port, elements, grating.thin)
+            rows = rows * np.where(ODD.ravel()[:elements], step.prod(), 1)
+            places = (light.orders * step - first) @ [1, int(last[0] - first[0]) + 1]
+            for left in range(grating.sides):
+                values[n, came, left, places] = rows[left * size : (left + 1) * size]
+    header = header_of(chosen, how) | dict(facts)
+    if not lights.is_all:
+        header["directions"] = [[float(t), float(p)] for t in polar for p in azimuth]
+    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]))
+    made = listed_table(
+        table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
+    )  # fmt: skip
+    if lights.is_all:
+        header |= measured_error(made, chosen.problem, work).facts()
+        warn_of_error(header)
+    warn_of_gaps(made, table, f"the table of {grating.profile.name}")
+    return replace(made, header=header | {"processor_seconds": round(work.processor_seconds, 1)})
+
+
+def _refuse_grazing(problem: Problem, waves: Real, theta: Real, phi: Real) -> None:
+    """Refuse light with an order so near to grazing that the method loses its digits."""
     least = LEAST_COSINES.get(problem.method, 0.0)
-    most = int(2e3 * grating.optical_period / low) + 1
-    steps = np.arange(-most, most + 1)[:, None] * waves / (1e3 * grating.optical_period)
+    if least == 0.0:
+        return
+    optical = problem.grating.optical_period
+    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    most = int(2e3 * optical / waves.min()) + 1
+    steps = np.arange(-most, most + 1)[:, None] * waves / (1e3 * optical)
     c = np.sqrt(1.0 - np.minimum((sine * np.sin(turn)) ** 2, 1.0))
     square = 1.0 - ((steps - sine * np.cos(turn)) / c) ** 2
     if (near := (square > 0.0) & (square < least**2)).any():
@@ -86,49 +146,6 @@ def solve_directions(
             f"of grazing, where method {problem.method} loses its digits; use method=coupled or "
             "chandezon, or leave this light out"
         )
-    # solvers take y ≥ 0, the mirror image; side 0 of a block lies within
-    factors = [1.0, 1.0 / block] if block else [1.0] * sides
-    cell_of, places = [], []
-    for factor in factors:
-        x, y = -factor * sine * np.cos(turn), factor * np.abs(sine * np.sin(turn))
-        cell, of_side = places_at(x, y, waves, how.wavelengths, grating.optical_period)
-        cell_of.append(cell)
-        places.append(of_side)
-    every = [place for of_side in places for place in of_side]
-    compared = every[:: max(len(every) // _COMPARED, 1)]
-    announce_comparison(announce, problem, work, compared)
-    chosen = resolved(problem, work, compared, how.tolerance / 2)
-    first = int(min((cell.channel - cell.channels + 1).min() for cell in cell_of))
-    last = int(max(cell.channel.max() for cell in cell_of))
-    orders = orders_between((first, 0), (last, 0))
-    elements = MUELLER if how.polarised else LINEAR
-    conical = bool((np.abs(np.sin(turn) * sine) > 1e-9).any())
-    if grating.thin and conical:  # without phases, which tell s from p
-        elements = 1
-    values = np.full((len(waves), sides, sides, len(orders), elements), np.nan)
-    announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
-    solved = work.amplitudes(chosen.problem, every, "solving orders")
-    for came, (cell, of_side) in enumerate(zip(cell_of, places, strict=True)):
-        for n, (place, j) in enumerate(zip(of_side, cell.channel.tolist(), strict=True)):
-            size = int(cell.channels[n])
-            light = _elements(solved[place], came * size + j, elements, grating.thin)
-            for left in range(sides):
-                part = light[left * size : (left + 1) * size]
-                values[n, came, left, j - np.arange(size) - first] = part
-    header = (
-        header_of(chosen, how)
-        | dict(facts)
-        | {
-            "directions": [[float(t), float(p)] for t in polar for p in azimuth],
-            "processor_seconds": round(work.processor_seconds, 1),
-        }
-    )
-    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]))
-    made = listed_table(
-        table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
-    )  # fmt: skip
-    warn_of_gaps(made, table, f"the table of {grating.profile.name}")
-    return made
 
 
 def _elements(amplitudes: Complex, port: int, count: int, thin: bool) -> Real:

@@ -7,11 +7,11 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import lru_cache
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -24,18 +24,21 @@ from ...progress import Progress, silent
 from ...tables.store import Record, read_record, write_record
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
+from .crossed import CrossedWaves
 from .integral import IntegralSolver
-from .nodes import Place
+from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
 from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
 
-Item = TypeVar("Item", bound=Hashable)
+Spot = TypeVar("Spot", bound=AnyPlace)
 
 #: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
 #: solve layers, a structure.
 METHODS: dict[str, Callable[..., Solver]] = {
     "integral": IntegralSolver, "coupled": CoupledWaves, "chandezon": Chandezon,
 }  # fmt: skip
+#: Method of crossed gratings, the only one.
+CROSSED = "crossed"
 LAYERED = ("coupled", "chandezon")
 #: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) of the solvers that lose
 #: digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its power.
@@ -43,7 +46,7 @@ LEAST_COSINES = {"integral": 0.03}
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
 #: Largest resolutions, whose matrices need less than 2 GB, and a minute or more for a station.
-MOST_RESOLUTION = {"integral": 1000, "coupled": 400, "chandezon": 400}
+MOST_RESOLUTION = {"integral": 1000, "coupled": 400, "chandezon": 400, CROSSED: 12}
 # Threads that libraries of linear algebra start in each process, which would compete for the cores
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -76,11 +79,11 @@ def method_for(grating: Grating) -> str:
     Chandezon's method for slopes, also under films; coupled waves for other films, for slices and
     for lamellar profiles of metal no deeper than twice their period, else the integral method.
     """
-    flat = grating.profile.depth == 0.0
-    sloped = not (grating.is_perfect or grating.thin or flat or refused(grating.profile))
+    profile = grating.line
+    flat = profile.depth == 0.0
+    sloped = not (grating.is_perfect or grating.thin or flat or refused(profile))
     if sloped and not grating.structure.is_beneath:
         return "chandezon"
-    profile = grating.profile
     shallow = profile.is_lamellar and profile.depth <= 2.0 * profile.period
     lamellar = shallow and not (grating.is_perfect or grating.thin)
     return "coupled" if grating.structure or lamellar else "integral"
@@ -91,6 +94,12 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
 
     Raises a DiffractionError if the method is unknown.
     """
+    material = grating.material
+    if (cell := grating.cell) is not None:
+        check_choice("method", method, (AUTO, "coupled"))
+        outline: tuple[object, ...] = CROSSED, cell.periods, grating.wavelengths
+        digest = digest_of(outline, cell.heights, material.wavelengths, material.values)
+        return Problem(grating, CROSSED, resolution, digest)
     if method == AUTO:
         method = method_for(grating)
     check_choice("method", method, (AUTO, *METHODS))
@@ -101,7 +110,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
             "layers, beneath and substrate"
         )
     outline = "amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin
-    profile, material = grating.profile, grating.material
+    profile = grating.line
     digest = digest_of(
         outline + (("block",) if grating.block else ()),
         profile.period, profile.x, profile.z, material.wavelengths, material.values,
@@ -124,6 +133,8 @@ def digest_of(*parts: object) -> str:
 def solver_of(problem: Problem) -> Solver:
     """Return the solver of a problem; a process keeps the last ones."""
     grating = problem.grating
+    if grating.cell is not None:
+        return CrossedWaves(grating.cell, problem.resolution)
     layers = [grating.structure] if grating.structure else []
     return METHODS[problem.method](grating.profile, problem.resolution, *layers)
 
@@ -143,7 +154,7 @@ class Solved(NamedTuple):
     seconds: float
 
 
-def solve_place(problem: Problem, place: Place) -> Solved:
+def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     """Solve a place.
 
     Values are rounded as they are stored, so that a table is the same whether or not it was
@@ -153,9 +164,13 @@ def solve_place(problem: Problem, place: Place) -> Solved:
     """
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
-    w = place.w[:1] if grating.is_perfect else place.w
-    least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
-    station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
+    station: Any
+    if isinstance(place, CrossedPlace):
+        station = grating.crossed_station(place.x, place.y, place.w[0])
+    else:
+        w = place.w[:1] if grating.is_perfect else place.w
+        least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
+        station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
     try:
         values = solver.amplitudes(station)
     except DiffractionError:
@@ -189,74 +204,58 @@ class Jobs:
     progress: Progress = silent
     _seconds: dict[str, float] = field(default_factory=dict, init=False)
 
-    def solve(self, problem: Problem, places: Sequence[Place], text: str) -> dict[Place, Real]:
+    def solve(self, problem: Problem, places: Sequence[Spot], text: str) -> dict[Spot, Real]:
         """Return the efficiencies at all places; see `amplitudes`."""
         known = self.amplitudes(problem, places, text)
         return {place: np.abs(values) ** 2 for place, values in known.items()}
 
     def amplitudes(
-        self, problem: Problem, places: Sequence[Place], text: str
-    ) -> dict[Place, Complex]:
-        """Return the amplitudes at all places; see `results`."""
-
-        def key(place: Place) -> object:
-            return problem.digest, problem.resolution, tuple(place)
-
-        known = self.results(partial(solve_place, problem), places, key, text)
-        return {place: solved.values.astype(np.complex128) for place, solved in known.items()}
-
-    def results(
-        self,
-        task: Callable[[Item], Solved],
-        items: Iterable[Item],
-        key: Callable[[Item], object],
-        text: str,
-    ) -> dict[Item, Solved]:
-        """Return the results of a task for all items, of which those in the folder are read.
+        self, problem: Problem, places: Sequence[Spot], text: str
+    ) -> dict[Spot, Complex]:
+        """Return the amplitudes at all places, of which those in the folder are read.
 
         An exception or Ctrl-C leaves finished results in the folder.
 
-        key : all that the result of an item depends on, as text of which its file is named.
-
         Raises a DiffractionError if the folder cannot be written.
         """
-        names = {item: digest_of(key(item))[:24] for item in items}
+        names = {
+            place: digest_of((problem.digest, problem.resolution, tuple(place)))[:24]
+            for place in places
+        }
         files = {} if self.folder is None else {
-            item: self.folder / f"{name}{_SUFFIX}" for item, name in names.items()
+            place: self.folder / f"{name}{_SUFFIX}" for place, name in names.items()
         }  # fmt: skip
-        results = {item: _read(file, names[item]) for item, file in files.items()}
-        known = {item: solved for item, solved in results.items() if solved is not None}
-        missing = [item for item in names if item not in known]
+        results = {place: _read(file, names[place]) for place, file in files.items()}
+        known = {place: solved for place, solved in results.items() if solved is not None}
+        missing = [place for place in names if place not in known]
         if self.folder is not None and missing:
             make_folder(self.folder)
         self.progress(len(known), len(names), text)
-        for item, solved in self._solved(task, missing):
-            known[item] = solved
-            if item in files:
+        for place, solved in self._solved(problem, missing):
+            known[place] = solved
+            if place in files:
                 record = Record({"seconds": solved.seconds}, [solved.values])
-                write_record(files[item], _title(names[item]), record)
+                write_record(files[place], _title(names[place]), record)
             self.progress(len(known), len(names), text)
-        self._seconds |= {names[item]: solved.seconds for item, solved in known.items()}
-        return known
+        self._seconds |= {names[place]: solved.seconds for place, solved in known.items()}
+        return {place: solved.values.astype(np.complex128) for place, solved in known.items()}
 
     @property
     def processor_seconds(self) -> float:
         """Processor seconds of all solutions so far, including solutions read from the folder."""
         return sum(self._seconds.values())
 
-    def seconds(self, problem: Problem, place: Place) -> float:
+    def seconds(self, problem: Problem, place: AnyPlace) -> float:
         """Return the processor seconds that a place takes."""
         if self.executor is None:
             return timed(problem, place)
         return float(self.executor.submit(timed, problem, place).result())
 
-    def _solved(
-        self, task: Callable[[Item], Solved], items: Iterable[Item]
-    ) -> Iterator[tuple[Item, Solved]]:
+    def _solved(self, problem: Problem, places: Iterable[Spot]) -> Iterator[tuple[Spot, Solved]]:
         if self.executor is None:
-            yield from ((item, task(item)) for item in items)
+            yield from ((place, solve_place(problem, place)) for place in places)
             return
-        futures = {self.executor.submit(task, item): item for item in items}
+        futures = {self.executor.submit(solve_place, problem, place): place for place in places}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -265,7 +264,7 @@ class Jobs:
                 future.cancel()
 
 
-def timed(problem: Problem, place: Place) -> float:
+def timed(problem: Problem, place: AnyPlace) -> float:
     """Return the processor seconds that a place takes, without the start of the solver."""
     solver_of(problem)
     return solve_place(problem, place).seconds

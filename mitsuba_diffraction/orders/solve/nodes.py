@@ -16,7 +16,7 @@ from scipy.fft import dct
 
 from .. import cells
 from ..cells import Counts
-from .stations import Complex, Real, reversed_light
+from .stations import Complex, Grating, Real, reversed_light
 
 #: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most. Along
 #: w a line is one station, and gold's index changes quickly.
@@ -48,18 +48,55 @@ def places_of(band: int, counts: Counts, nodes: Callable[[int], Real] = cells.no
     return [Place(band, kind, t, r, tuple(w)) for kind in kinds_of(band) for t in half for r in rho]
 
 
-def places_at(
-    x: Real, y: Real, wavelength: Real, wavelengths: tuple[float, float], optical_period: float
-) -> tuple[cells.Cell, list[Place]]:
-    """Return the cell of each of some lights (n,), and its station, of one w.
+class CrossedPlace(NamedTuple):
+    """Light of a crossed grating, which its station is of; w : the wavelength, nm, alone."""
 
-    x, y, wavelength, optical_period : as for `cells.to_cell`; wavelengths : of the table, nm.
+    x: float
+    y: float
+    w: tuple[float, ...]
+
+
+AnyPlace = Place | CrossedPlace
+
+
+class Located(NamedTuple):
+    """Light of one direction and wavelength.
+
+    Attributes
+    ----------
+    place : station of which the light is solved.
+    port : among the station's channels.
+    orders : (q, 2) by which the light leaves through these channels.
     """
-    cell = cells.to_cell(x, y, wavelength, optical_period)
-    w = cells.w_of(cell.k_continuous, wavelength, wavelengths, optical_period)
-    columns = (part.tolist() for part in (cell.band, cell.kind, cell.tau, cell.rho, w))
-    rows = zip(*columns, strict=True)
-    return cell, [Place(band, kind, tau, rho, (at,)) for band, kind, tau, rho, at in rows]
+
+    place: AnyPlace
+    port: int
+    orders: NDArray[np.int64]
+
+
+def located(grating: Grating, x: Real, y: Real, wavelength: Real) -> list[Located]:
+    """Return the stations of some lights (n,), by their mirror directions and wavelengths, nm."""
+    if grating.cell is not None:
+        lights = zip(*(part.tolist() for part in (x, y, wavelength)), strict=True)
+        stations = [grating.crossed_station(*light) for light in lights]
+        return [
+            Located(
+                CrossedPlace(station.x, station.y, (lam,)),
+                int(np.flatnonzero(~station.orders.any(axis=1))[0]),
+                station.orders,
+            )
+            for station, lam in zip(stations, wavelength.tolist(), strict=True)
+        ]
+    cell = cells.to_cell(x, y, wavelength, grating.optical_period)
+    w = cells.w_of(cell.k_continuous, wavelength, grating.wavelengths, grating.optical_period)
+    columns = (part.tolist() for part in (*cell[:2], cell.channel, cell.channels, *cell[3:5], w))
+    return [
+        Located(
+            Place(band, kind, tau, rho, (at,)), j,
+            np.column_stack([j - np.arange(count), np.zeros(count, np.int64)]),
+        )
+        for band, kind, j, count, tau, rho, at in zip(*columns, strict=True)
+    ]  # fmt: skip
 
 
 def at_nodes(

@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import DiffractionError, check_choice, quoted, warn
+from ...errors import DiffractionError, check_choice, quoted
+from ...heights.field import HeightField
 from .. import cells
 from ..cells import Counts
 from ..polarised import mueller_of
 from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
 from ..table import OrderTable, check_outline
-from .accuracy import WORST, measured_error, missed_tolerance, powers
-from .block import to_node
+from .accuracy import WORST, measured_error, missed_tolerance, powers, warn_of_error
+from .crossed import PHI, THETA, check_cell
 from .directions import Directions, solve_directions
 from .films import Layers, Substance, structure_of
 from .grating_index import TabulatedIndex, material_of
@@ -29,7 +30,7 @@ from .nodes import (
     kinds_of,
     places_of,
 )
-from .profiles import Profile
+from .profiles import Profile, UnitCell
 from .resolution import (
     coarsest,
     energy_error,
@@ -55,7 +56,7 @@ MOST_BYTES = 128 << 20
 
 
 def solve_orders(
-    profile: Profile,
+    profile: Profile | HeightField,
     material: str | float | complex | TabulatedIndex = "Al",
     *,
     superstrate: float = 1.0,
@@ -66,7 +67,7 @@ def solve_orders(
     substrate: Substance | None = None,
     theta: ArrayLike | None = None,
     phi: ArrayLike = 0.0,
-    step: float = 5.0,
+    step: float | None = None,
     settings: Settings | None = None,
     jobs: Jobs | None = None,
     announce: Callable[[Estimate], None] | None = None,
@@ -81,7 +82,8 @@ def solve_orders(
 
     Parameters
     ----------
-    profile : one period of the grooves, from `solve.profiles`.
+    profile : one period of the grooves, from `solve.profiles`; or of the heights of a crossed
+        grating, which reflects light in air.
     material : a name that Mitsuba knows, an index n + ik, or "none" for a perfect conductor.
     superstrate : index of the clear medium above.
     thin : whether the material is a thin sheet, whose lower side is flat: the table then has the
@@ -93,20 +95,36 @@ def solve_orders(
     beneath : layers beneath the profile, from the substrate upwards, and slices (`films.Layers`).
     substrate : below them; by default the material.
     theta, phi : directions to the light, degrees, within the medium that it comes from: from the
-        normal, and from x towards y; a grid of both. None solves all directions.
-    step : between the wavelengths of listed directions, nm; the ends are solved exactly.
+        normal, and from x towards y; a grid of both. None solves all directions, of crossed
+        gratings 10° and 15° apart.
+    step : between the wavelengths of listed directions, nm, 5 by default, and 20 for all
+        directions of crossed gratings; the ends are solved exactly.
     settings : wavelengths, tolerance, method; of listed directions, the tolerance bounds the
         solver's error.
     jobs : where stations are solved and stored; by default here, and stored nowhere.
     announce : called with the estimate of each stage before it starts.
     """
-    if not isinstance(profile, Profile):
+    if not isinstance(profile, Profile | HeightField):
         raise DiffractionError(
-            f"solve_orders: expected a profile, as of md.profiles.lamellar, got {quoted(profile)}; "
-            "a recipe is solved by the command 'solve'"
+            "solve_orders: expected a profile, as of md.profiles.lamellar, or a HeightField, got "
+            f"{quoted(profile)}; a recipe is solved by the command 'solve'"
         )
     how, work, tell = settings or Settings(), jobs or Jobs(), announce or silent
     substance = material_of(material, how.wavelengths)
+    if isinstance(profile, HeightField):
+        if thin or block or layers or beneath or substrate is not None or superstrate != 1.0:
+            raise DiffractionError(
+                "crossed gratings reflect light in air; leave out superstrate, thin, block, "
+                "layers, beneath and substrate"
+            )
+        cell = UnitCell(profile.heights, profile.extent)
+        check_cell(cell, substance, how.wavelengths)
+        problem = problem_of(
+            Grating(cell, substance, 1.0, how.wavelengths), how.method, how.resolution or 0
+        )
+        every = Directions(THETA, PHI, step or 20.0, is_all=True)
+        lights = every if theta is None else Directions(theta, phi, step or 5.0)
+        return solve_directions(problem, lights, how, work, tell, {})
     if thin or block:
         check_clear(substance, how.wavelengths)
         if how.polarised:
@@ -128,7 +146,7 @@ def solve_orders(
     problem = problem_of(grating, "coupled" if block else how.method, how.resolution or 0)
     facts = {"material": substance.name} if block else {}
     if theta is not None:
-        lights = Directions(theta, phi, step)
+        lights = Directions(theta, phi, step or 5.0)
         return solve_directions(problem, lights, how, work, tell, facts)
     check_outline((profile.period, math.inf), how.wavelengths, *_media(grating))
     return _solve_cells(problem, how, work, tell, facts)
@@ -189,25 +207,20 @@ def _solve_cells(
             header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
         made = tuple(_band(grating, k, counts[k], solved, how.polarised) for k in bands)
         table = OrderTable(
-            (grating.profile.period, math.inf), how.wavelengths,
+            grating.periods, how.wavelengths,
             CellResponse(made, even=bool(block)), superstrate, header, thin, block,
         )  # fmt: skip
         error = measured_error(table, problem, work)
         header |= error.facts()
-        if not (missed := missed_tolerance(header)) or refinement == REFINEMENTS:
+        if not missed_tolerance(header) or refinement == REFINEMENTS:
             break
-        excess = max(error.mean, error.polarised or 0.0, error.most / WORST) / how.tolerance
+        excess = max(error.mean, error.table.most / WORST) / how.tolerance
         finer = _refined_counts(counts, error.bands, excess, grating.block)
         if _size(grating, finer, elements) > MOST_BYTES:
             break
         counts = finer
     header |= {"processor_seconds": round(work.processor_seconds, 1)}
-    if missed:
-        warn(
-            f"the table misses {error.mean:.2%} of the light in its orders on average (tolerance "
-            f"{how.tolerance:.2%}) and {error.most:.2%} in 5 % of directions (tolerance "
-            f"{WORST * how.tolerance:.2%}); use a larger tolerance, or fewer wavelengths"
-        )
+    warn_of_error(header)
     return table
 
 
@@ -275,16 +288,13 @@ def _band(
 ) -> Band:
     """Assemble the response of a band from its stations."""
     places = places_of(band, counts, _nodes(grating))
+    values_of = _limited_mueller if polarised else _along_grooves
     if grating.block:
-        moved = {place: solved[place] * to_node(grating, place) for place in places}
         values_of = _lossless
-    else:
-        moved = {place: solved[place] for place in places}
-        values_of = _limited_mueller if polarised else _along_grooves
     return Band(
         band,
         *(
-            at_nodes(kind, places, counts, moved, grating.sides, values_of)
+            at_nodes(kind, places, counts, solved, grating.sides, values_of)
             for kind in kinds_of(band)
         ),
     )

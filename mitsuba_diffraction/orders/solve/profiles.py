@@ -139,6 +139,41 @@ class Profile:
         return bool(crossing.any())
 
 
+@dataclass(frozen=True, eq=False)
+class UnitCell:
+    """One period of the heights of a crossed grating.
+
+    Raises a DiffractionError if a period is out of its range.
+
+    Attributes
+    ----------
+    heights : (rows, columns) µm, rows along y; the material lies below.
+    periods : along x and y, µm.
+    """
+
+    heights: Real
+    periods: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for period in self.periods:
+            number_between(period, "crossed grating: period", 0.01, 1e3, " µm")
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return f"crossed, {self.depth:.3g} µm deep"
+
+    @property
+    def period(self) -> float:
+        """The longer period, µm."""
+        return max(self.periods)
+
+    @property
+    def depth(self) -> float:
+        """Height of the highest over the lowest point, µm."""
+        return float(np.ptp(self.heights))
+
+
 def lamellar(period: float, depth: float, duty: float = 0.5) -> Profile:
     """Rectangular grooves between ridges of width duty·period, at x = 0 to duty·period; µm."""
     width = period * number_between(duty, "lamellar: duty", 0.01, 0.99)
@@ -182,7 +217,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     if (kind := kind_of(path)) in (FileKind.IMAGE, FileKind.EXR, FileKind.NPY, FileKind.JPEG):
         raise DiffractionError(
             f"'{path}' ({kind}): profiles are one-dimensional, one period of a line, CSV of x, z "
-            "in µm; crossed gratings: one period of heights, by solve_crossed"
+            "in µm; crossed gratings: one period of heights, with --crossed"
         )
     what = "two columns x, z in µm ('solve --import', or read_orders, reads efficiencies)"
     table = read_columns(path)

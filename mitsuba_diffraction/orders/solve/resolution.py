@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import DiffractionError
 from .chandezon import stretched_period
 from .films import material_text
-from .jobs import MOST_RESOLUTION, Jobs, Problem
-from .nodes import Place, kinds_of
+from .jobs import CROSSED, MOST_RESOLUTION, Jobs, Problem
+from .nodes import AnyPlace, Place, kinds_of
 from .stations import Real, reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
@@ -26,8 +26,8 @@ _DARK = 1e-7
 #: between them.
 _POINTS_PER_WAVELENGTH = 2.5
 _FEWEST_POINTS, _POINTS_PER_CORNER = 48, 12
-#: Harmonics on either side beyond the orders that propagate, at first.
-_HARMONICS = 8
+#: Harmonics on either side beyond the orders that propagate, at first; least of crossed gratings.
+_HARMONICS, _FEWEST_CROSSED = 8, 3
 
 
 class Chosen(NamedTuple):
@@ -38,7 +38,7 @@ class Chosen(NamedTuple):
 
 
 def chosen_resolution(
-    problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float
+    problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], tolerance: float
 ) -> Chosen:
     """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
 
@@ -49,7 +49,7 @@ def chosen_resolution(
     coarse = replace(problem, resolution=coarsest(problem))
     values = jobs.solve(coarse, places, "choosing the resolution")
     for number in range(_MOST):
-        if number and np.ceil(coarse.resolution * STEP) > MOST_RESOLUTION[problem.method]:
+        if number and _finer(coarse) > MOST_RESOLUTION[problem.method]:
             break
         fine, finer, error = _refined(coarse, values, jobs, places)
         excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
@@ -69,22 +69,22 @@ def chosen_resolution(
     )
 
 
-def resolved(problem: Problem, jobs: Jobs, places: Sequence[Place], tolerance: float) -> Chosen:
+def resolved(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], tolerance: float) -> Chosen:
     """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
     if problem.resolution == 0:
         return chosen_resolution(problem, jobs, places, tolerance)
     return Chosen(problem, resolution_error(problem, jobs, places))
 
 
-def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[Place]) -> float:
+def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]) -> float:
     """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
     return _refined(problem, values, jobs, places)[2]
 
 
 def _refined(
-    problem: Problem, values: Mapping[Place, Real], jobs: Jobs, places: Sequence[Place]
-) -> tuple[Problem, dict[Place, Real], float]:
+    problem: Problem, values: Mapping[Any, Real], jobs: Jobs, places: Sequence[AnyPlace]
+) -> tuple[Problem, dict[Any, Real], float]:
     """Return the problem at the next resolution, its efficiencies, and the share that changes.
 
     Raises a DiffractionError if the grating reflects nothing.
@@ -104,7 +104,14 @@ def _refined(
 
 def finer_problem(problem: Problem) -> Problem:
     """Return the problem at the next resolution."""
-    return replace(problem, resolution=int(np.ceil(problem.resolution * STEP)))
+    return replace(problem, resolution=_finer(problem))
+
+
+def _finer(problem: Problem) -> int:
+    """Return the next resolution; of crossed gratings the cost rises with its seventh power."""
+    if problem.method == CROSSED:
+        return problem.resolution + 1
+    return int(np.ceil(problem.resolution * STEP))
 
 
 def places_to_test(bands: Sequence[int]) -> list[Place]:
@@ -117,7 +124,7 @@ def places_to_test(bands: Sequence[int]) -> list[Place]:
     ]
 
 
-def reciprocity_error(solved: Mapping[Place, Real], sides: int) -> float:
+def reciprocity_error(solved: Mapping[Any, Real], sides: int) -> float:
     """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
 
     They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
@@ -126,7 +133,7 @@ def reciprocity_error(solved: Mapping[Place, Real], sides: int) -> float:
     differences = [
         np.abs(values - reversed_light(values, sides))
         for place, values in solved.items()
-        if place.tau == 0.5
+        if isinstance(place, Place) and place.tau == 0.5
     ]
     sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in differences)
     return max(sums, default=0.0)
@@ -140,7 +147,10 @@ def energy_error(solved: Iterable[Real]) -> float:
 def coarsest(problem: Problem) -> int:
     """Return the resolution to begin with, which shows where efficiencies vary."""
     grating = problem.grating
-    profile, (low, high) = grating.profile, grating.wavelengths
+    low, high = grating.wavelengths
+    if problem.method == CROSSED:
+        return max(int(2e3 * grating.profile.period / low) + 1, _FEWEST_CROSSED)
+    profile = grating.line
     lam = np.linspace(low, high, 32)
     index = grating.material.index(lam)
     dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ...heights.lengths import count_between, number_between
 from .films import material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, solver_of
-from .nodes import Place
+from .nodes import AnyPlace
 from .resolution import STEP, Chosen, coarsest
 
 #: Wavelengths of a table, nm: the visible.
@@ -63,7 +63,7 @@ class Settings:
     def __post_init__(self) -> None:
         number_between(self.tolerance, "tolerance", 1e-4, 0.2)
         if self.resolution is not None:
-            count_between(self.resolution, "resolution", 4, max(MOST_RESOLUTION.values()))
+            count_between(self.resolution, "resolution", 3, max(MOST_RESOLUTION.values()))
 
 
 def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
@@ -84,7 +84,7 @@ def announce_stage(
     stage: str,
     problem: Problem,
     jobs: Jobs,
-    places: Sequence[Place],
+    places: Sequence[AnyPlace],
     size: float = 0.0,
 ) -> None:
     """Time some of the stage's stations and announce the stage; size : of its table, bytes."""
@@ -98,7 +98,7 @@ def announce_stage(
 
 
 def announce_comparison(
-    announce: Callable[[Estimate], None], problem: Problem, jobs: Jobs, places: Sequence[Place]
+    announce: Callable[[Estimate], None], problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]
 ) -> None:
     """Time a solution at the first resolution, and announce the comparison with the next one."""
     if announce is silent:

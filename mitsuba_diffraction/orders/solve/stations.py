@@ -6,15 +6,17 @@ share the expensive part of a solver. A station has several wavelengths w at the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import cells
+from ..response import orders_between
 from .grating_index import TabulatedIndex
-from .profiles import Profile
+from .profiles import Profile, UnitCell
 from .structure import Structure
 
 Real = NDArray[np.float64]
@@ -35,17 +37,17 @@ class Grating:
 
     Attributes
     ----------
-    profile : one period of the grooves.
+    profile : one period of the grooves, or of a crossed grating's heights.
     material : below the profile.
     superstrate : real index of the clear medium above.
     wavelengths : shortest and longest of the table, in vacuum, nm.
     thin : whether the material is a sheet with a flat lower side (`sheet`).
     structure : films on the profile, and what lies beneath it.
     block : whether the medium above is a block, the material the rarer one that surrounds it, and
-        light of both is solved (`block`).
+        light of both is solved (`blocks`).
     """
 
-    profile: Profile
+    profile: Profile | UnitCell
     material: TabulatedIndex
     superstrate: float
     wavelengths: tuple[float, float]
@@ -62,6 +64,22 @@ class Grating:
     def sides(self) -> int:
         """Number of sides with light: 2 of a thin sheet or a block, else 1."""
         return 2 if self.thin or self.block else 1
+
+    @property
+    def cell(self) -> UnitCell | None:
+        """Heights of a crossed grating; None of grooves."""
+        return self.profile if isinstance(self.profile, UnitCell) else None
+
+    @property
+    def line(self) -> Profile:
+        """Profile of the grooves."""
+        assert isinstance(self.profile, Profile)
+        return self.profile
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Periods along x and y, µm; the second one is infinite for grooves."""
+        return (self.profile.period, math.inf) if self.cell is None else self.cell.periods
 
     @property
     def is_perfect(self) -> bool:
@@ -110,6 +128,45 @@ class Grating:
                 if (layer := material.index(lam)) is not None  # always: `films.structure_of`
             ),
         )
+
+    def crossed_station(self, x: float, y: float, wavelength: float) -> CrossedStation:
+        """Return the station of light of a crossed grating; wavelength : nm."""
+        index = self.material.index(wavelength)
+        assert index is not None  # `crossed.check_cell`
+        return CrossedStation(x, y, 1e-3 * wavelength, complex(index), self.periods)
+
+
+@dataclass(frozen=True, eq=False)
+class CrossedStation:
+    """Light of a crossed grating, with which all its orders are solved.
+
+    Attributes
+    ----------
+    x, y : direction cosines of the mirror direction of the incident light.
+    wavelength : µm.
+    index : n + ik of the material.
+    periods : along x and y, µm.
+    """
+
+    x: float
+    y: float
+    wavelength: float
+    index: complex
+    periods: tuple[float, float]
+
+    def tangential(self, orders: NDArray[np.int64]) -> tuple[Real, Real]:
+        """Return x and y of orders (n, 2), (n,) each."""
+        shifts = (self.wavelength * m / d for m, d in zip(orders.T, self.periods, strict=True))
+        x, y = (part + shift for part, shift in zip((self.x, self.y), shifts, strict=True))
+        return x, y
+
+    @property
+    def orders(self) -> NDArray[np.int64]:
+        """Orders (n, 2) that propagate."""
+        most = [int(2.0 * period / self.wavelength) + 1 for period in self.periods]
+        every = orders_between([-m for m in most], most)
+        x, y = self.tangential(every)
+        return every[x * x + y * y < 1.0 - LEAST_NORMAL**2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +223,8 @@ class Solver(Protocol):
     def name(self) -> str:
         """Name, version and settings, for the header of tables."""
 
-    def amplitudes(self, station: Station) -> Complex:
-        """Return the amplitudes between all ports, whose |·|² are efficiencies.
+    def amplitudes(self, station: Any) -> Complex:
+        """Return the amplitudes between all ports of a `Station`, whose |·|² are efficiencies.
 
         Ports are the channels above, then, of a thin station, its channels `inside` the material.
         Those that do not propagate at a wavelength have zeros.

@@ -7,9 +7,10 @@ picture, on all paths. Light that several surfaces reflect counts at each of the
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -22,7 +23,7 @@ from ...optics.colour import linear_srgb
 from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair, Site
 from ...plugin.memory import upload
-from ...plugin.types import BSDF, Colour, Context, Float, Mask, Powers, Spectrum, Vector3f
+from ...plugin.types import BSDF, Context, Float, Mask, Powers, Spectrum
 from ...tables.source import TableRequest, providing
 from ...tables.table import DiffractionTable
 from ..elements import own_id, parts_of
@@ -84,62 +85,48 @@ class TableLight:
         return ends, ends[:, None]
 
 
-@dataclass(eq=False)
 class _Factors:
     """Factors of 1 on the light of all surfaces that share a table."""
 
-    request: TableRequest
-    table: DiffractionTable
-    bsdfs: list[BSDF] = field(default_factory=list)
-    shapes: list[Any] = field(default_factory=list)
-    names: dict[str, None] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.frequency, self.kappa, self.wavelength, self.whole = (
-            dr.ones(mi.Float, count) for count in (BINS**2, BINS, len(WAVELENGTHS) - 1, 1)
-        )
+    def __init__(self, request: TableRequest, table: DiffractionTable) -> None:
+        self.request, self.table = request, table
+        self.surfaces: dict[str, None] = {}
+        self.shapes: list[Any] = []
+        counts = BINS**2, BINS, len(WAVELENGTHS) - 1, 1
+        # by frequency, κ and wavelength, and on all light
+        self.all = [dr.ones(mi.Float, count) for count in counts]
         dr.enable_grad(self.all)
 
-    @property
-    def all(self) -> list[Float]:
-        """The factors by frequency, κ, wavelength and of all light."""
-        return [self.frequency, self.kappa, self.wavelength, self.whole]
-
-    def put_on(self, bsdf: BSDF) -> None:
-        """Multiply the light of a BSDF by the factors."""
-        light, evaluated = bsdf.light, bsdf.evaluated
+    @contextlib.contextmanager
+    def on(self, bsdf: BSDF) -> Iterator[None]:
+        """Multiply the light of a BSDF by the factors inside."""
+        light, evaluated, (*parts, whole) = bsdf.light, bsdf.evaluated, self.all
 
         def weighed(ctx: Context, site: Site, pair: Pair, power: Powers, active: Mask) -> Spectrum:
-            return light(ctx, site, pair, power, active) * mi.Spectrum(self._at(site, pair))
+            factor = mi.UnpolarizedSpectrum(1.0)
+            for n, bins in enumerate(self._bins(site, pair)):
+                for part, number in zip(parts, bins, strict=True):
+                    factor[n] *= dr.gather(mi.Float, part, number)
+            return light(ctx, site, pair, power, active) * mi.Spectrum(factor)
 
-        def whole(
-            ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
-        ) -> tuple[Spectrum, Float]:
-            value, density = evaluated(ctx, site, wo, active, kinds)
-            return value * dr.gather(mi.Float, self.whole, mi.UInt32(0)), density
+        def all_light(*asked: Any) -> tuple[Spectrum, Float]:
+            value, density = evaluated(*asked)
+            return value * dr.gather(mi.Float, whole, mi.UInt32(0)), density
 
-        bsdf.light, bsdf.evaluated = weighed, whole
-        self.bsdfs.append(bsdf)
-
-    def take_off(self) -> None:
-        """Leave the BSDFs as they were: functions that know them would keep them alive."""
-        for bsdf in self.bsdfs:
+        bsdf.light, bsdf.evaluated = weighed, all_light
+        try:
+            yield
+        finally:
             del bsdf.light, bsdf.evaluated
 
-    def _at(self, site: Site, pair: Pair) -> Colour:
-        """Return the product of the factors of each channel."""
-        result = mi.UnpolarizedSpectrum(1.0)
-        table, first = self.table, float(WAVELENGTHS[0])
-        for n, k in enumerate(site.wavenumbers):
-            x, y = (_bin(dr.abs(k * part), table.q_limit, BINS) for part in pair.uv)
-            kappa = _bin(k * pair.w * site.scale, table.expansion.kappa_max, BINS)
-            nm = mi.UInt32(dr.clip(2e3 * dr.pi / k - first, 0.0, len(WAVELENGTHS) - 2.0))
-            result[n] = (
-                dr.gather(mi.Float, self.frequency, y * BINS + x)
-                * dr.gather(mi.Float, self.kappa, kappa)
-                * dr.gather(mi.Float, self.wavelength, nm)
-            )
-        return result
+    def _bins(self, site: Site, pair: Pair) -> Iterator[tuple[Any, Any, Any]]:
+        """Yield the bins of frequency, κ and wavelength of each channel."""
+        q_limit, kappa_max = self.table.q_limit, self.table.expansion.kappa_max
+        for k in site.wavenumbers:
+            x, y = (_bin(dr.abs(k * part), q_limit, BINS) for part in pair.uv)
+            kappa = _bin(k * pair.w * site.scale, kappa_max, BINS)
+            nm = 2e3 * dr.pi / k - float(WAVELENGTHS[0])
+            yield y * BINS + x, kappa, _bin(nm, len(WAVELENGTHS) - 1, len(WAVELENGTHS) - 1)
 
 
 def _bin(value: Float, end: float, count: int) -> Any:
@@ -169,14 +156,25 @@ def light_of_tables(
 
     with providing(table_of):
         scene = load()
-    names = _take_surfaces(scene, made)
-    try:
+    bsdfs = _surfaces(scene, made)
+    names = ", ".join(sorted({name for name, _ in bsdfs.values()}))
+    if not bsdfs:
+        raise DiffractionError(
+            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    if not made:
+        raise DiffractionError(
+            f"the tables of {names} come from files and stay as they are; give the scene "
+            "the height field, or its recipe, to have smaller ones planned"
+        )
+    with contextlib.ExitStack() as stack:
+        for factors in made:
+            for _, bsdf in bsdfs.values():
+                if bsdf.table is factors.table:
+                    stack.enter_context(factors.on(bsdf))
         view = sensor(scene)
         turns = _turns(scene, view, seed)
         _render(scene, view, paths, seed, made)
-    finally:
-        for each in made:
-            each.take_off()
     found = [_light_of(each, turns) for each in made]
     if not any(each.share for each in found):
         raise DiffractionError(
@@ -186,36 +184,21 @@ def light_of_tables(
     return found
 
 
-def _take_surfaces(scene: Any, made: list[_Factors]) -> str:
-    """Put the factors on all surfaces with a table of heights; return the surfaces' names."""
-    surfaces: dict[int, tuple[BSDF, Surface]] = {}
-    names: dict[str, None] = {}
+def _surfaces(scene: Any, made: list[_Factors]) -> dict[int, tuple[str, BSDF]]:
+    """Return all BSDFs `diffraction` of a scene, with their names; note those of each table."""
+    found: dict[int, tuple[str, BSDF]] = {}
     for shape in scene.shapes():
         for part in parts_of(shape.bsdf()):
             described = describe(part)
-            if not isinstance(described, Surface) or described.solved or described.transmits:
-                continue
-            heights = described.patch.source.get("name") or "heights without a name"
-            name = own_id(part.id()) or f"a diffraction BSDF without id (of {heights})"
-            names[name] = None
-            for each in made:
-                if each.table is described.patch:
-                    each.names[name] = None
-                    each.shapes.append(shape)
-                    if id(part) not in surfaces:
-                        each.put_on(part)
-            surfaces[id(part)] = part, described
-    if not surfaces:
-        raise DiffractionError(
-            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
-        )
-    listed = ", ".join(sorted(names))
-    if not made:
-        raise DiffractionError(
-            f"the tables of {listed} come from files and stay as they are; give the scene "
-            "the height field, or its recipe, to have smaller ones planned"
-        )
-    return listed
+            if isinstance(described, Surface) and not (described.solved or described.transmits):
+                heights = described.patch.source.get("name") or "heights without a name"
+                name = own_id(part.id()) or f"a diffraction BSDF without id (of {heights})"
+                found[id(part)] = name, part
+                for each in made:
+                    if each.table is part.table:
+                        each.surfaces[name] = None
+                        each.shapes.append(shape)
+    return found
 
 
 def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]) -> None:
@@ -263,7 +246,7 @@ def _light_of(factors: _Factors, turns: dict[int, float]) -> TableLight:
     )
     seen = [turns[number] for shape in factors.shapes if (number := _number(shape)) in turns]
     return TableLight(
-        factors.request, factors.table, tuple(sorted(factors.names)), float(whole[0]),
+        factors.request, factors.table, tuple(sorted(factors.surfaces)), float(whole[0]),
         frequency.reshape(BINS, BINS), kappa, wavelength, max(seen, default=float("nan")),
     )  # fmt: skip
 

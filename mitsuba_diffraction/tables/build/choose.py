@@ -183,6 +183,7 @@ class _Trial:
         self._spectrum = Spectrum(field, (last[0], last[1]), double=True)
         self._centre = (last[1], last[0])
         self._lengths: dict[int, int] = {}
+        self._known: dict[tuple[float, str], NDArray[np.floating]] = {}
 
     def length(self, make: _Maker, intervals: int, budget: float) -> int:
         """Terms of a Chebyshev series that is so good that the functions' number is what counts."""
@@ -235,12 +236,15 @@ class _Trial:
         return np.asarray((bins[:, None] * parts + np.arange(parts)).ravel())
 
     def _values(self, kappa: float, expansion: Expansion) -> NDArray[np.floating]:
-        """Powers (ny, nx, 1), or the parts of amplitudes (ny, nx, 2)."""
-        amplitude = self._spectrum.of_phase(kappa, minus_one=True)
-        amplitude[self._centre] += 1.0
-        power = expansion.kind == "power"
-        parts = (np.abs(amplitude) ** 2,) if power else (amplitude.real, amplitude.imag)
-        return np.stack(parts, axis=-1)
+        """Powers (ny, nx, 1), or the parts of amplitudes (ny, nx, 2); trials share nodes."""
+        key = float(kappa), expansion.kind
+        if key not in self._known:
+            amplitude = self._spectrum.of_phase(kappa, minus_one=True)
+            amplitude[self._centre] += 1.0
+            power = expansion.kind == "power"
+            parts = (np.abs(amplitude) ** 2,) if power else (amplitude.real, amplitude.imag)
+            self._known[key] = np.stack(parts, axis=-1)
+        return self._known[key]
 
     def _parts(self, bins: NDArray[np.floating]) -> tuple[float, float]:
         row, column = self._centre

@@ -78,10 +78,110 @@ def bcr(path):
     path.write_bytes("\n".join(lines).encode().ljust(2048) + COUNTS.tobytes())
 
 
+def ibw(path):
+    labels = [b"layers".ljust(32, b"\0"), b"HeightRetrace".ljust(32, b"\0")]
+    data = (1e-11 * COUNTS).astype("<f4").tobytes()
+    wave = bytearray(320)
+    struct.pack_into("<i", wave, 12, COUNTS.size)
+    struct.pack_into("<h", wave, 16, 2)
+    struct.pack_into("<4i", wave, 68, NX, NY, 1, 0)
+    struct.pack_into("<2d", wave, 84, SIZE[0] / NX * 1e-6, SIZE[1] / NY * 1e-6)
+    for at in (148, 152, 156):
+        wave[at : at + 1] = b"m"
+    sizes = (320 + len(data), 0, 0, 0, *4 * [0], 0, 0, 64, 0, 0, 0, 0)
+    head = struct.pack("<hh15i", 5, 0, *sizes)
+    words = int(np.frombuffer(head + bytes(wave), "<u2").sum())
+    head = struct.pack("<hH15i", 5, -words % 65536, *sizes)
+    path.write_bytes(head + bytes(wave) + data + b"".join(labels))
+
+
+def nid(path):
+    text = f"""[DataSet]
+GroupCount=1
+Gr0-Count=1
+Gr0-Ch0=DataSet-0:0
+[DataSet-Info]
+Date=01-02-2020
+Time=10:20:30
+[DataSet-0:0]
+SaveMode=Binary
+SaveOrder=Intel
+SaveSign=Signed
+SaveBits=16
+Points={NX}
+Lines={NY}
+Frame=Scan forward
+Dim0Unit=m
+Dim0Range={SIZE[0] * 1e-6}
+Dim1Unit=m
+Dim1Range={SIZE[1] * 1e-6}
+Dim2Name=Z-Axis
+Dim2Unit=m
+Dim2Min=0
+Dim2Range=6.5536e-7
+"""
+    path.write_bytes(text.replace("\n", "\r\n").encode() + b"#!" + COUNTS.tobytes())
+
+
+def mdt(path):
+    scales = struct.pack(
+        "<ffhffhffh", 0, SIZE[0] / NX, -2, 0, SIZE[1] / NY, -2, 0, 1e-2, -1
+    )  # fmt: skip
+    fields = (scales[:20] + scales[20:] + struct.pack("<BBHH", 0, 0, NX, NY)).ljust(50, b"\0")
+    body = fields + struct.pack("<4H", 0, NX, NY, 0) + COUNTS.tobytes()
+    frame = struct.pack("<IHH6HH", 22 + len(body), 0, 0, 2020, 1, 1, 1, 1, 1, len(fields)) + body
+    head = b"\x01\xb0\x93\xff" + struct.pack("<I4xH19x", len(frame), 0)
+    path.write_bytes(head + frame)
+
+
+def tiff(path, *pages):
+    tifffile = pytest.importorskip("tifffile", reason="TIFF files need the extra afm")
+    with tifffile.TiffWriter(path) as writer:
+        for values, tags in pages:
+            writer.write(values, extratags=[(*tag, True) for tag in tags], metadata=None)
+
+
+def park(path):
+    wide = "Height".encode("utf-16-le").ljust(64, b"\0"), b"".ljust(16, b"\0")
+    head = struct.pack(
+        "<I64s16sdIIIIdIdIII6d16s5d16siiiIII", 0, *wide, 0, 0, 0, NX, NY, 0, 0, 0, 1, 0, 0, *SIZE,
+        0, 0, 0, 0, wide[1], 0, 0, 1e-5, 1, 0, "um".encode("utf-16-le").ljust(16, b"\0"),
+        0, 0, 0, 0, 0, 0,
+    )  # fmt: skip
+    data = COUNTS.tobytes()
+    tags = (50432, 4, 1, 0x0E031301), (50433, 4, 1, 0x1000001)
+    blocks = (50434, 7, len(data), data), (50435, 7, len(head), head)
+    tiff(path, (np.zeros((4, 4), np.uint8), (*tags, *blocks)))
+
+
+def jpk(path):
+    grid = [(tag, 12, 1, 1e-6 * size) for tag, size in zip((0x8042, 0x8043), SIZE, strict=True)]
+    date = (0x8003, 2, 0, "2020-01-02 10:20:30")
+    texts = {0x8052: "Height", 0x8081: "h", 0x8090: "h", 0x80A1: "h", 0x80A2: "m"}
+    texts[0x80A3] = "LinearScaling"
+    tags = [(tag, 2, 0, text) for tag, text in texts.items()]
+    tags += [(0x8051, 4, 1, 0), (0x8080, 4, 1, 1), (0x80A4, 12, 1, 1e-11), (0x80A5, 12, 1, 0.0)]
+    thumbnail = np.zeros((4, 4), np.uint8)
+    tiff(path, (thumbnail, [date, *grid]), (COUNTS.astype(np.int32), tags))
+
+
 FILES = {
     "a.gwy": gwyddion, "a.x3p": x3p, "a.sdf": sdf, "b.sdf": binary_sdf, "a.top": wsxm, "a.mi": mi,
-    "a.bcr": bcr,
+    "a.bcr": bcr, "a.ibw": ibw, "a.nid": nid, "a.mdt": mdt, "a.tiff": park, "a.jpk": jpk,
 }  # fmt: skip
+
+
+#: Formats whose first line is the lowest of the picture; WSxM turns it by half a turn besides.
+UPWARDS = ("a.mi", "a.ibw", "a.nid", "a.mdt", "a.tiff", "a.jpk", "a.top")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_pictures_stand_as_the_instrument_s_program_shows_them(tmp_path, name):
+    FILES[name](tmp_path / name)
+    heights = HeightField.load(tmp_path / name, level="none").heights
+    lines = COUNTS if name in UPWARDS else COUNTS[::-1]
+    lines = lines[:, ::-1] if name == "a.top" else lines
+    assert np.corrcoef(heights.ravel(), lines.ravel())[0, 1] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -117,6 +217,16 @@ def test_heights_that_the_header_contradicts_are_refused(tmp_path, monkeypatch):
     message = refusal(tmp_path / "a.top")
     assert "0.05 µm" in message
     assert "50 µm" in message
+
+
+def test_a_unit_of_one_axis_is_its_own(tmp_path):
+    mdt(tmp_path / "a.mdt")
+    content = (tmp_path / "a.mdt").read_bytes()
+    y = struct.pack("<fh", SIZE[1] / NY, -2)
+    (tmp_path / "a.mdt").write_bytes(content.replace(y, struct.pack("<fh", 1e3 * SIZE[1] / NY, -1)))
+    with pytest.warns(DiffractionWarning, match=r"4 x 1\.5 µm.* 4 x 1500 µm"):
+        field = HeightField.load(tmp_path / "a.mdt", level="none")
+    assert field.extent == pytest.approx(SIZE, rel=1e-6)
 
 
 def test_a_capture_that_was_stopped_has_a_part_of_the_slow_axis(tmp_path):

@@ -5,32 +5,42 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.orders.solve.jobs import Jobs, Solved, remove_results
+from mitsuba_diffraction.orders.solve import jobs
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.jobs import Jobs, Problem, Solved, remove_results
+from mitsuba_diffraction.orders.solve.nodes import Place
+from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from mitsuba_diffraction.orders.solve.stations import Grating
 from mitsuba_diffraction.tables.store import Record, write_record
 
-ITEMS = (1, 2)
+RANGE = (500.0, 600.0)
+PLACES = [Place(1, 0, tau, 0.4, (0.5,)) for tau in (0.1, 0.2)]
+PROBLEM = Problem(
+    Grating(sinusoidal(0.7, 0.1), material_of(1.5, RANGE), 1.0, RANGE), "chandezon", 8, "digest"
+)
 
 
 @pytest.fixture
-def solved(tmp_path):
-    """`solved()`: the results of two items, and the items that were solved for them."""
+def solved(tmp_path, monkeypatch):
+    """`solved()`: the results at two places, and the places that were solved for them."""
 
     def call():
         made = []
 
-        def task(item):
-            made.append(item)
-            return Solved(np.full(3, item, np.complex64), 1.5)
+        def solve_place(problem, place):
+            made.append(place)
+            return Solved(np.full(3, place.tau, np.complex64), 1.5)
 
-        found = Jobs(tmp_path / "kept").results(task, ITEMS, lambda item: item, "items")
-        return {item: result.values.tolist() for item, result in found.items()}, made
+        monkeypatch.setattr(jobs, "solve_place", solve_place)
+        found = Jobs(tmp_path / "kept").amplitudes(PROBLEM, PLACES, "places")
+        return {place: values.tolist() for place, values in found.items()}, made
 
     return call
 
 
 def test_results_are_read_again(solved):
     first, made = solved()
-    assert made == [*ITEMS]
+    assert made == PLACES
     assert solved() == (first, [])
 
 

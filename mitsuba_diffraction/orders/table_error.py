@@ -1,0 +1,69 @@
+"""Error of a table beside known efficiencies: solved ones of random lights, or those of a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import Array
+
+
+class TableError(NamedTuple):
+    """Error of the efficiencies of a table.
+
+    mean : of the light in coloured orders, which the table has too much or too little in an order,
+        unpolarised.
+    most : the same of a direction, which 95 % of them keep; directions with hardly any light are
+        judged by a twentieth of the mean.
+    relative : of an order and a polarisation, relative to its efficiency, which 95 % of them keep.
+    largest, place : largest of these, and its light.
+    """
+
+    mean: float
+    most: float
+    relative: float
+    largest: float
+    place: str
+
+    def facts(self) -> dict[str, Any]:
+        """Return the entries of a header."""
+        return {
+            "error_mean": self.mean, "error_worst": self.most, "error_relative": self.relative,
+            "error_largest": self.largest, "error_place": self.place,
+        }  # fmt: skip
+
+
+def table_error(
+    found: Array, truth: Array, coloured: NDArray[np.bool_], least: float,
+    place: Callable[[int, int, int], str],
+) -> TableError:  # fmt: skip
+    """Compare efficiencies (lights, orders, polarisations) of a table with known ones.
+
+    Parameters
+    ----------
+    found, truth : of the table, and known; 0 of orders that a light lacks.
+    coloured : (lights, orders) orders of which the light counts.
+    least : efficiency from which on the relative error counts.
+    place : names a light, an order and a polarisation by their places.
+    """
+    missed, light = unpolarised(found, truth, coloured)
+    floor = max(0.05 * float(light.mean()), 1e-12)
+    relative = np.where(truth > least, np.abs(found - truth) / np.maximum(truth, least), 0.0)
+    each = relative[truth > least]
+    worst = np.unravel_index(int(relative.argmax()), relative.shape)
+    return TableError(
+        float(missed.sum()) / max(float(light.sum()), 1e-12),
+        float(np.quantile(missed / np.maximum(light, floor), 0.95)),
+        float(np.quantile(each, 0.95)) if len(each) else 0.0,
+        float(relative.max()),
+        place(*map(int, worst)) if len(each) else "",
+    )
+
+
+def unpolarised(found: Array, truth: Array, coloured: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return missed and all light (lights,) of coloured orders; arguments as of `table_error`."""
+    missed = np.abs(found.mean(axis=-1) - truth.mean(axis=-1))
+    return (missed * coloured).sum(axis=-1), (truth.mean(axis=-1) * coloured).sum(axis=-1)
