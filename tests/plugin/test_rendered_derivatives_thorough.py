@@ -48,6 +48,13 @@ def test_every_parameter_has_the_derivative_of_differences(mitsuba_variant, name
     check(plate(name, width), SURFACES[name][1])
 
 
+@pytest.mark.parametrize("name", ["metal", "coat", "dielectric"])
+def test_scales_of_energy_have_the_derivatives_of_differences(name):
+    """Of height scales, in which scales of energy are linear; in others they have steps."""
+    mi.set_variant("llvm_ad_mono")
+    check(plate(name, 6.0, energy_conserving=True), {"height_scale": 0.9, "orientation": 20.0})
+
+
 @pytest.mark.parametrize("mitsuba_variant", VARIANTS)
 @pytest.mark.parametrize("thin", [False, True])
 def test_solved_orders_have_the_derivatives_of_differences(mitsuba_variant, thin):

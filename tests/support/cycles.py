@@ -69,7 +69,8 @@ for degrees in tilts:
     sink = nodes.new("ShaderNodeOutputWorld")
     links.new(background.outputs[0], sink.inputs["Surface"])
     tilt = math.radians(degrees)
-    place = (10 * math.sin(tilt), 0, 10 * math.cos(tilt))  # the camera looks from x
+    # the camera looks from x, all of it above the plane also from 89°
+    place = (40 * math.sin(tilt), 0, 40 * math.cos(tilt))
     bpy.ops.object.camera_add(location=place, rotation=(0, tilt, 0))
     scene.camera = bpy.context.object
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
