@@ -131,6 +131,8 @@ def __getattr__(name: str) -> Any:
 
         return version(__name__)
     if name in _MODULES:
+        if name in ("glsl", "shader_comparison"):
+            importlib.import_module(f"{__name__}.thesis.shaders")  # registers its methods
         return importlib.import_module(f"{__name__}.{_MODULES[name]}")
     if name in _NAMES:
         return getattr(importlib.import_module(f"{__name__}.{_NAMES[name]}"), name)

@@ -13,8 +13,9 @@ from typing import Any
 from urllib.parse import urlencode
 
 from ..errors import DiffractionError
-from ..realtime.glsl.source import METHODS, WEB_METHODS
+from ..realtime.glsl.methods import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
+from ..thesis import shaders  # noqa: F401 - registers its methods
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say, say_warning
@@ -74,8 +75,7 @@ def _opened(address: str) -> bool:
     "compare", "compare the realtime picture of a scene with the path-traced one",
     "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
     "difference: over all pixels in all direct light of the scene, and beside it in full "
-    "transport; and, as a detail, where both see the same lit surface under lights "
-    "without extent, by points and directions in place of the scene's.",
+    "transport.",
     *scene_options.SCENE,
     ("-o --output FOLDER", "for pictures (EXR), sheets (PNG) and compare.json; default: the "
      "scene's name with _compare in the current folder", Path),
@@ -84,9 +84,8 @@ def _opened(address: str) -> bool:
     *options.samples(2, 1024),
     ("--full-spp N", "samples per pixel of full transport; 0 leaves it out",
      whole_number(0), 64),
-    ("--frames N", "frames of progressive light for fast and exact", whole_number(4), 512),
-    ("--supersampling N", "the shaders' samples along either side of a pixel (at most 2 of "
-     "flss, nmm and pq)", whole_number(1), 8),
+    ("--frames N", "frames of progressive light", whole_number(4), 512),
+    ("--supersampling N", "the shaders' samples along either side of a pixel", whole_number(1), 8),
     options.json(),
 )  # fmt: skip
 def compare(args: argparse.Namespace) -> Figures:
@@ -111,7 +110,7 @@ def compare(args: argparse.Namespace) -> Figures:
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
             args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
         )  # fmt: skip
-        figures = comparison.run(METHODS if every else args.method, leave_out=every)
+        figures = comparison.run(tuple(METHODS) if every else args.method, leave_out=every)
     figures = {"scene": figures["scene"], "parameters": parameters, **figures}
     save_json(folder / "compare.json", figures)
     print(markdown(plain(figures)))

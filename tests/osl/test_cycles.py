@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
-from tests.support.patches import DEFAULTS, PATCH
 
 pytestmark = pytest.mark.thorough
 
@@ -89,48 +87,3 @@ def test_lobe_is_as_wide_as_the_window_has_it(tmp_path, axis):
     variance = (1e-3 * np.array(RGB_WAVELENGTHS) / (0.5 * np.pi * width)) ** 2 / 2
     # mean of λ² over a channel is up to 1 % above the square of its mean; and noise
     assert seen.mean[0] == pytest.approx(variance, rel=0.04)
-
-
-@pytest.mark.parametrize("material", ["none", "dielectric", "blazed"])
-def test_patch_reflects_as_in_mitsuba(tmp_path, material):
-    """A flat mirror, a rough dielectric and blazed grooves have the albedo of Mitsuba's BSDF.
-
-    Without scales of energy the grooves would reflect more than they receive.
-    """
-    if material == "none":
-        flat = md.HeightField(np.zeros((32, 32)), 0.75)
-        bsdf = mi.load_dict(md.bsdf_dict(flat, coherence_width=24, material="none"))
-    elif material == "blazed":
-        grooves = md.gratings.blazed(2.0, 1.0, periods=12, rows=8)
-        bsdf = mi.load_dict(md.bsdf_dict(grooves, coherence_width=24, material="none"))
-        assert bsdf.describe().energy_scale(1.0).values.min() < 0.9
-    else:
-        bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS))
-    seen = plane_seen(md.osl.export(bsdf, tmp_path), [30], WorkingSpace="Linear Rec.2020")
-    expected = colour(bsdf, 30.0, "Linear Rec.2020")
-    # closures have the scale at the middle of a lobe, and Cycles' noise
-    assert np.all(np.abs(seen.mean[0] - expected) < 0.02 * expected + 3 * seen.error[0])
-
-
-def colour(bsdf, degrees, space, count=48):
-    """Albedo as a colour of a working space, (3,): of wavelengths as a shader draws them."""
-    spectrum, nodes = drawn_spectrum(), np.linspace(0.0, 1.0, NODES)
-    u = (np.arange(count) + 0.5) / count
-    weights = np.stack([np.interp(u, nodes, x) for x in spectrum.colours[space].T])
-    lam = np.interp(u, nodes, spectrum.wavelengths)
-    albedos = np.array([albedo(bsdf, degrees, float(nm)) for nm in lam])
-    return weights @ albedos / weights.sum(axis=1)
-
-
-def albedo(bsdf, degrees, wavelength, count=100_000):
-    """Mean of drawn weights at a wavelength, nm, of light from x."""
-    rng = np.random.default_rng(3)
-    si = dr.zeros(mi.SurfaceInteraction3f, count)
-    angle = np.radians(degrees)
-    si.wi = mi.Vector3f(float(np.sin(angle)), 0.0, float(np.cos(angle)))
-    si.n, si.sh_frame = mi.Normal3f(0, 0, 1), mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-    si.wavelengths = dr.opaque(mi.UnpolarizedSpectrum, wavelength)
-    first, *second = (mi.Float(x) for x in rng.random((3, count)).astype(np.float32))
-    _, weight = bsdf.sample(mi.BSDFContext(), si, first, mi.Point2f(*second))
-    return float(np.mean(np.array(weight)))

@@ -6,8 +6,6 @@ import mitsuba as mi
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.blender.compare import compare
-from docs.make.blender.views import Surface, View
 from tests.support import ROOT
 from tests.support.blender import blender, result_of, run_in_blender
 from tests.support.orders import thin_grating
@@ -188,24 +186,3 @@ def test_unknown_object_is_one_line(tmp_path, grating):
     assert done.returncode != 0
     assert "no mesh object 'Ring'; the file has Cube" in done.stderr
     assert "Traceback" not in done.stderr
-
-
-def test_pictures_agree_with_mitsuba(tmp_path, grating):
-    """A disc, a grating and a scale differ by a mean ΔE2000 of at most 2 beyond noise."""
-    views = []
-    pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.1, 0.05, 0.02]}}
-    scale = md.gratings.elaphe_like(extent=16.0, pixels=128)
-    for name, shape, light, source, inputs, beneath in (
-        ("disc", "disk", "lamp", grating, {"Rotation (°)": -90.0}, {}),
-        ("grating", "rectangle", "sky", grating, {}, {}),
-        ("skin", "sphere", "sky", scale, {}, {"coat_ior": 1.33, "pigment": pigment}),
-    ):
-        bsdf = exported(source, tmp_path / name, name, **beneath)
-        tangent = "radial-z" if shape == "disk" else "uv"
-        cycles = {"folder": str(tmp_path / name), "tangent": tangent, "inputs": inputs}
-        views.append(View(shape, light, Surface(bsdf, cycles), 12, 8))
-    compared = compare(views, tmp_path, mitsuba_samples=8192, cycles_samples=4096)
-    for view, comparison in zip(views, compared, strict=True):
-        assert comparison.beyond_noise <= 2.0, view.shape
-        # noise that hides no larger difference
-        assert comparison.noise <= 3.0, view.shape

@@ -23,7 +23,7 @@ from mitsuba_diffraction.plugin.description import (
 )
 from mitsuba_diffraction.realtime.glsl.export import SHADER
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
-from mitsuba_diffraction.realtime.glsl.methods import CONSUMERS
+from mitsuba_diffraction.realtime.glsl.methods import METHODS
 from mitsuba_diffraction.realtime.glsl.shader_materials import (
     GLSL,
     pack_conservation,
@@ -35,7 +35,7 @@ from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH
 
-ALL = [GLSL, SHADER, OSL, MAPS, SPECTRA, *CONSUMERS.values()]
+ALL = [GLSL, SHADER, OSL, MAPS, SPECTRA, *(m.consumer() for m in METHODS.values() if m.consumer)]
 TABLE = md.DiffractionTable.build(PATCH, **DEFAULTS)
 TEXTURE = object()  # stands for an object of Mitsuba, which features do not read
 

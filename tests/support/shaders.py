@@ -7,16 +7,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.realtime.glsl.context import (
-    Bindings,
-    compile_program,
-)
+from mitsuba_diffraction.realtime.glsl.context import Bindings
+from mitsuba_diffraction.realtime.glsl.source import fragment_parts, vertex_source
 from mitsuba_diffraction.realtime.glsl.texels import (
     Packed,
     Texture,
 )
 
 DAYLIGHT = [(np.array([360.0, 830.0]), np.ones(2))]
+#: Evaluates a method's function at one set of arguments per fragment.
+_PROBE = """#ifdef PAIRED
+uniform sampler2D directions;  // ωi in the first row, ωo in the second
+#endif
+uniform sampler2D places;  // u, v, z = w·height_scale, cosine at the half vector
+
+out vec4 fragment;
+
+void main()
+{
+#ifdef PAIRED
+    ivec2 column = ivec2(gl_FragCoord.x, 0);
+    vec3 wi = texelFetch(directions, column, 0).xyz;
+    vec3 wo = texelFetch(directions, column + ivec2(0, 1), 0).xyz;
+#ifndef ORDERS
+    begin_pair(wi, wo, vec2(wi.z, wo.z));
+#endif
+#endif
+    vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
+#ifdef ORDERS
+#ifndef PAIRED
+    vec3 wi = vec3(0.0, 0.0, 1.0), wo = vec3(place.xy, sqrt(1.0 - dot(place.xy, place.xy)));
+#endif
+    fragment = vec4(diffraction(wi, wo, vec2(1.0, 0.0), 0), 1.0);
+#else
+    fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
+#endif
+}
+"""
 PERFECT = Packed(definitions={"SURFACE_KIND": "0"})
 
 
@@ -31,7 +58,9 @@ def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArra
     parts = packed | Packed(
         (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}
     )
-    program = compile_program(gl, method, parts.definitions, vertex="whole.vert", main="probe.frag")
+    source = "".join(text for _, text in fragment_parts(method, parts.definitions)[:-1])
+    vertex = vertex_source(name="whole.vert")
+    program = gl.program(vertex_shader=vertex, fragment_shader=source + _PROBE)
     bindings = Bindings(gl, parts)
     target = gl.texture((len(places), 1), 4, dtype="f4")
     frame = gl.framebuffer([target])

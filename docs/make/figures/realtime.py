@@ -71,13 +71,13 @@ def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
     rows = []
     high = 0.0
     for document in documents:
-        wholes = [document["methods"][method]["whole"] for method in _OURS]
+        entries = [document["methods"][method] for method in _OURS]
         values = [
-            *(whole["direct"]["delta_e_mean"] for whole in wholes),
-            wholes[-1]["noise"]["delta_e_mean"],
-            document["whole_noise"]["delta_e_mean"],
+            *(entry["direct"]["delta_e_mean"] for entry in entries),
+            entries[-1]["noise"]["delta_e_mean"],
+            document["noise"]["delta_e_mean"],
         ]
-        high = max(high, *(w["direct"]["delta_e_percentiles"]["99"] for w in wholes))
+        high = max(high, *(e["direct"]["delta_e_percentiles"]["99"] for e in entries))
         link = f"[{Path(document['scene']).stem}]({document['scene']})"
         rows.append((link, *map(plain_number, values)))
     text = f"In each scene 99 % of the pixels have at most {plain_number(high)}."
@@ -85,22 +85,13 @@ def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
 
 
 def summary(document: dict[str, Any]) -> str:
-    """Sentences with the frame times, texture sizes and look-up errors in one scene."""
+    """Return a sentence with the frame times and texture sizes in one scene."""
     fast, exact = (document["methods"][method] for method in _OURS)
-    time = exact["whole"]["frame_ms"] / fast["whole"]["frame_ms"]
-    share = 100 * fast["diffracting"]["share"]
     sizes = [plain_number(entry["texture_bytes"] / 1e6) for entry in (fast, exact)]
-    errors = [
-        f"{plain_number(entry['diffracting']['delta_e_mean'])} (99 %: "
-        f"{plain_number(entry['diffracting']['delta_e_percentiles']['99'])}) by `{method}`"
-        for method, entry in zip(_OURS, (fast, exact), strict=True)
-    ]
+    time = plain_number(exact["frame_ms"] / fast["frame_ms"])
     return (
-        f"First scene: a frame by `exact` takes {plain_number(time)} times as long as by `fast`; "
-        f"textures have {sizes[0]} MB (`fast`) and {sizes[1]} MB (`exact`). With point lights and "
-        f"without shadows, over the {share:.0f} % of the pixels that diffract and are lit in both, "
-        f"the mean is {' and '.join(errors)}: the error of tables and look-ups, with "
-        f"{plain_number(document['noise_delta_e_mean'])} of noise."
+        f"First scene: a frame by `exact` takes {time} times as long as by `fast`; textures have "
+        f"{sizes[0]} MB (`fast`) and {sizes[1]} MB (`exact`)."
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...extras import optional
 from ...system import cores
+from .scene import VERTEX
 from .source import fragment_parts, plain_source, vertex_source
 from .texels import PAGE, Packed, Texture, Uniform
 
@@ -83,17 +84,14 @@ def compile_program(
     context: Any,
     method: str,
     definitions: Mapping[str, str],
-    *,
-    vertex: str = "surface.vert",
-    main: str = "surface.frag",
 ) -> Any:
     """Compile the program of a method.
 
     Raises a DiffractionError with file, line and the driver's message if it does not compile.
     """
     moderngl = optional("moderngl")
-    stage = vertex_source(name=vertex)
-    parts = fragment_parts(method, definitions, main=main)
+    stage = vertex_source()
+    parts = fragment_parts(method, definitions)
     try:
         return context.program(
             vertex_shader=stage, fragment_shader="".join(text for _, text in parts)
@@ -101,9 +99,16 @@ def compile_program(
     except moderngl.Error as error:
         log = str(error)
         if "vertex_shader" in log:
-            parts = [(vertex, stage)]
+            parts = [("surface.vert", stage)]
         words = compiler_words(log, parts)
         raise DiffractionError(f"the driver cannot compile method {method}: {words}") from None
+
+
+def vertex_array(context: Any, program: Any, buffer: Any) -> Any:
+    """Return the vertex array of the attributes that a program reads."""
+    names = [name for name, _ in VERTEX if name in program]
+    layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
+    return context.vertex_array(program, [(buffer, layout, *names)])
 
 
 def compile_plain(

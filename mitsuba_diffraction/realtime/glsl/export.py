@@ -16,7 +16,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Surface
 from ...tables.exr import write_channels
 from .maps import Map
-from .methods import CONSUMERS
+from .methods import method_tables
 from .packing import pack_responses
 from .rewriting import global_names, renamed, shader_file
 from .shader_materials import (
@@ -134,9 +134,6 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
         )
-    for method in methods:
-        if method in CONSUMERS:
-            CONSUMERS[method].check(described)
     surface = packed_by(described)
     material = ShaderMaterial(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)
@@ -145,7 +142,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", **common.definitions})
-    tables = {method: surface.tables(method) for method in methods}
+    tables = {method: method_tables(method, surface) for method in methods}
     if "exact" in tables:
         tables["exact"] |= pack_responses([(np.array([360.0, 830.0]), np.ones(2))])
     return _joined(common, tables, described, surface.words)
@@ -174,7 +171,7 @@ def export_shader(
     texts = {
         "diffraction.glsl": shader.code,
         "constants.json": json.dumps(shader.constants(), indent=1, ensure_ascii=False) + "\n",
-        **{name: shader_file(name, "three") for name in ("diffraction.js", "example.html")},
+        **{name: shader_file(f"../three/{name}") for name in ("diffraction.js", "example.html")},
     }
     for name, text in texts.items():
         with atomic_path(folder / name) as path:

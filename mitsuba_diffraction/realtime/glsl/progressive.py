@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from .camera import Camera
-from .context import Bindings, ShaderPass, Target, compile_plain, set_uniforms
+from .context import Bindings, ShaderPass, Target, compile_plain, set_uniforms, vertex_array
 from .emitters import NO_LIGHT
 from .lights import Lamp
-from .methods import vertex_array
 from .packed_scene import PackedScene
 from .shadows import SIZE, Casters, ShadowMap
 from .texels import Packed, Uniform

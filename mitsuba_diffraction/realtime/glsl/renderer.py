@@ -16,18 +16,18 @@ from .context import (
     Target,
     bind,
     check_version,
-    clock_of,
+    compile_program,
     headless_context,
     set_uniforms,
+    vertex_array,
 )
 from .lights import Lamp
-from .methods import Prepared
 from .packed_scene import PackedScene
 from .packing import pack_responses
 from .progressive import ProgressiveLight, Stage
 from .shadows import SIZE
 from .source import LIGHTS
-from .texels import Uniform
+from .texels import Packed, Uniform
 
 Image = NDArray[np.float32]
 
@@ -64,7 +64,9 @@ class Renderer:
         check_version(self.context)
         self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
         self.bindings = [Bindings(self.context, s.packed) for s in self.packed.surfaces]
-        self._methods: dict[str, Prepared] = {}
+        self._tables: dict[str, list[Bindings]] = {}
+        self._programs: dict[object, Any] = {}
+        self._arrays: dict[object, Any] = {}
         self._responses: Bindings | None = None
         self._stage: Stage | None = None
         self._spectra: list[NDArray[np.float64]] = []
@@ -87,7 +89,7 @@ class Renderer:
 
         Parameters
         ----------
-        method : one of `source.METHODS`.
+        method : one of `methods.METHODS`.
         supersampling : samples along either side of a pixel, averaged evenly.
         size : width and height; by default the camera's.
         """
@@ -101,30 +103,9 @@ class Renderer:
         target.release()
         return np.ascontiguousarray(fine.mean(axis=(1, 3), dtype=np.float32))
 
-    def frame_time(
-        self, method: str, *, size: tuple[int, int] | None = None, frames: int = 1
-    ) -> float:
-        """Return the seconds of the fastest of some frames with one sample per pixel.
-
-        The program is compiled before. The clock is `context.clock_of`.
-        """
-        width, height = size or self.camera.size
-        target = self.target(width, height)
-        camera = self.camera.resized(width, height)
-        self.draw(target.frame, method, self.camera.resized(1, 1))
-        self.context.finish()
-        clock, times = clock_of(self.driver), []
-        for _ in range(frames):
-            start = clock()
-            self.draw(target.frame, method, camera)
-            self.context.finish()
-            times.append(clock() - start)
-        target.release()
-        return min(times)
-
     def texture_bytes(self, method: str) -> int:
         """Return the size of a method's textures."""
-        return self.prepared(method).nbytes
+        return sum(packed.nbytes for packed in self.packed.tables(method))
 
     def draw(
         self,
@@ -137,7 +118,7 @@ class Renderer:
         Parameters
         ----------
         frame : framebuffer of moderngl with a depth buffer.
-        method : one of `source.METHODS`.
+        method : one of `methods.METHODS`.
         camera : by default the scene's camera.
         """
         definitions = {"LIGHTS_LIT": str(len(self.lights))}
@@ -162,11 +143,11 @@ class Renderer:
     ) -> ProgressiveLight:
         """Return a picture that accumulates frames of all direct light with shadows.
 
-        Raises a DiffractionError if no emitter lights the scene, or as of `prepared`.
+        Raises a DiffractionError if no emitter lights the scene, or as of `tables`.
 
         Parameters
         ----------
-        method : one of `source.METHODS`.
+        method : one of `methods.METHODS`.
         size : width and height; by default the camera's.
         camera : by default the scene's camera.
         lights : lights to draw instead of the scene's emitters.
@@ -209,7 +190,7 @@ class Renderer:
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
         extras, each : further bindings, and uniforms, of each surface.
         """
-        prepared = self.prepared(method)
+        tables = self.tables(method)
         frame.use()
         self.context.enable_only(self.context.DEPTH_TEST)
         matrix = camera.view_projection(self.scene.low, self.scene.high)
@@ -223,17 +204,17 @@ class Renderer:
         shared: dict[str, Uniform] = {
             "view_projection": tuple(matrix.T.ravel().tolist()),
             "eye": tuple(camera.eye.tolist()),
-            "view_axis": (0.0, 0.0, 0.0),
             "light_place": places,
             "light_colour": colours,
             **uniforms,
         }
         for n, surface in enumerate(self.scene.surfaces):
             further = extras[n] if extras else ()
-            program, array = prepared.part(n, definitions, *(part.definitions for part in further))
+            parts = (self.bindings[n], tables[n], *further)
+            program, array = self._program(method, n, parts, definitions)
             set_uniforms(program, shared)
             unit = 0
-            for part in (self.bindings[n], prepared.tables[n], *further):
+            for part in parts:
                 unit = part.use(program, unit)
             unit = bind(program, each[n] if each else {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
@@ -247,26 +228,51 @@ class Renderer:
 
     def release(self) -> None:
         """Free the graphics card's memory."""
-        for prepared in self._methods.values():
-            prepared.release()
+        for held in (self._arrays, self._programs):
+            for thing in held.values():
+                thing.release()
+        for tables in self._tables.values():
+            for one in {id(table): table for table in tables}.values():
+                one.release()
         for resource in (*self.bindings, *self.buffers, self._responses, self._stage):
             if resource is not None:
                 resource.release()
         if self._own_context:
             self.context.release()
 
-    def prepared(self, method: str) -> Prepared:
-        """Return a method's tables and programs, uploaded at the first call.
+    def tables(self, method: str) -> list[Bindings]:
+        """Return a method's table of each surface, uploaded at the first call; empty without one.
 
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
-        if method not in self._methods:
-            numbers = [surface.table for surface in self.packed.surfaces]
-            self._methods[method] = Prepared(
-                self.context, method, self.packed.tables(method), numbers, self.bindings,
-                self.buffers,
-            )  # fmt: skip
-        return self._methods[method]
+        if method not in self._tables:
+            tables = (*self.packed.tables(method), Packed())
+            bound = [Bindings(self.context, packed) for packed in tables]
+            numbers = (-1 if s.table is None else s.table for s in self.packed.surfaces)
+            self._tables[method] = [bound[number] for number in numbers]
+        return self._tables[method]
+
+    def _program(
+        self, method: str, number: int, parts: Sequence[Bindings], light: Mapping[str, str]
+    ) -> tuple[Any, Any]:
+        """Return the program of a surface and its vertex array; both are cached.
+
+        parts : of the surface, its table and its surroundings.
+        light : definitions of the light.
+
+        Raises a DiffractionError if the program does not compile.
+        """
+        definitions = dict(light)
+        for part in parts:
+            definitions |= part.definitions
+        key = method, frozenset(definitions.items())
+        if key not in self._programs:
+            self._programs[key] = compile_program(self.context, method, definitions)
+        if (number, key) not in self._arrays:
+            self._arrays[number, key] = vertex_array(
+                self.context, self._programs[key], self.buffers[number]
+            )
+        return self._programs[key], self._arrays[number, key]
 
     def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:
         """Bind the lights' spectra, and upload them if the lights have changed."""

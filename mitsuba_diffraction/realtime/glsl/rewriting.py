@@ -13,9 +13,12 @@ _GLOBAL = re.compile(rf"(?:uniform |const )?{_TYPES} (\w[^;={{(]*)")
 
 
 @functools.cache
-def shader_file(name: str, folder: str = "shaders") -> str:
-    """Read a shader file, or one of the example in the folder `three`."""
-    return resources.files(__package__).joinpath(folder, name).read_text(encoding="utf-8")
+def shader_file(name: str, package: str = "") -> str:
+    """Read a file of the folder `shaders`, or of another package's folder."""
+    files = (
+        resources.files(package) if package else resources.files(__package__).joinpath("shaders")
+    )
+    return files.joinpath(name).read_text(encoding="utf-8")
 
 
 def global_names(source: str) -> set[str]:

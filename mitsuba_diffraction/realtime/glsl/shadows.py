@@ -21,9 +21,8 @@ import scipy
 from numpy.typing import NDArray
 
 from .camera import Camera, box_corners
-from .context import Target, compile_plain, set_uniforms
+from .context import Target, compile_plain, set_uniforms, vertex_array
 from .lights import Lamp
-from .methods import vertex_array
 from .scene import SceneSurface
 from .texels import Uniform
 

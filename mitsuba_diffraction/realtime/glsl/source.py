@@ -11,25 +11,11 @@ from typing import Literal
 from ...errors import check_choice
 from ...optics.display import VIEWS
 from .formulas import formulas
+from .methods import METHODS, method_of
 from .rewriting import shader_file
 from .texels import PAGE
 
 Dialect = Literal["desktop", "web"]
-
-#: Files of each method; the last one defines `diffracted`.
-_FILES = {
-    "fast": ["fast.glsl"],
-    "exact": ["responses.glsl", "exact.glsl"],
-    "flss": ["taylor.glsl", "spectrum.glsl"],
-    "nmm": ["taylor.glsl", "nmm.glsl"],
-    "pq": ["taylor.glsl", "spectrum.glsl"],
-}
-#: Methods of the fragment stage.
-METHODS = tuple(_FILES)
-#: Methods that a page in a browser supports.
-WEB_METHODS = METHODS[:2]
-#: Methods of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
-THESIS_METHODS = METHODS[2:]
 
 #: Largest number of lights in one draw call.
 LIGHTS = 4
@@ -59,23 +45,22 @@ def fragment_parts(
     method: str,
     definitions: Mapping[str, str],
     dialect: Dialect = "desktop",
-    main: str = "surface.frag",
 ) -> list[tuple[str, str]]:
     """Return names and texts of the parts of a method's fragment stage, which are to be joined.
 
     definitions : definitions of the surface, the tables and the light (`Packed.definitions`).
     dialect : "desktop" is GLSL 3.30 core, "web" GLSL ES 3.00.
-    main : file with the main function.
 
     Raises a DiffractionError if the method is unknown.
     """
-    check_choice("method", method, METHODS)
     files = [*surface_files(definitions), "frame.glsl"]
     further = {"SHADOWED": "shadow.glsl", "GLOSS": "gloss.glsl"}
     files += [name for definition, name in further.items() if definition in definitions]
     if "WEIGHTED" in definitions or "LOOKED_UP" in definitions:
         files += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
-    return _parts([*files, *method_files(method, definitions), main], definitions, dialect)
+    return _parts(
+        [*files, *method_files(method, definitions), "surface.frag"], definitions, dialect
+    )
 
 
 def _parts(
@@ -90,7 +75,10 @@ def _parts(
 
 def part(name: str, definitions: Mapping[str, str]) -> str:
     """Return the text of a file, or of `formulas`."""
-    return formulas(definitions) if name == "formulas" else shader_file(name)
+    if name == "formulas":
+        return formulas(definitions)
+    packages = (method.package for method in METHODS.values() if name in method.files)
+    return shader_file(name, next(packages, ""))
 
 
 def surface_files(definitions: Mapping[str, str]) -> list[str]:
@@ -105,10 +93,10 @@ def surface_files(definitions: Mapping[str, str]) -> list[str]:
 
 def method_files(method: str, definitions: Mapping[str, str]) -> list[str]:
     """Return the files of a method's `diffraction`."""
+    files = method_of(method).files
     if "ORDERS" in definitions:
-        return [*_FILES[method][:-1], "orders_light.glsl"]
-    end = ["diffraction.glsl"] if "DIFFRACTING" in definitions else []
-    return [*_FILES[method], *end]
+        return [*files[:-1], "orders_light.glsl"]
+    return [*files, *(["diffraction.glsl"] if "DIFFRACTING" in definitions else [])]
 
 
 def plain_source(

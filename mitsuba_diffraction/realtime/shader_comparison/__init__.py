@@ -3,8 +3,7 @@
 Contents
 --------
 Comparison    pictures, sheets, errors and times of both renderers, in a folder
-SameLights    one scene for both renderers, under lights that both support
-difference    compare a picture with its reference, over some of the pixels
+difference    compare a picture with its reference
 Difference    measures of that comparison
 delta_e       ΔE2000 of each pixel
 exposure_of   factor with which a picture's brightest pixels are white
@@ -14,6 +13,6 @@ from __future__ import annotations
 
 from ...optics.colour import delta_e
 from .measures import Difference, difference, exposure_of
-from .run import Comparison, SameLights
+from .run import Comparison
 
-__all__ = ["Comparison", "Difference", "SameLights", "delta_e", "difference", "exposure_of"]
+__all__ = ["Comparison", "Difference", "delta_e", "difference", "exposure_of"]

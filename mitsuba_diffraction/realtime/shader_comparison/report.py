@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...optics.colour import delta_e, encode_srgb
@@ -17,14 +16,9 @@ _WORST = 8.0  # ΔE2000 at the end of the scale
 
 # times are ratios: those of one machine, and of a busy one, say little; compare.json has them in ms
 _HEAD = (
-    "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, × `{first}` "
-    "| fragment, × `{first}` | × `flss` | look-up in a fragment | textures, MB |\n"
-    "|---|---|---|---|---|---|---|---|---|---|"
-)
-
-_WHOLE = (
     "| method | ΔE2000 mean | 99 % | noise | FLIP | relative RMSE | ΔE2000 to full light "
-    "| frame, × `{first}` | × without shadows |\n|---|---|---|---|---|---|---|---|---|"
+    "| frame, × `{first}` | fragment, × `{first}` | textures, MB |\n"
+    "|---|---|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -36,7 +30,6 @@ def write_sheet(
     *,
     method: str,
     errors: Difference,
-    compared: NDArray[np.bool_] | None,
     exposure: float,
 ) -> None:
     """Write a sheet: both pictures, their difference, and full transport.
@@ -49,8 +42,7 @@ def write_sheet(
     reference, other : direct light, path-traced and of the shader, linear sRGB (height, width, 3).
     full : full transport, or None.
     method : method of the shader.
-    errors : difference over the compared pixels.
-    compared : compared pixels; the map is pale elsewhere. None for all.
+    errors : their difference.
     exposure : factor on all pictures.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -66,16 +58,10 @@ def write_sheet(
     for axis, image, title in pictures:
         axis.imshow(encode_srgb(exposure * np.asarray(image, float)))
         axis.set_title(title)
-    least = 0.0 if compared is None else 0.01
-    distances = delta_e(reference, other, exposure=exposure, least=least)
-    shown = axes[1, 0].imshow(
-        np.nan_to_num(distances), cmap="magma", vmin=0.0, vmax=_WORST,
-        alpha=None if compared is None else np.where(compared, 1.0, 0.25),
-    )  # fmt: skip
+    distances = delta_e(reference, other, exposure=exposure, least=0.0)
+    shown = axes[1, 0].imshow(distances, cmap="magma", vmin=0.0, vmax=_WORST)
     high = errors.delta_e_percentiles["99"]
     title = f"difference, mean {errors.delta_e_mean:.2f}, 99 % {high:.1f}"
-    if compared is not None:
-        title += "\n(pale where shadows, edges and materials differ)"
     axes[1, 0].set_title(title, fontsize="medium")
     figure.colorbar(shown, ax=axes[1, 0], label="ΔE2000", extend="max", shrink=0.8)
     for axis in axes.ravel():
@@ -85,88 +71,46 @@ def write_sheet(
 
 
 def markdown(document: dict[str, Any]) -> str:
-    """Return the methods' tables over all pixels and under points and directions, with notes.
+    """Return the table of the methods, with notes.
 
     document : content of compare.json.
     """
     methods = document["methods"]
-    first = next(iter(methods))
-    slow = methods.get("flss", {}).get("fragment_ns")
-    rows = [_row(method, entry, methods[first], slow) for method, entry in methods.items()]
-    lit = {method: entry for method, entry in methods.items() if "whole" in entry}
-    whole = [_whole_row(m, entry, next(iter(lit.values()))) for m, entry in lit.items()]
-    share = methods[first]["diffracting"]["share"]
+    first, of_first = next(iter(methods.items()))
     width, height = document["size"]
-    head = _WHOLE.format(first=next(iter(lit), first))
-    return "\n".join(
-        [
-            *([head, *whole, ""] if whole else []),
-            f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
-            f"{_samples(document)} samples a pixel, against {document['spp']} of the path tracer; "
-            f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
-            *_dark_regions(lit),
-            "",
-            _HEAD.format(first=first),
-            *rows,
-            "",
-            f"Lights without extent, no shadows: {100 * share:.0f} % of the pixels, those that "
-            f"diffract and are lit in both; {document['driver']}; noise of the path tracer: "
-            f"ΔE2000 {plain_number(document['noise_delta_e_mean'])}.",
-        ]
-    )
-
-
-def _dark_regions(methods: dict[str, Any]) -> list[str]:
-    """Return a sentence on regions that light between surfaces leaves dark, where measured."""
-    shares = [
-        f"{plain_number(100.0 * entry['whole']['dark_region'])} % by `{method}`"
+    samples = max(entry["samples"] for entry in methods.values()) // document["frames"]
+    dark = [
+        f"{plain_number(100.0 * entry['dark_region'])} % by `{method}`"
         for method, entry in methods.items()
-        if entry["whole"].get("dark_region") is not None
+        if entry["dark_region"] is not None
     ]
-    if not shares:
-        return []
-    return [
+    lines = [
+        _HEAD.format(first=first),
+        *(_row(method, entry, of_first) for method, entry in methods.items()),
         "",
-        "With light between surfaces, largest region of the picture less than half as bright as in "
-        f"full transport: {', '.join(shares)}.",
+        f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
+        f"{samples} samples a pixel, against {document['spp']} of the path tracer, whose noise is "
+        f"ΔE2000 {plain_number(document['noise']['delta_e_mean'])}; {document['driver']}; "
+        f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
     ]
+    if dark:
+        lines += [
+            "",
+            "With light between surfaces, largest region of the picture less than half as bright "
+            f"as in full transport: {', '.join(dark)}.",
+        ]
+    return "\n".join(lines)
 
 
-def _samples(document: dict[str, Any]) -> int:
-    """Return the samples per pixel in one progressive frame."""
-    samples = [e["whole"]["samples"] for e in document["methods"].values() if "whole" in e]
-    return int(max(samples, default=0) / document["frames"])
-
-
-def _whole_row(method: str, entry: dict[str, Any], first: dict[str, Any]) -> str:
-    """Return the row of a method in progressive light, over all pixels; first : for times."""
-    whole = entry["whole"]
-    direct, full = whole["direct"], whole["full"]
-    return _line(
-        method, direct["delta_e_mean"], direct["delta_e_percentiles"]["99"],
-        whole["noise"]["delta_e_mean"], direct["flip"], direct["relative_rmse"],
-        full and full["delta_e_mean"], whole["frame_ms"] / first["whole"]["frame_ms"],
-        whole["frame_ms"] / whole["plain_frame_ms"],
-    )  # fmt: skip
-
-
-def _row(method: str, entry: dict[str, Any], first: dict[str, Any], slow: float | None) -> str:
-    """Return the row of a method under points and directions, over diffracting pixels.
-
-    first : method whose times are 1.
-    slow : time of a fragment of `flss`, ns, or None.
-    """
-    errors = entry["diffracting"]
-    return _line(
-        method, errors["delta_e_mean"], errors["delta_e_percentiles"].get("99"), errors["flip"],
-        errors["relative_rmse"], *(entry[n] / first[n] for n in ("frame_ms", "fragment_ns")),
-        slow / entry["fragment_ns"] if slow else None, entry["look_up_ns"] / entry["fragment_ns"],
+def _row(method: str, entry: dict[str, Any], first: dict[str, Any]) -> str:
+    """Return the row of a method; first : entry of the method whose times are 1."""
+    direct, full = entry["direct"], entry["full"]
+    values = (
+        direct["delta_e_mean"], direct["delta_e_percentiles"]["99"],
+        entry["noise"]["delta_e_mean"], direct["flip"], direct["relative_rmse"],
+        full and full["delta_e_mean"], *(entry[n] / first[n] for n in ("frame_ms", "fragment_ns")),
         entry["texture_bytes"] / 1e6,
     )  # fmt: skip
-
-
-def _line(method: str, *values: float | None) -> str:
-    """Return a line of a Markdown table."""
     return "| " + " | ".join([f"`{method}`", *map(plain_number, values)]) + " |"
 
 

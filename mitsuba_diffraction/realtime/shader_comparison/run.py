@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import DiffractionError, DiffractionWarning, warn
+from ...errors import DiffractionError, warn
 from ...progress import Progress, silent
 from ...scene.passes import Stop, render_passes
 from ...scene.pictures import write_exr
 from ..glsl.context import clock_of
 from ..glsl.renderer import Renderer
-from ..glsl.scene import load
-from ..glsl.source import THESIS_METHODS
 from ..glsl.timing import fragment_times
-from .measures import dark_region, difference, exposure_of, regions
-from .path_traced import box_sensor, direct_light, visibility, with_lights
+from .measures import dark_region, difference, exposure_of
+from .path_traced import box_sensor, direct_light
 from .report import write_sheet
 
-#: Samples along either side of a pixel: fewer for the thesis' slow methods, whose errors are far
-#: larger than the noise, and at most so many for the others.
-_FEWER, _MOST = 2, 64
-_DETAIL = 1024  # largest number of samples per pixel under points and directions: little noise
 _STEP = 8  # frames between two reports of progress
 
 #: Only every `_SPARED`-th frame of methods other than `_QUICK` is drawn. Their difference from
@@ -36,52 +28,6 @@ _STEP = 8  # frames between two reports of progress
 #: frames by `_QUICK`.
 _QUICK, _SPARED = "fast", 8
 _IN_FRAME = 1 << 15  # samples that progressive light draws at once; fewer are not faster
-
-
-class SameLights:
-    """A scene for both renderers, lit only by directions and points.
-
-    Both renderers replace lights with an extent by points and directions: the sun of a sky by its
-    direction. The rest of the sky is left out of both.
-
-    Raises a DiffractionError if the scene has no light with a direction or position, or as of
-    `glsl.Renderer`.
-
-    Parameters
-    ----------
-    scene : a `mi.Scene` of the current variant, or an XML file.
-    sensor : index of the camera.
-    name : name of the scene in errors.
-
-    Attributes
-    ----------
-    renderer : renderer by shaders.
-    scene : scene for the path tracer; its one sensor averages evenly over each pixel.
-    """
-
-    def __init__(self, scene: Any, *, sensor: int = 0, name: str = "the scene") -> None:
-        scene = load(scene)
-        self.renderer = Renderer(scene, sensor=sensor)
-        if not self.renderer.lights:
-            raise DiffractionError(
-                f"{name} has no light with a direction or position; add a directional or point "
-                "emitter, or a sky with a sun"
-            )
-        self.renderer.sky = np.zeros((4, 3))
-        self.scene = with_lights(scene, self.renderer.camera, self.renderer.lights)
-        self._visibility = visibility(self.scene, self.renderer.lights)
-        surfaces = [
-            [surface for surface in self.renderer.scene.surfaces if surface.shape.ptr == shape.ptr]
-            for shape in self.scene.shapes()
-        ]
-        self._exact = np.array([bool(s) and all(one.exact for one in s) for s in surfaces])
-        self._diffracting = np.array(
-            [any(one.material.diffraction is not None for one in s) for s in surfaces]
-        )
-
-    def regions(self, picture: NDArray[np.floating]) -> dict[str, NDArray[np.bool_]]:
-        """Classify the pixels of a picture (height, width, 4) by `renderer`, see `regions`."""
-        return regions(self._visibility, self._exact, self._diffracting, picture[..., 3])
 
 
 @dataclass(frozen=True)
@@ -96,9 +42,9 @@ class Halves:
         """Picture of all samples."""
         return 0.5 * (self.first + self.second)
 
-    def noise(self, exposure: float, mask: Any = None) -> dict[str, float]:
+    def noise(self, exposure: float) -> dict[str, float]:
         """Estimate the ΔE2000 of the mean from a picture without noise: mean and 99 %."""
-        halves = difference(self.first, self.second, mask, exposure)
+        halves = difference(self.first, self.second, exposure)
         # the difference of the halves is twice the error of their mean
         return {
             "delta_e_mean": 0.5 * halves.delta_e_mean,
@@ -122,8 +68,8 @@ class Comparison:
     folder : folder of pictures (EXR) and sheets (PNG), created with the first file.
     sensor : index of the camera.
     spp, full_spp : samples per pixel of the direct light and of full transport; 0 leaves it out.
-    frames : frames of progressive light, for all methods but the thesis'.
-    supersampling : samples of the shaders along either side of a pixel.
+    frames : frames of progressive light.
+    supersampling : largest number of samples of the shaders along either side of a pixel.
     seed : seed of the random numbers.
     progress : called as progress(done, total, text).
     """
@@ -139,13 +85,13 @@ class Comparison:
     supersampling: int = 8
     seed: int = 0
     progress: Progress = silent
-    same_lights: SameLights = field(init=False)
+    renderer: Renderer = field(init=False)
     _progressive: dict[tuple[str, int, bool], ProgressivePicture] = field(
         init=False, repr=False, default_factory=dict
     )
 
     def __post_init__(self) -> None:
-        self.same_lights = SameLights(self.scene, sensor=self.sensor, name=f"'{self.name}'")
+        self.renderer = Renderer(self.scene, sensor=self.sensor)
 
     def run(self, methods: Sequence[str], *, leave_out: bool = False) -> dict[str, Any]:
         """Draw with these methods of the shaders, path-trace, and measure.
@@ -160,35 +106,31 @@ class Comparison:
             If the rendering was interrupted.
         """
         supported = [name for name in dict.fromkeys(methods) if self._supports(name, leave_out)]
-        renderer, full = self.same_lights.renderer, None
+        camera, full = self.renderer.camera, None
         with Stop() as stop:
-            simple = self._halves(self.same_lights.scene, min(self.spp, _DETAIL), stop)
-            direct = self._halves(direct_light(self.scene, renderer.camera), self.spp, stop)
+            direct = self._halves(direct_light(self.scene, camera), stop)
             if self.full_spp:
-                sensor = box_sensor(renderer.camera)
+                sensor = box_sensor(camera)
                 full = self._path_trace(self.scene, sensor, self.full_spp, self.seed, stop)
-        reference = simple.mean
-        exposure = exposure_of(reference)
+        exposure = exposure_of(direct.mean)
         self._make_folder()
         self._write(direct.mean, "direct", self.spp)
         if full is not None:
             self._write(full, "full", self.full_spp)
-        table, compared = self._compare_same_lights(supported, reference, exposure)
-        for method in supported:
-            if method not in THESIS_METHODS:
-                table[method]["whole"] = self._compare_all_light(method, direct, full)
+        table = {method: self._compare(method, direct, full) for method in supported}
+        self.progress(0, 1, "timing fragments")
+        for method, seconds in fragment_times(self.renderer, supported).items():
+            table[method]["fragment_ns"] = 1e9 * seconds
         return {
-            "scene": self.name, "variant": self.variant, "driver": renderer.driver,
-            "size": list(renderer.camera.size), "spp": self.spp, "exposure": exposure,
-            "lights": [light.name for light in renderer.lights],
-            "not_shown": list(renderer.scene.omissions),
-            "noise_delta_e_mean": simple.noise(exposure, compared)["delta_e_mean"],
-            "whole_noise": direct.noise(exposure_of(direct.mean)),
-            "clipped": float((direct.mean * exposure_of(direct.mean) > 1.0).any(axis=2).mean()),
+            "scene": self.name, "variant": self.variant, "driver": self.renderer.driver,
+            "size": list(camera.size), "spp": self.spp, "exposure": exposure,
+            "not_shown": list(self.renderer.scene.omissions),
+            "noise": direct.noise(exposure),
+            "clipped": float((direct.mean * exposure > 1.0).any(axis=2).mean()),
             "frames": self.frames,
             "full_transport": None
             if full is None
-            else difference(full, direct.mean, None, exposure_of(full)),
+            else difference(full, direct.mean, exposure_of(full)),
             "methods": table,
         }  # fmt: skip
 
@@ -196,7 +138,7 @@ class Comparison:
         """Prepare a method's tables, and return whether it supports the surfaces."""
         self.progress(0, 0, f"preparing {method}")
         try:
-            self.same_lights.renderer.prepared(method)
+            self.renderer.tables(method)
         except DiffractionError as error:
             if not leave_out:
                 raise
@@ -204,7 +146,7 @@ class Comparison:
             return False
         return True
 
-    def _compare_all_light(self, method: str, direct: Halves, full: Any) -> dict[str, Any]:
+    def _compare(self, method: str, direct: Halves, full: Any) -> dict[str, Any]:
         """Compare all pixels in progressive light with direct light and with full transport."""
         frames = self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
         picture, side, seconds = self._draw_progressive(method, frames)
@@ -215,20 +157,18 @@ class Comparison:
                 many.second + (picture.second - few.second),
             )
         exposure = exposure_of(direct.mean)
-        errors = difference(direct.mean, picture.mean, None, exposure)
-        self._write(picture.mean, f"{method}_whole", self.frames)
+        errors = difference(direct.mean, picture.mean, exposure)
+        self._write(picture.mean, method, self.frames)
         beside_full: dict[str, Any] = {"full": None, "dark_region": None}
         if full is not None:
             bounced = self._draw_progressive(method, frames, bounces=True)[0].mean
             self._write(bounced, f"{method}_bounces", frames)
-            beside_full["full"] = difference(full, bounced, None, exposure_of(full))
+            beside_full["full"] = difference(full, bounced, exposure_of(full))
             beside_full["dark_region"] = dark_region(full, bounced)
         write_sheet(
             self.folder / f"{method}.png", direct.mean, picture.mean, full, method=method,
-            errors=errors, compared=None, exposure=exposure,
+            errors=errors, exposure=exposure,
         )  # fmt: skip
-        renderer = self.same_lights.renderer
-        fine = (side * renderer.camera.size[0], side * renderer.camera.size[1])
         return {
             "direct": errors,
             **beside_full,
@@ -236,7 +176,7 @@ class Comparison:
             "frames": frames,
             "samples": self.frames * side**2,
             "frame_ms": 1e3 * seconds / frames,
-            "plain_frame_ms": 1e3 * renderer.frame_time(method, size=fine, frames=3),
+            "texture_bytes": self.renderer.texture_bytes(method),
         }
 
     def _draw_progressive(
@@ -245,7 +185,7 @@ class Comparison:
         """Draw frames of progressive light; results are cached."""
         if (method, frames, bounces) in self._progressive:
             return self._progressive[method, frames, bounces]
-        renderer = self.same_lights.renderer
+        renderer = self.renderer
         width, height = renderer.camera.size
         side = min(self.supersampling, math.isqrt(max(_IN_FRAME // (width * height), 1)))
         size = side * width, side * height
@@ -266,46 +206,10 @@ class Comparison:
         self._progressive[method, frames, bounces] = picture, side, seconds
         return self._progressive[method, frames, bounces]
 
-    def _compare_same_lights(
-        self, methods: Sequence[str], reference: Any, exposure: float
-    ) -> tuple[dict[str, dict[str, Any]], Any]:
-        """Return errors, times and memory of all methods, and the pixels that are compared."""
-        renderer, table = self.same_lights.renderer, {}
-        compared: Any = None
-        for n, method in enumerate(methods):
-            self.progress(n, len(methods), f"drawing with {method}")
-            samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
-            with warnings.catch_warnings():  # other lights are left out of both renderers
-                warnings.simplefilter("ignore", DiffractionWarning)
-                drawn = renderer.render(method, supersampling=samples)
-            areas, picture = self.same_lights.regions(drawn), drawn[..., :3]
-            compared = areas["both"]
-            errors = {
-                name: difference(reference, picture, mask, exposure) for name, mask in areas.items()
-            }
-            seconds = renderer.frame_time(method, frames=1 if method in THESIS_METHODS else 3)
-            self._write(picture, method, samples**2)
-            if method in THESIS_METHODS:
-                write_sheet(
-                    self.folder / f"{method}.png", reference, picture, None, method=method,
-                    errors=errors["diffracting"], compared=compared, exposure=exposure,
-                )  # fmt: skip
-            table[method] = {
-                "supersampling": samples,
-                "frame_ms": 1e3 * seconds,
-                "texture_bytes": renderer.texture_bytes(method),
-                **errors,
-            }
-        self.progress(0, 1, "timing fragments")
-        for method, times in fragment_times(renderer, tuple(table)).items():
-            table[method]["fragment_ns"] = 1e9 * times["whole"]
-            table[method]["look_up_ns"] = 1e9 * times["look_up"]
-        return table, compared
-
-    def _halves(self, scene: Any, spp: int, stop: Stop) -> Halves:
+    def _halves(self, scene: Any, stop: Stop) -> Halves:
         """Path-trace a scene by its first sensor, in two halves of the samples."""
         sensor, seeds = scene.sensors()[0], (2 * self.seed, 2 * self.seed + 1)
-        return Halves(*(self._path_trace(scene, sensor, spp // 2, s, stop) for s in seeds))
+        return Halves(*(self._path_trace(scene, sensor, self.spp // 2, s, stop) for s in seeds))
 
     def _path_trace(self, scene: Any, sensor: Any, spp: int, seed: int, stop: Stop) -> Any:
         """Path-trace a picture (height, width, 3)."""

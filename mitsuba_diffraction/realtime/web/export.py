@@ -21,13 +21,12 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
 from ...progress import Progress, silent
-from ..glsl.methods import CONSUMERS
+from ..glsl.methods import WEB_METHODS, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
 from ..glsl.shader_materials import Diffracting
 from ..glsl.source import (
-    WEB_METHODS,
     display_definitions,
     fragment_parts,
     plain_source,
@@ -327,9 +326,8 @@ def _fitted(
     """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
     for method in methods:
-        consumer = CONSUMERS.get(method)
-        refusals = [consumer.refusal(surface.described) for surface in tables] if consumer else []
-        if reason := next((refusal for refusal in refusals if refusal), None):
+        refusals = (refusal(method, surface.described) for surface in tables)
+        if reason := next(filter(None, refusals), None):
             shown.remove(method)
             left_out[method] = reason
     while shown:

@@ -56,32 +56,6 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
     return Section(data, layout)
 
 
-def packed_series(rows: NDArray[np.float16 | np.float32]) -> Section:
-    """Compress rows of numbers as integers, and the binary exponent of each row's step.
-
-    rows : (n, m) half floats, or floats that store two upper halves each (`texels.paired`). Few
-        binary digits in a row make small integers.
-    """
-    words = rows.dtype == np.float32
-    if words:
-        bits = rows.view(np.uint32)
-        pairs = np.stack([bits << 16, bits & np.uint32(0xFFFF0000)], axis=-1)
-        values = pairs.reshape(len(rows), -1).view(np.float32).copy()
-        values[np.abs(values) < 1e-30] = 0.0
-    else:
-        values = rows.astype(np.float32)
-    # frexp: |x| = m 2^e with 24-bit m; the step is the lowest bit that any number of a row has
-    mantissas, exponents = np.frexp(values)
-    digits = np.round(np.abs(mantissas) * 2.0**24).astype(np.int64)
-    lowest = np.log2(np.where(digits > 0, digits & -digits, 1)).astype(np.int32) + exponents - 24
-    steps = np.where(digits > 0, lowest, 127).min(axis=1, keepdims=True)
-    integers = np.ldexp(values, -steps).astype(np.int32)
-    # sign in the lowest bit: the upper bytes of small integers are zeros
-    unsigned = (integers << 1) ^ (integers >> 31)
-    section = packed_array(np.concatenate([unsigned, steps + 128], axis=1).astype(np.uint16))
-    return Section(section.data, {**section.layout, "series": "words" if words else "half"})
-
-
 def as_columns(data: Any, width: int) -> Any:
     """Arrange a texture's numbers in rows of a given width; the last row is padded with zeros."""
     flat = data.reshape(-1)

@@ -22,7 +22,7 @@ from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
-from .sections import Section, as_columns, converted, packed_array, packed_series
+from .sections import Section, as_columns, converted, packed_array
 
 #: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
 DIGITS = 9
@@ -32,7 +32,6 @@ FLOOR = 2.0**-19
 _FEWER = 4  # numbers of digits that are tried for tables that are too large for a page
 
 _ORDERS = 5  # largest number of orders that the page names
-_LARGE = 1 << 20  # least number of entries of rounded textures
 _ORDER_BYTES = 6 << 20  # size of efficiencies of solved orders before compression
 _BANDS = 4  # bands of solved orders whose colours are compared
 
@@ -62,14 +61,7 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
         if orders is None
         else _solved(method, orders, surface.described.sigma, digits)
     )
-    sections = {}
-    for texture in packed.textures:
-        data, channels = texture.data, texture.data.shape[2]
-        sections[texture.name] = (
-            packed_series(as_columns(data, width))
-            if data.size > _LARGE
-            else packed_array(as_columns(data, channels))
-        )
+    sections = {t.name: packed_array(as_columns(t.data, width)) for t in packed.textures}
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 

@@ -69,39 +69,21 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
             32,
             40,
         )
-        whole = entry["whole"]
         # a directional light and no more: nothing of it is drawn at random but edges
-        assert whole["direct"]["pixels"] == 40 * 32
-        noise = document["whole_noise"]["delta_e_mean"] + whole["noise"]["delta_e_mean"]
-        assert whole["direct"]["delta_e_mean"] < 1.5 * noise + 0.5
-        assert whole["full"]["delta_e_mean"] > 0.0
+        assert entry["direct"]["pixels"] == 40 * 32
+        noise = document["noise"]["delta_e_mean"] + entry["noise"]["delta_e_mean"]
+        assert entry["direct"]["delta_e_mean"] < 1.5 * noise + 0.5
+        assert entry["full"]["delta_e_mean"] > 0.0
         # one convex surface; two samples of the path tracer leave a few pixels to chance
-        assert whole["dark_region"] < 0.05
-        assert whole["frame_ms"] > 0.0
-        assert (folder / f"{method}.png").stat().st_size > 10_000
-        both = entry["both"]
-        assert both["pixels"] > 200
-        # 64 samples of four wavelengths are noisy: their own noise, and a little
-        assert both["delta_e_mean"] < 2.5 * document["noise_delta_e_mean"] + 0.5
-        assert both["flip"] < 0.2
+        assert entry["dark_region"] < 0.05
         assert entry["frame_ms"] > 0.0
-        # a look-up is a part of a fragment; the rest of a fragment is alike
-        assert 0.0 < entry["look_up_ns"] < 1.5 * entry["fragment_ns"]
+        assert (folder / f"{method}.png").stat().st_size > 10_000
     # a loop over some hundred orders against eleven texels
-    for kind in ("look_up_ns", "fragment_ns"):
-        times = {name: entry[kind] for name, entry in document["methods"].items()}
-        assert times["exact"] > 4.0 * times["fast"]
+    times = {name: entry["fragment_ns"] for name, entry in document["methods"].items()}
+    assert times["exact"] > 4.0 * times["fast"]
     assert document["driver"]
     assert (folder / "direct.exr").exists()
     assert (folder / "full.exr").exists()
-
-
-def test_a_scene_without_a_light_to_compare_under_is_refused(run, scene, some_variant, gl_works):
-    light = SCENE[SCENE.index("  <emitter") : SCENE.index("</scene>")]
-    scene.write_text(SCENE.replace(light, '  <emitter type="constant"/>\n'))
-    line = run("compare", scene).failed_in_one_line()
-    assert "no light with a direction or position" in line
-    assert not Path("plate_compare").exists()
 
 
 def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(

@@ -20,7 +20,7 @@ from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
-from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
+from mitsuba_diffraction.realtime.glsl.methods import METHODS
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_beneath,
@@ -32,7 +32,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_responses,
 )
 from mitsuba_diffraction.realtime.glsl.source import (
-    METHODS,
     fragment_parts,
     vertex_source,
 )
@@ -48,6 +47,7 @@ from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
+from mitsuba_diffraction.thesis.shaders.pack import pack_method, thesis_method
 from tests.support.patches import SMALL_SCAN
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
@@ -306,7 +306,7 @@ def test_the_documents_tables_are_built_once(
     def build(*_: object, **__: object) -> DiffractionTable:
         raise AssertionError("built again")
 
-    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.methods.build_with", build)
+    monkeypatch.setattr("mitsuba_diffraction.thesis.shaders.pack.build_with", build)
     del first
     gc.collect()
     assert in_memory() is None  # as in the next process

@@ -16,7 +16,6 @@ from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     box_sensor,
     direct_light,
-    visibility,
 )
 
 pytestmark = [
@@ -60,6 +59,16 @@ def truth(renderer: Renderer, spp: int) -> NDArray[np.float64]:
     sensor, integrator = box_sensor(renderer.camera), mi.load_dict({"type": "direct"})
     image = mi.render(renderer.packed.mitsuba_scene, sensor=sensor, integrator=integrator, spp=spp)
     return np.array(image, np.float64)
+
+
+def shapes_seen(scene: Any, camera: Camera) -> NDArray[np.int64]:
+    """Number of the shape of each pixel (height, width), −1 for the background and −2 at edges."""
+    index = mi.load_dict({"type": "aov", "aovs": "shape:shape_index"})
+    seen = np.array(mi.render(scene, sensor=box_sensor(camera), integrator=index, spp=16))[..., 0]
+    depth = mi.render(scene, sensor=box_sensor(camera), integrator=mi.load_dict({"type": "depth"}))
+    shapes = np.where(np.array(depth)[..., 0] > 0.0, seen, -1.0)
+    same = (maximum_filter(shapes, 3) - minimum_filter(shapes, 3)) < 1e-3
+    return np.where(same, np.rint(shapes), -2).astype(int)
 
 
 def places_on_plate(camera: Any) -> NDArray[np.float64]:
@@ -309,10 +318,10 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
     light.release()
     once = direct_light(scene, renderer.camera)
     expected = np.array(mi.render(once, spp=512), float)[..., :3]
-    shapes = visibility(once, renderer.lights).shape
+    shapes = shapes_seen(scene, renderer.camera)
     renderer.release()
     numbers = [number for number in np.unique(shapes) if number > -2]
-    assert len(numbers) == 1 + len(materials)
+    assert len(numbers) >= 1 + len(materials)
     for number in numbers:
         pixels = shapes == number
         mean = expected[pixels].mean(axis=0)
@@ -366,7 +375,7 @@ def test_a_lamp_may_reflect_other_light(
     light.advance(512)
     found, expected = light.image[..., :3], truth(renderer, 256)
     light.release()
-    shapes = visibility(direct_light(scene, renderer.camera), renderer.lights).shape
+    shapes = shapes_seen(scene, renderer.camera)
     renderer.release()
     numbers = np.unique(shapes[shapes >= 0])
     assert len(numbers) == 2

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
+import mitsuba_diffraction.thesis.shaders  # registers its methods
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of

@@ -13,14 +13,12 @@ from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.realtime.glsl.scene import VERTEX
-from mitsuba_diffraction.realtime.glsl.texels import paired
 from mitsuba_diffraction.realtime.web.sections import (
     Section,
     Sections,
     octahedral,
     packed_array,
     packed_mesh,
-    packed_series,
 )
 from mitsuba_diffraction.realtime.web.tables import rounded
 
@@ -145,11 +143,3 @@ def test_rounding_is_bounded_by_the_largest_number_of_a_row(
     bounds = np.maximum(largest * 2.0**-bits, largest.max() * floor)
     assert (np.abs(found - values) <= bounds * 1.001).all()
     np.testing.assert_array_equal(rounded(found, bits, floor), found)
-    # as integers with a step, and back
-    half, words = found.astype(np.float16), paired(found)
-    for rows in (half, words):
-        section = packed_series(rows)
-        array = undone(section.data, section.layout).astype(np.int64)
-        integers = (array[:, :-1] >> 1) ^ -(array[:, :-1] & 1)
-        np.testing.assert_array_equal(integers * 2.0 ** (array[:, -1:] - 128.0), found)
-        assert section.layout["series"] == ("half" if rows is half else "words")

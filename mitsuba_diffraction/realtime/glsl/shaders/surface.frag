@@ -9,7 +9,6 @@ in vec3 v_colour;
 in vec3 v_axis;
 
 uniform vec3 eye;
-uniform vec3 view_axis;           // direction to an orthographic camera; zero otherwise
 uniform vec4 light_place[LIGHTS];   // w = 0: direction to the light; w = 1: position
 uniform vec3 sky[4];              // irradiance over π: mean, and gradient along x, y, z
 
@@ -120,7 +119,7 @@ void main()
     vec3 mapped = looked_up(normal_map, normal_uv, v_texcoord, false, false);
     n = normalize(mapped.x * s + mapped.y * t + mapped.z * n);
 #endif
-    vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
+    vec3 towards_eye = normalize(eye - v_position);
 #ifdef TURNED
     n = facing(n, smooth_normal, towards_eye);
     s = normalize(s - n * dot(n, s));

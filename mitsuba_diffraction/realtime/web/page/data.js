@@ -30,21 +30,6 @@ function restored(planes, layout) {
   return array;
 }
 
-// Decode integers with the exponent of their step in the last column: floats, or floats that store
-// the upper halves of two.
-function seriesOf(array, { rows, columns, series }) {
-  const floats = new Float32Array(rows * (columns - 1));
-  let to = 0;
-  for (let from = 0; from < array.length; ++from) {
-    const step = 2 ** (array[from + columns - 1] - 128);
-    for (const end = from + columns - 1; from < end; ++from) floats[to++] = ((array[from] >>> 1) ^ -(array[from] & 1)) * step;
-  }
-  if (series === "half") return floats;
-  const bits = new Uint32Array(floats.buffer);
-  const words = Uint32Array.from({ length: bits.length / 2 }, (_, n) => (bits[2 * n] >>> 16) | (bits[2 * n + 1] & 0xffff0000 || 0x800000));
-  return new Float32Array(words.buffer);
-}
-
 class Data {
   constructor(bytes, layouts) {
     this.bytes = bytes;
@@ -57,9 +42,7 @@ class Data {
   }
 
   async array(number) {
-    const layout = this.layouts[number];
-    const array = restored(await inflated(this.part(number)), layout);
-    return layout.series ? seriesOf(array, layout) : array;
+    return restored(await inflated(this.part(number)), this.layouts[number]);
   }
 
   async text(number) {

@@ -143,7 +143,7 @@ class Viewer {
   // Matrix and uniforms that do not depend on the light.
   viewed(jitter = [0, 0]) {
     const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
-    const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0] };
+    const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
     const turn = (this.turn * Math.PI) / 180, { material, coherence, pigment } = this;
     const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment;
