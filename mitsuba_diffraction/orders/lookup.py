@@ -172,9 +172,12 @@ class Lookup:
         if self.sides == 2:
             port = port + xp.where(cos_i < 0.0, channels, 0)
         start = self.memory.start("starts", kind) + (cell * ports + port) * (ports + 1)
-        face = 1.0 - self._through(cos_i) if self.coated else 0.0 * x
-        place = kind, cell, start, channel, port, channels, weights
-        return Row(*place, lit, x, y, vacuum, face, passage(1.0 - face, self._kept))
+        face, entering = 0.0 * x, 1.0 + 0.0 * x
+        if self.coated:
+            through = self._through(cos_i)
+            face, entering = 1.0 - through, passage(through, self._kept)
+        cells = kind, cell, start, channel, port, channels, weights
+        return Row(*cells, lit, x, y, vacuum, face, entering)
 
     def ports(self, row: Any) -> Index:
         """Return the number of a row's ports."""
