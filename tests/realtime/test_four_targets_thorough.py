@@ -45,7 +45,7 @@ SUN, IRRADIANCE = (0.45, 0.0, 0.893), 3.0
 #: Pixels along a side of the squares whose means are compared, which have less noise.
 BLOCK = 2
 #: Samples of the path tracer and of Cycles, frames of GLSL and samples of the page.
-SAMPLES, CYCLES, FRAMES, PAGE = 512, 1536, 128, 128
+SAMPLES, CYCLES, FRAMES, PAGE = 512, 640, 128, 128
 
 
 class Halves(NamedTuple):
@@ -161,10 +161,16 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
     return made._replace(traced=Halves(*halves))
 
 
-def errors(stage: Stage, found: Halves, names: Iterable[str]) -> dict[str, float]:
+def profile(part: Array, joined: int) -> Array:
+    along = part.mean(axis=0)
+    whole = along[: len(along) // joined * joined]
+    return np.asarray(whole.reshape(-1, joined, 3).mean(axis=1))
+
+
+def errors(stage: Stage, found: Halves, names: Iterable[str], joined: int = 1) -> dict[str, float]:
     """Mean ΔE2000 of each surface beyond the noise of both pictures, which adds in squares.
 
-    Colours are means along the arch's lines of equal normals.
+    Colours are means along the arch's lines of equal normals, and over some blocks across them.
     """
     rows, columns, _ = found.first.shape
     half = HIGH * np.tan(np.radians(0.5 * ANGLE))
@@ -178,7 +184,7 @@ def errors(stage: Stage, found: Halves, names: Iterable[str]) -> dict[str, float
             np.flatnonzero(np.abs(x - place[0]) < 0.44),
         ]
         traced, seen = (
-            Halves(*(half[np.ix_(*inside)].mean(axis=0) for half in part))
+            Halves(*(profile(half[np.ix_(*inside)], joined) for half in part))
             for part in (stage.traced, found)
         )
         exposure = 1.0 / float(np.percentile(traced.mean.mean(axis=-1), 95.0))
@@ -192,9 +198,9 @@ def errors(stage: Stage, found: Halves, names: Iterable[str]) -> dict[str, float
     return beyond
 
 
-def check(stage: Stage, found: Halves, names: list[str], least: int) -> None:
+def check(stage: Stage, found: Halves, names: list[str], least: int, joined: int = 1) -> None:
     assert len(names) >= least
-    beyond = errors(stage, found, names)
+    beyond = errors(stage, found, names, joined)
     print({name: round(error, 2) for name, error in beyond.items()})
     assert {name: round(error, 2) for name, error in beyond.items() if error > 1.0} == {}
 
@@ -294,7 +300,8 @@ def test_cycles_shows_them_as_the_path_tracer_does(stage: Stage, tmp_path: Path)
         camera={"position": (0.0, 0.0, HIGH), "target": (0.0, 0.0, 0.0), "angle": ANGLE},
     )  # fmt: skip
     found = Halves(*(blocks(read_exr(Path(file))) for file in files))
-    check(stage, found, names, 22)
+    # orders are drawn at random, most of them away from the sun: the noise is several times larger
+    check(stage, found, names, 22, joined=2)
 
 
 @pytest.mark.usefixtures("some_variant")
