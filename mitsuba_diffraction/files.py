@@ -166,8 +166,8 @@ def beginning(path: str | os.PathLike[str], count: int) -> bytes:
     return first
 
 
-def path_within(file: Path, name: str) -> Path:
-    """Return the path of an output that a file names, relative to the file's folder.
+def path_beside(file: Path, name: str, *, output: bool = False) -> Path:
+    """Return the path of an input, or output, that a file names, relative to the file's folder.
 
     Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
     """
@@ -175,20 +175,9 @@ def path_within(file: Path, name: str) -> Path:
     if not path.resolve().is_relative_to(file.parent.resolve()):
         raise DiffractionError(
             f"{str(file)!r}: output: {name!r} is outside the file's folder; name a path in it"
-        )
-    return path
-
-
-def path_beside(file: Path, name: str) -> Path:
-    """Return the path of an input that a file names, relative to the file's folder.
-
-    Raises a DiffractionError if it leads out of the folder: absolute, by "..", or by a link.
-    """
-    path = file.parent / name
-    if not path.resolve().is_relative_to(file.parent.resolve()):
-        raise DiffractionError(
+            if output else
             f"{str(file)!r} names {quoted(name)}, which is outside of its folder; copy that there"
-        )
+        )  # fmt: skip
     return path
 
 

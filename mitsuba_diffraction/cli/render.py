@@ -92,7 +92,9 @@ def run(args: argparse.Namespace) -> Figures:
         return _run_frames(args)
     if moving or args.exr or args.fps:
         args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
-    return _on_workers(args) if on_workers(args) else _run_one(args, eye)
+    if eye is None and on_workers(args):
+        return _on_workers(args)
+    return _run_one(args, eye)
 
 
 class Outputs(NamedTuple):

@@ -6,7 +6,7 @@ import argparse
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import DiffractionWarning
 from ..scene.load import set_variant
@@ -15,18 +15,9 @@ from .console import Bar
 from .options import number_between
 from .report import Figures, check_outputs, output_name, save_json
 
-
-class Effort(NamedTuple):
-    """Sizes of a measurement."""
-
-    side: int  # pixels of the default patch, along either axis
-    pairs: int  # pairs of directions
-    lanes: int  # calls in a kernel launch
-    rounds: int  # timed launches
-    depths: int  # height scales
-
-
-FULL, QUICK = Effort(1332, 240, 1 << 19, 7, 14), Effort(400, 160, 1 << 17, 5, 9)
+#: Pixels of the default patch along an axis, pairs of directions, calls in a kernel launch, timed
+#: launches, height scales.
+FULL, QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
 @options.command(

@@ -190,18 +190,23 @@ def level_plane(field: HeightField) -> HeightField:
 
 def level_quadratic(field: HeightField) -> HeightField:
     """Subtract the least-squares polynomial of degree 2, a scanner's arc; the mean height stays."""
-    bases = []
-    for count in field.shape:
-        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(2, count - 1))
-        bases.append(np.linalg.qr(powers)[0])  # orthonormal on the pixels
-    along_y, along_x = bases
-    weights = along_y.T @ field.heights @ along_x
-    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 2] = 0.0
-    weights[0, 0] = 0.0
-    arc = along_y @ weights @ along_x.T
+    arc = arc_of(field.heights)
     heights = field.heights - arc
     line = f"paraboloid removed: it spanned {np.ptp(arc):.3g} µm{rms_change(field, heights)}"
     return field.changed(heights, line)
+
+
+def arc_of(heights: FloatArray) -> FloatArray:
+    """Return the least-squares polynomial of degree 2, without its mean, (ny, nx)."""
+    bases = []
+    for count in heights.shape:
+        powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, count), min(2, count - 1))
+        bases.append(np.linalg.qr(powers)[0])  # orthonormal on the pixels
+    along_y, along_x = bases
+    weights = along_y.T @ heights @ along_x
+    weights[np.add.outer(*(np.arange(n) for n in weights.shape)) > 2] = 0.0
+    weights[0, 0] = 0.0
+    return np.asarray(along_y @ weights @ along_x.T)
 
 
 def level_lines(field: HeightField) -> HeightField:

@@ -24,7 +24,7 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, check_keys
-from ..files import FileKind, kind_of, path_within, read_toml
+from ..files import FileKind, kind_of, path_beside, read_toml
 from ..limits import MOST_PATCHES, check_count
 from ..retired import retired
 from ..settings import RECIPE_SETTINGS, checked
@@ -204,4 +204,4 @@ def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
         raise DiffractionError(
             f"{shown}: output: expected a path that ends in .exr, got {output!r}"
         )
-    return path_within(file, output)
+    return path_beside(file, output, output=True)

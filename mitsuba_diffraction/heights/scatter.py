@@ -68,7 +68,7 @@ def power_spectrum(field: HeightField) -> PowerSpectrum:
 
     Raises a DiffractionError if the patch has too few pixels.
     """
-    density = _density(field)
+    density = height_spectrum(field, windowed=not field.periodic)
     fx, fy = frequencies(field)
     radius = np.hypot(fx, fy)
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
@@ -89,15 +89,6 @@ def power_spectrum(field: HeightField) -> PowerSpectrum:
     return PowerSpectrum(middle, mean, counts[known], rms, slope, band)
 
 
-def _density(field: HeightField) -> Reals:
-    """Return S₂, windowed but for patches that tile (`spectra.height_spectrum`)."""
-    if not field.periodic:
-        return height_spectrum(field)
-    (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    amplitude = np.fft.fft2(field.heights - field.heights.mean())
-    return np.fft.fftshift(np.abs(amplitude) ** 2) * (dx * dy / (nx * ny))
-
-
 def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
     """Return the total integrated scatter of a mirror at normal incidence, over its reflectance.
 
@@ -114,7 +105,7 @@ def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
         )
     fx, fy = frequencies(field)
     cosine = np.sqrt(np.maximum(1.0 - lam**2 * (fx**2 + fy**2), 0.0))
-    density = _density(field)
+    density = height_spectrum(field, windowed=not field.periodic)
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     return float((16.0 * np.pi**2 / lam**2 * cosine * density).sum() / (nx * dx * ny * dy))
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import scipy
 
 from .field import HeightField
+from .preprocess import arc_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -57,18 +58,21 @@ def frequencies(field: HeightField) -> tuple[FloatArray, FloatArray]:
     return np.fft.fftshift(fx), np.fft.fftshift(fy)[:, None]
 
 
-def height_spectrum(field: HeightField) -> FloatArray:
+def height_spectrum(field: HeightField, windowed: bool = True) -> FloatArray:
     """Return the two-sided power spectral density of the heights, (ny, nx) in µm⁴.
 
     The integral over frequencies is the variance. A Hann window, normalised to mean square 1,
     suppresses the seams of a measured patch (Welch, 1967); periodic patches are windowed, too, so
     that spectra can be compared.
+
+    windowed : False for the spectrum of a patch that tiles, as it is.
     """
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     # without the zeros at the window's ends, which would be the whole window of two rows
     window = np.hanning(ny + 2)[1:-1, None] * np.hanning(nx + 2)[1:-1]
     window /= np.sqrt(np.mean(window**2))
-    amplitude = np.fft.fft2((field.heights - field.heights.mean()) * window)
+    heights = field.heights - field.heights.mean()
+    amplitude = np.fft.fft2(heights * window if windowed else heights)
     return np.fft.fftshift(np.abs(amplitude) ** 2) * (dx * dy / (nx * ny))
 
 
@@ -137,7 +141,7 @@ def examine_periods(field: HeightField, most: int = 3) -> Periods:
     """
     central = field.heights[tuple(_central(n) for n in field.shape)]
     if field.cut_out or central.shape != field.shape:
-        central = _without_bow(central)
+        central = central - arc_of(central)
     spectrum = _Spectrum(HeightField(central, field.pixel_size))
     if not spectrum.total > 0.0:
         return Periods([], None)
@@ -261,16 +265,6 @@ class _Spectrum:
                 centre, repeats = peak.centre / harmonic, peak.repeats / harmonic
                 return replace(lower, centre=centre, repeats=repeats)
         return None
-
-
-def _without_bow(heights: FloatArray) -> FloatArray:
-    """Subtract the least-squares surface of second degree."""
-    y, x = (np.linspace(-1.0, 1.0, count) for count in heights.shape)
-    terms = np.stack(np.broadcast_arrays(
-        1.0, x, y[:, None], x**2, y[:, None] ** 2, x * y[:, None]
-    )).reshape(6, -1)  # fmt: skip
-    solution = np.linalg.lstsq(terms @ terms.T, terms @ heights.ravel(), rcond=None)[0]
-    return np.asarray(heights - (solution @ terms).reshape(heights.shape))
 
 
 def _repeated_profile(field: HeightField) -> list[Periodicity]:

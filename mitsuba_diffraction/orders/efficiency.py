@@ -75,17 +75,7 @@ def efficiency(
     return share.efficiency.reshape(placed.shape)
 
 
-def polarised_efficiency(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    order_y: ArrayLike = 0,
-    *,
-    from_below: bool = False,
-    transmitted: bool = False,
-) -> Array:
+def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """Return the efficiencies for incident light of s and of p polarisation, (…, 2).
 
     s light has its E across the plane of incidence. Other arguments as for `efficiency`.
@@ -94,9 +84,9 @@ def polarised_efficiency(
     coherent sums of the table's components, if a solved table has no Mueller matrices; or as
     `efficiency` does.
     """
-    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
-    mean, cosine, sine = _linear(light)
-    turned = turned_axes(x, y)
+    at = _Light(table, *light, **sides)
+    mean, cosine, sine = _linear(at)
+    turned = turned_axes(at.x, at.y)
     difference = cosine * turned.cosine
     if sine is None:
         if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
@@ -111,17 +101,7 @@ def polarised_efficiency(
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-def groove_efficiency(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    order_y: ArrayLike = 0,
-    *,
-    from_below: bool = False,
-    transmitted: bool = False,
-) -> Array:
+def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """Return the efficiencies of light whose E, or B, lies along the grooves, (…, 2).
 
     As far as it can: see the axes of `polarised`. In the plane across the grooves they are s and p
@@ -130,9 +110,9 @@ def groove_efficiency(
     Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
     p; or as for `efficiency`.
     """
-    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
-    mean, difference, _ = _linear(light)
-    turned = np.abs(turned_axes(x, y).sine) > _IN_PLANE
+    at = _Light(table, *light, **sides)
+    mean, difference, _ = _linear(at)
+    turned = np.abs(turned_axes(at.x, at.y).sine) > _IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
@@ -173,31 +153,17 @@ def _linear(light: _Light) -> tuple[Array, Array, Array | None]:
     return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
 
 
-def mueller(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    order_y: ArrayLike = 0,
-) -> Array:
+def mueller(table: OrderTable, *light: Any) -> Array:
     """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
 
     M₀₀ is `efficiency`. Arguments as for `efficiency`.
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    return nearest_pure(*_matrices(_Light(table, x, y, wavelength, order, order_y)))
+    return nearest_pure(*_matrices(_Light(table, *light)))
 
 
-def jones(
-    table: OrderTable,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength: ArrayLike,
-    order: ArrayLike,
-    order_y: ArrayLike = 0,
-) -> NDArray[np.complex128]:
+def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     """Return the Jones matrices of an order about s and p, (…, 2, 2), as ray tracers take them.
 
     E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
@@ -207,11 +173,9 @@ def jones(
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    light = _Light(table, x, y, wavelength, order, order_y)
-    of_grooves = nearest_jones(*_matrices(light))
-    x, y, lam, m_x, m_y = np.broadcast_arrays(
-        *(np.asarray(part, np.float64) for part in (x, y, wavelength, order, order_y))
-    )
+    at = _Light(table, *light)
+    of_grooves = nearest_jones(*_matrices(at))
+    x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
     leaving = tuple(part + shift for part, shift in zip((x, y), shifts, strict=True))

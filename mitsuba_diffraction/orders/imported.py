@@ -20,7 +20,7 @@ from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
 from .cells import Array
 from .efficiency import MIN_ANGLE, turned_axes
-from .listed import Lights, listed_response, listed_table, warn_of_gaps
+from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .response import LARGEST_SUM, ListedResponse, orders_between
 from .table import OrderTable, check_outline
@@ -73,11 +73,10 @@ def imported_table(
     return replace(table, header=header)
 
 
-def _mirror(theta: Array, phi: Array, crossed: bool) -> tuple[Array, Array]:
-    """Return (x, y) of the mirror direction of light; of grooves the image with y at least 0."""
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    y = -sine * np.sin(turn)
-    return -sine * np.cos(turn), y if crossed else np.abs(y)
+def _placed(theta: Array, phi: Array, crossed: bool) -> tuple[Array, Array]:
+    """Return the mirror direction of light; of grooves the image with y at least 0."""
+    x, y = mirror_of(theta, phi)
+    return x, y if crossed else np.abs(y)
 
 
 def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
@@ -88,7 +87,7 @@ def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
     theta, phi = np.meshgrid(
         np.where(grid.theta == 0.0, MIN_ANGLE, grid.theta), grid.phi, indexing="ij"
     )
-    turned = turned_axes(*_mirror(theta, phi, crossed))
+    turned = turned_axes(*_placed(theta, phi, crossed))
     cosine, sine = (part[:, :, None, None] for part in turned)
     elements = np.stack([mean, half * cosine, half * sine], axis=-1)
     for row in np.flatnonzero(grid.theta == 0.0):
@@ -112,7 +111,7 @@ def _sheet(
     through = replace(response, values=response.values[..., count:, :])
     alone = OrderTable(periods, ends, through)
     lam, theta, phi = (axis[..., None] for axis in np.meshgrid(*response.axes, indexing="ij"))
-    x, y = _mirror(theta, phi, False)
+    x, y = _placed(theta, phi, False)
     orders = response.orders[:, 0]
     steps = orders * lam / (1e3 * periods[0])
     # reversed light enters along the order that it left by
@@ -138,7 +137,7 @@ def _check_orders(
     lam, theta, phi = (
         axis.ravel() for axis in np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     )
-    x, y = _mirror(theta, phi, crossed)
+    x, y = _placed(theta, phi, crossed)
     steps = [1e-3 * lam / (superstrate * period) for period in periods]
 
     def square(some: NDArray[np.int64]) -> Array:
@@ -191,7 +190,7 @@ def _errors(
     """
     lam, theta, phi = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     level = np.where(theta == 0.0, MIN_ANGLE, theta)
-    x, y = (part[..., None] for part in _mirror(level, phi, table.crossed))
+    x, y = (part[..., None] for part in _placed(level, phi, table.crossed))
     light = x, y, lam[..., None], orders[:, 0], orders[:, 1]
     got = [table.polarised_efficiency(*light)]
     if table.thin:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from ..errors import warn
@@ -36,6 +36,12 @@ class Lights(NamedTuple):
     phi: Array
     orders: NDArray[np.int64]
     values: Array
+
+
+def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Array, Array]:
+    """Return x and y of the mirror direction of light from θ and φ, degrees."""
+    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    return np.asarray(-sine * np.cos(turn)), np.asarray(-sine * np.sin(turn))
 
 
 def listed_table(

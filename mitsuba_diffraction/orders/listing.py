@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import MIN_ANGLE
+from .listed import mirror_of
 from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
 from .response import ListedResponse, orders_between
 from .table import OrderTable
@@ -124,7 +125,9 @@ def list_orders(
     )
     m_x, m_y = orders[n].T
     index = (table.block or 1.0) if from_below else 1.0
-    x, y = (index * part for part in _mirror(polar, azimuth, table.crossed))
+    # at the normal, φ decides what s is
+    level = np.where(polar == 0.0, MIN_ANGLE, polar)
+    x, y = (index * part for part in mirror_of(level, azimuth))
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
     square = crossed_square(x, y, *shifts)
@@ -156,16 +159,6 @@ def orders_of(table: OrderTable, shortest: float) -> NDArray[np.int64]:
         return table.response.orders
     most = int(np.ceil(2e3 * table.optical_period / shortest))
     return orders_between((-most, 0), (most, 0))
-
-
-def _mirror(polar: Any, azimuth: Any, crossed: bool) -> tuple[Real, Real]:
-    """Return (x, y) of the mirror direction of light, of grooves with y mirrored.
-
-    At the normal, φ decides what s is.
-    """
-    sine = np.sin(np.radians(np.where(polar == 0.0, MIN_ANGLE, polar)))
-    y = sine * np.sin(np.radians(azimuth))
-    return -sine * np.cos(np.radians(azimuth)), -y if crossed else y
 
 
 def _check_count(lights: list[Real], orders: int) -> None:

@@ -67,7 +67,9 @@ from ...errors import warn
 from ...optics.geometry import sigma_of
 from ...plugin.base import SurfaceBSDF, asked_sides
 from ...plugin.description import Surface
+from ...plugin.dictionary import ORDERS
 from ...plugin.directions import Pair, PatchFrame, Site
+from ...plugin.parameters import mono_wavelength, nested_of, orientation_of
 from ...plugin.sampling import direction_of
 from ...plugin.types import (
     Colour,
@@ -83,7 +85,7 @@ from ...plugin.types import (
 from ..table import OrderTable
 from .daylight_lobes import DaylightLobes
 from .lobes import Lobes, OrderLobe, SpectralLobes
-from .parameters import Parameters, read_parameters
+from .parameters import coherence_width_of, table_of
 from .polarised_lobes import PolarisedLobes
 
 
@@ -102,12 +104,13 @@ class DiffractionOrders(SurfaceBSDF):
     title = "DiffractionOrders"
 
     def __init__(self, props: Properties) -> None:
-        read = read_parameters(props)
-        super().__init__(props, read.nested)
-        self.table, self.orientation = read.table, read.orientation
-        self.transmits = self.table.sides == 2
-        self.coherence_width, self._wavelength = read.coherence_width, read.wavelength
-        self._lobes = _lobes_of(read)
+        nested = nested_of(props, ORDERS)
+        self.table = table_of(props, nested)
+        super().__init__(props, nested)
+        self.coherence_width = coherence_width_of(props, self.table)
+        self.orientation, self.transmits = orientation_of(props), self.table.sides == 2
+        window = OrderLobe(self.table, self.coherence_width)
+        self._lobes = _lobes_of(window, mono_wavelength(props, self.table.wavelengths))
         self.parameters += self.orientation.changeable
         if mi.is_polarized and not self.table.polarised:
             _warn_of_polarisation()
@@ -188,10 +191,6 @@ class DiffractionOrders(SurfaceBSDF):
         """See `SurfaceBSDF.reflected_share`."""
         return self._albedo(site.si.wi, site)
 
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `SurfaceBSDF.normal_reflectance`."""
-        return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), site))
-
     def _albedo(self, direction: Vector3f, site: Site) -> Colour:
         """Return Σ η_m of light from a direction in the shading frame."""
         tangential = site.frame.turned(direction)
@@ -259,14 +258,13 @@ def requested(ctx: Context, passed: Mask) -> Mask:
     return dr.select(passed, transmission, reflection)
 
 
-def _lobes_of(read: Parameters) -> Lobes:
+def _lobes_of(window: OrderLobe, wavelength: float) -> Lobes:
     """Return the lobes of the current variant."""
-    table, window = read.table, OrderLobe(read.table, read.coherence_width)
     if mi.is_rgb:
         return DaylightLobes(window)
-    if mi.is_polarized and table.polarised and table.sides == 1:
-        return PolarisedLobes(window, read.wavelength)
-    return SpectralLobes(window, read.wavelength)
+    if mi.is_polarized and window.lookup.numbers and window.lookup.sides == 1:
+        return PolarisedLobes(window, wavelength)
+    return SpectralLobes(window, wavelength)
 
 
 #: Visible wavelengths, nm, that a table should reach: eyes see less than 1 % of daylight beyond.

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
 
 from ...errors import DiffractionError
 from ...heights.lengths import is_auto
-from ...plugin.dictionary import ORDERS, TableData
-from ...plugin.parameters import mono_wavelength, nested_of, orientation_of, resolved_path
+from ...plugin.dictionary import ORDERS, Data
+from ...plugin.parameters import resolved_path
 from ...plugin.properties import class_of
 from ...plugin.types import BSDF, Properties
-from ...plugin.varying import Orientation
 from ...settings import USUAL_WIDTH, checked
 from ...tables.store import loaded_once
 from ..file import load_orders
@@ -23,49 +21,23 @@ LEAST_PERIODS = 2.0
 _tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
 
 
-@dataclass(frozen=True)
-class Parameters:
-    """Parameters of `diffraction_orders`, checked.
+def table_of(props: Properties, nested: BSDF | None) -> OrderTable:
+    """Load the table.
 
-    Attributes
-    ----------
-    table : efficiencies of the orders.
-    coherence_width : 4σ of the amplitude window, µm.
-    orientation : angle from the first tangent to the patch's x axis.
-    wavelength : nm, of mono variants.
-    nested : the BSDF beneath, or None.
+    Raises a DiffractionError with the parameter and the choices, or if the table has two sides,
+    beneath which no BSDF lies.
     """
-
-    table: OrderTable
-    coherence_width: float
-    orientation: Orientation
-    wavelength: float
-    nested: BSDF | None
-
-
-def read_parameters(props: Properties) -> Parameters:
-    """Read and check everything, and load the table.
-
-    Raises a DiffractionError with the parameter, its value and the choices.
-    """
-    nested = nested_of(props, ORDERS)
-    table = _table(props)
+    table = _loaded(props)
     if table.sides == 2 and nested is not None:
         kind = "thin sheet" if table.thin else "block"
         raise DiffractionError(
             f"the table is that of a {kind}, beneath which no BSDF ({class_of(nested)}) lies; "
             f"put a surface behind the {kind} instead"
         )
-    return Parameters(
-        table=table,
-        coherence_width=_coherence_width(props, table),
-        orientation=orientation_of(props),
-        wavelength=mono_wavelength(props, table.wavelengths),
-        nested=nested,
-    )
+    return table
 
 
-def _table(props: Properties) -> OrderTable:
+def _loaded(props: Properties) -> OrderTable:
     if ("filename" in props) == ("data" in props):
         raise DiffractionError(
             f"{ORDERS} takes one of filename, a file of orders, and data, an "
@@ -73,16 +45,20 @@ def _table(props: Properties) -> OrderTable:
         )
     if "data" in props:
         data = props.get("data")
-        if not isinstance(data, TableData) or not isinstance(data.table, OrderTable):
+        if not isinstance(data, Data) or not isinstance(data.value, OrderTable):
             raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
-        return data.table
+        return data.value
     name = props.get("filename")
     if not isinstance(name, str):
         raise DiffractionError(f"filename={name!r} must be the name of a file")
     return loaded_once(resolved_path(name, "filename"), load_orders, _tables)
 
 
-def _coherence_width(props: Properties, table: OrderTable) -> float:
+def coherence_width_of(props: Properties, table: OrderTable) -> float:
+    """Return the coherence width, µm.
+
+    Raises a DiffractionError with the value and the least one.
+    """
     value = props.get("coherence_width", "auto")
     width = USUAL_WIDTH if is_auto(value) else checked("coherence_width", value)
     if width < LEAST_PERIODS * table.period:

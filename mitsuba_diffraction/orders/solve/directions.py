@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import DiffractionError
-from ..listed import Lights, listed_table, warn_of_gaps
+from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
 from ..polarised import ODD, mueller_of
 from ..response import LINEAR, MUELLER, orders_between
@@ -86,9 +86,8 @@ def solve_directions(
         bearings, steps = folded(grating.cell, azimuth)
     phi = bearings[number]
     _refuse_grazing(problem, waves, theta, phi)
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
     factors = [1.0, 1.0 / block] if block else [1.0] * grating.sides  # side 0 of a block is within
-    x, y = (np.round(-sine * part, 12) + 0.0 for part in (np.cos(turn), np.sin(turn)))
+    x, y = (np.round(part, 12) + 0.0 for part in mirror_of(theta, phi))
     if grating.cell is None:  # solvers take y ≥ 0, the mirror image
         y = np.abs(y)
     found = [located(grating, factor * x, factor * y, waves) for factor in factors]
@@ -102,7 +101,7 @@ def solve_directions(
         first, last = np.minimum(first, -last), np.maximum(last, -first)
     orders = orders_between(first.tolist(), last.tolist())
     elements = MUELLER if how.polarised else LINEAR
-    if grating.thin and (np.abs(np.sin(turn) * sine) > 1e-9).any():
+    if grating.thin and (np.abs(y) > 1e-9).any():
         elements = 1  # without phases, which tell s from p
     values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
     announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)

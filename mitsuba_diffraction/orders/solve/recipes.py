@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import DiffractionError, check_keys, quoted
-from ...files import path_within, read_toml
+from ...files import path_beside, read_toml
 from ...heights.field import HeightField
 from ...heights.lengths import number_between
 from ...heights.recipes import SOLVED
@@ -100,7 +100,7 @@ class SolvedRecipe:
                 number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
                 _settings(content),
-                path_within(file, output),
+                path_beside(file, output, output=True),
                 layers,
                 beneath,
                 None if substrate is None else str(substrate),

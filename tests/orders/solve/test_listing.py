@@ -10,7 +10,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.lists import read_efficiencies
-from mitsuba_diffraction.reference.boundary import small_slope
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.orders import shallow_grating, thin_grating
 
 INDEX = 1.2 + 6.0j
@@ -114,6 +114,13 @@ def test_jones_matrices_have_the_efficiencies_of_s_and_p_and_come_back_from_netc
     shares = list_orders(table, *light, polarised=True).rows[:, 4:]
     power = (listing.rows[:, 4:] ** 2).reshape(-1, 2, 2, 2).sum(axis=(1, 3))
     np.testing.assert_allclose(power, shares, atol=2e-4)
+    # light comes from (θ, φ): the mirror image has J_sp and J_ps of the other sign
+    lam, theta, phi, m = listing.rows[listing.rows[:, 1] > 0.0].T[:4]
+    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
+    crossing = table.jones(-sine * np.cos(turn), -sine * np.sin(turn), lam, m)[:, 0, 1]
+    listed = listing.rows[listing.rows[:, 1] > 0.0, listing.columns.index("J_sp_re")]
+    assert np.abs(listed).max() > 1e-3
+    np.testing.assert_allclose(listed, crossing.real, atol=1e-9)
     listing.save(tmp_path / "jones.nc")
     with netcdf_file(tmp_path / "jones.nc", mmap=False) as file:
         axes = [file.variables[name][:] for name in ("wavelength", "theta", "phi", "order")]
