@@ -61,7 +61,11 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
         if orders is None
         else _solved(method, orders, surface.described.sigma, digits)
     )
-    sections = {t.name: packed_array(as_columns(t.data, width)) for t in packed.textures}
+    sections = {}
+    for texture in packed.textures:  # rows are series, or texels: whichever takes fewer bytes
+        widths = width, texture.data.shape[2]
+        layouts = [packed_array(as_columns(texture.data, columns)) for columns in widths]
+        sections[texture.name] = min(layouts, key=lambda layout: len(layout.data))
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 
