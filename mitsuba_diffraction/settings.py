@@ -166,7 +166,7 @@ class TableSettings:
     frequency_limit : half axes along x and y, in rad/µm, of the ellipse of spatial frequencies
         k·(u, v) that are tabulated: the table is dark beyond. None for all that light can probe.
     windows : width in µm of the tapered windows that a scan is seen through, whose powers are
-        averaged (`tables.build.windows`); "auto" as `heights.coherence.usual_window` has it.
+        averaged (`tables.build.screens`); "auto" as `heights.coherence.usual_window` has it.
     window_width : 4σ of the window of all orders but 0, µm, where a scan limits it
         (`heights.coherence`); None for `coherence_width`. Tables have it; users do not give it.
     taper_width : 4σ_t of a scan's windows, µm; None for a patch that tiles the plane. Its orders

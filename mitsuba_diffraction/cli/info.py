@@ -61,13 +61,25 @@ def run(args: argparse.Namespace) -> Figures:
     ):
         if data["kind"] not in kinds:
             options.refuse(args, [name], f": '{args.file}' is a {data['kind']}, not {what}")
+    if args.energy or args.albedo is not None:
+        from ..analysis.energy import energy_summary, energy_warnings, sides_summary
+        from ..analysis.pictures import albedo_figure
+        from ..tables import DiffractionTable
+
+        table = DiffractionTable.load(args.file)
     if args.energy:
-        data |= _energy(args.file)
+        energy = energy_summary(table)
+        data |= {"energy": energy, "both sides": sides_summary(table)}
+        data["warnings"] = energy_warnings(energy)
     if args.albedo is not None:
-        _plot_albedo(args.file, args.albedo)
+        save_figure(args.albedo, albedo_figure(table), dpi=100)
         data["albedo plot"] = str(args.albedo)
     if args.picture is not None:
-        _draw(args)
+        from ..analysis.pictures import patches_figure
+        from ..heights.source import Source
+
+        fields = Source.of(args.file, options.load_options(args)).fields()
+        save_figure(args.picture, patches_figure(fields), dpi=80)
         data["picture"] = str(args.picture)
     if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
@@ -125,31 +137,6 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
     names = (*options.HEIGHTS, *_TABLE)
     options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
-
-
-def _energy(file: Path) -> dict[str, Any]:
-    from ..analysis.energy import energy_summary, energy_warnings, sides_summary
-    from ..tables import DiffractionTable
-
-    table = DiffractionTable.load(file)
-    reflected = energy_summary(table)
-    transmitted = sides_summary(table)
-    return {"energy": reflected, "both sides": transmitted, "warnings": energy_warnings(reflected)}
-
-
-def _plot_albedo(file: Path, output: Path) -> None:
-    from ..analysis.pictures import albedo_figure
-    from ..tables import DiffractionTable
-
-    save_figure(output, albedo_figure(DiffractionTable.load(file)), dpi=100)
-
-
-def _draw(args: argparse.Namespace) -> None:
-    from ..analysis.pictures import patches_figure
-    from ..heights.source import Source
-
-    fields = Source.of(args.file, options.load_options(args)).fields()
-    save_figure(args.picture, patches_figure(fields), dpi=80)
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:

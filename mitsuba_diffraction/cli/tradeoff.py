@@ -6,27 +6,18 @@ import argparse
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import DiffractionWarning
 from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
-from .report import Figures, check_outputs, output_name, save_json
+from .report import Figures, output_of, save_json
 
-
-class Effort(NamedTuple):
-    """Sizes of a measurement."""
-
-    side: int  # pixels of the default patch, along either axis
-    pairs: int  # pairs of directions
-    lanes: int  # calls in a kernel launch
-    rounds: int  # timed launches
-    depths: int  # height scales
-
-
-FULL, QUICK = Effort(1332, 240, 1 << 19, 7, 14), Effort(400, 160, 1 << 17, 5, 9)
+#: Pixels of the default patch along an axis, pairs of directions, calls in a kernel launch, timed
+#: launches, height scales.
+FULL, QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
 @options.command(
@@ -53,8 +44,7 @@ def run(args: argparse.Namespace) -> Figures:
     """Measure, write and recommend, and return the figures."""
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
-    args.output = output_name(args.output, Path("tradeoff"), _files_in)
-    check_outputs(_files_in(args.output), make_folder=True)
+    args.output = output_of(args, Path("tradeoff"), _files_in, make_folder=True)
     from ..analysis.machine import describe_machine
     from ..analysis.timing import PIXEL
     from ..analysis.tradeoff import (

@@ -6,7 +6,7 @@ power, 2π/L apart, add up to 1 + 2 exp(−(L/2σ)²) cos(LΔ) of their mean: to
 and to separate lines, a grating of period L, for a window twice as wide.
 
 A scan has open edges: it is a part of a larger surface. Its table is a mean over windows, no wider
-than the scan, whose phase screens fade towards their edges (`tables.build.windows`).
+than the scan, whose phase screens fade towards their edges (`tables.build.screens`).
 """
 
 from __future__ import annotations

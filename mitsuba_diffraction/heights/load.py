@@ -64,7 +64,7 @@ def load(
         Clip heights to this many robust standard deviations; default not at all.
     periodic
         "exact" states that the patch is whole periods of a surface that repeats, "open" that it is
-        a part of a larger surface, which is seen through windows (`tables.build.windows`). Files
+        a part of a larger surface, which is seen through windows (`tables.build.screens`). Files
         are open, unless they say otherwise. The treatments are applied in the order crop, fill,
         level, clip, and each leaves a line in `history`.
     """

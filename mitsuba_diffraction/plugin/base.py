@@ -210,10 +210,6 @@ class SurfaceBSDF(PluginBSDF):
         """Return the factor of the nested BSDF, T(ωi) T(ωo)."""
         raise NotImplementedError
 
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """Return the share of the light that the surface reflects at normal incidence."""
-        raise NotImplementedError
-
     @property
     def media_differ(self) -> bool:
         """Whether the media on both sides have different indices."""
@@ -312,7 +308,7 @@ class SurfaceBSDF(PluginBSDF):
         level = mi.SurfaceInteraction3f(si)
         level.wi = mi.Vector3f(0.0, 0.0, 1.0)
         site = self.site_at(level, active)
-        reflectance = self.normal_reflectance(site, active)
+        reflectance = mi.Spectrum(self.reflected_share(site, active))
         if self.nested is not None:
             nested = self.nested.eval_diffuse_reflectance(level, active)
             reflectance += mi.Spectrum(self.beneath(site, level.wi, active)) * _valid(nested)

@@ -48,9 +48,9 @@ def _tabulated() -> set[str]:
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of a material's table, if there is one."""
-    if material not in TISSUES and material not in _tabulated():
+    if (known := _known(material)) is None:
         return None
-    nodes, _ = _table(material, "eta")
+    nodes, _ = known
     return float(nodes[0]), float(nodes[-1])
 
 
@@ -59,11 +59,9 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
 
     Raises a DiffractionError if no table has that name.
     """
-    if tabulated_range(material) is None:
+    if (known := _known(material)) is None:
         raise DiffractionError(unknown_conductor(material))
-    nodes, eta = _table(material, "eta")
-    k = tabulated(material, "k", nodes)
-    return nodes, np.asarray(eta + 1j * k)
+    return known
 
 
 #: Wavelengths, nm, between which spectra are constant beyond their nodes.
@@ -92,18 +90,16 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     return children(mi.load_dict({"type": "conductor", "eta": eta, "k": none}))["eta"]
 
 
-def tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
-    """Part of a material's index at wavelengths in nm, as it is tabulated."""
-    return np.asarray(np.interp(wavelengths, *_table(material, name)))
-
-
-def _table(material: str, name: str) -> Array:
-    """Wavelengths in nm and values of a part of a material's index, (2, n)."""
+def _known(material: str) -> tuple[Array, Array] | None:
+    """Return wavelengths in nm and n + ik of a material that has a table, else None."""
     if tissue := TISSUES.get(material):
-        index = tissue.index(tissue.nodes)
-        return np.stack([tissue.nodes, index.real if name == "eta" else index.imag])
+        return tissue.nodes, tissue.index(tissue.nodes)
+    if material not in _tabulated():
+        return None
+    files = (_folder() / f"{material}.{part}.spd" for part in ("eta", "k"))
     what = "wavelengths in nm and values"
-    return read_columns(_folder() / f"{material}.{name}.spd").finite((0, 1), what).T
+    (nodes, eta), k = (read_columns(file).finite((0, 1), what).T for file in files)
+    return nodes, np.asarray(eta + 1j * np.interp(nodes, *k))
 
 
 def _folder() -> Path:

@@ -81,6 +81,7 @@ class Quantity:
 Index = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
+@runtime_checkable
 class SolvedOrders(Protocol):
     """Table of solved orders, as far as this room knows it; see `orders.table.OrderTable`."""
 
@@ -273,17 +274,12 @@ VARYING = frozenset(
 )
 
 
-@runtime_checkable
-class Described(Protocol):
-    """BSDF of this package, in any variant."""
-
-    def describe(self) -> Description:
-        """Return all that the surface has, with the current values of its parameters."""
-
-
 def describe(bsdf: BSDF) -> Description | None:
-    """Return the description of a BSDF of this package; None for any other BSDF."""
-    return bsdf.describe() if isinstance(bsdf, Described) else None
+    """Return the description of a BSDF of this package; None for any other BSDF.
+
+    It has all that the surface has, with the current values of its parameters.
+    """
+    return bsdf.describe() if hasattr(bsdf, "describe") else None
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import mitsuba as mi
 
@@ -11,6 +11,7 @@ from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
 from ..heights.field import HeightField
 from ..tables.table import DiffractionTable
+from .description import SolvedOrders
 
 #: BSDFs of a single height field.
 PLUGINS = ("diffraction", "diffraction_dielectric")
@@ -18,36 +19,16 @@ PLUGINS = ("diffraction", "diffraction_dielectric")
 ORDERS = "diffraction_orders"
 
 
-class HeightData(mi.Object):
-    """Height field in an object that a dictionary of Mitsuba's can hold."""
+class Data(mi.Object):
+    """Height field or table in an object that a dictionary of Mitsuba's can hold."""
 
-    def __init__(self, field: HeightField) -> None:
+    def __init__(self, value: HeightField | DiffractionTable | SolvedOrders) -> None:
         super().__init__()
-        self.field = field
-
-
-class TableData(mi.Object):
-    """Table in an object that a dictionary of Mitsuba's can hold."""
-
-    def __init__(self, table: DiffractionTable | SolvedTable) -> None:
-        super().__init__()
-        self.table = table
-
-
-@runtime_checkable
-class SolvedTable(Protocol):
-    """Table with a BSDF of its own, an `OrderTable`.
-
-    Attributes
-    ----------
-    plugin : name of the BSDF.
-    """
-
-    plugin: str
+        self.value = value
 
 
 def bsdf_dict(
-    field: HeightField | DiffractionTable | SolvedTable | str | os.PathLike[str],
+    field: HeightField | DiffractionTable | SolvedOrders | str | os.PathLike[str],
     plugin: str = "diffraction",
     **parameters: Any,
 ) -> dict[str, Any]:
@@ -70,17 +51,14 @@ def bsdf_dict(
     """
     check_choice("bsdf_dict: plugin", plugin, PLUGINS)
     arguments = {name: value for name, value in parameters.items() if value is not None}
-    if isinstance(field, SolvedTable):
-        return {"type": field.plugin, "data": TableData(field), **arguments}
-    if isinstance(field, DiffractionTable):
-        return {"type": plugin, "data": TableData(field), **arguments}
-    if isinstance(field, str | os.PathLike) and kind_of(field) is FileKind.ORDERS:
-        return {"type": ORDERS, "filename": os.fspath(field), **arguments}
     if isinstance(field, str | os.PathLike):
-        return {"type": plugin, "filename": os.fspath(field), **arguments}
-    if not isinstance(field, HeightField):
-        raise DiffractionError(
-            f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
-            "one of an array with HeightField(heights, pixel_size)"
-        )
-    return {"type": plugin, "data": HeightData(field), **arguments}
+        solved = kind_of(field) is FileKind.ORDERS
+        return {"type": ORDERS if solved else plugin, "filename": os.fspath(field), **arguments}
+    if isinstance(field, HeightField | DiffractionTable):
+        return {"type": plugin, "data": Data(field), **arguments}
+    if isinstance(field, SolvedOrders):
+        return {"type": ORDERS, "data": Data(field), **arguments}
+    raise DiffractionError(
+        f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
+        "one of an array with HeightField(heights, pixel_size)"
+    )

@@ -30,41 +30,24 @@ class DirectionLookup:
 
     It is of directions above the surface, or of both sides: rows of cells of the lower side follow
     those of the upper one.
+
+    Parameters
+    ----------
+    tables : of one or two sides, at evenly spaced height scales, `nodes`.
     """
 
-    def __init__(self) -> None:
-        self.present = False
-        self._ones: list[DirectionalTable] | None = None
-        self._values: Buffer = None
-        self._nodes: Buffer = None
-        self._last, self._varies, self._sides = 0, False, 1
-        self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
-        self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
-        self._pages = self._polar = self._azimuthal = self._record = 1
-
-    def update(
+    def __init__(
         self,
-        tables: Sequence[Sequence[DirectionalTable]] | None,
+        tables: Sequence[Sequence[DirectionalTable]],
         nodes: list[float],
         scales: ScaleRange,
     ) -> None:
-        """Take the tables of one or two sides at evenly spaced height scales, or none, which is 1.
-
-        While derivatives are taken, values of 1 stand for no tables after there were some: an
-        optimisation compiles no other kernel.
-        """
-        if tables is None and self._ones is not None and scales.differentiable:
-            tables = [self._ones] * len(nodes)
-        self.present = tables is not None
-        if tables is None:
-            return
-        if scales.differentiable:
-            self._ones = _ones(tables[0])
         height_scale, varies = scales.height_scale, scales.varies
         maps = np.stack([[_cells(side, scales.centre) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
+        self._values: Buffer = None
         if not varies:
             share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
             self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
@@ -153,16 +136,16 @@ def scales_of(
 ) -> Sequence[Sequence[DirectionalTable]] | None:
     """Scales of all sides at several height scales, 1 where there is none; None if all are 1."""
     some = next((sides for sides in tables if sides is not None), None)
-    return None if some is None else [sides or _ones(some) for sides in tables]
+    return None if some is None else [sides or ones_like(some) for sides in tables]
 
 
-def _ones(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:
+def ones_like(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:
     """Tables of 1 of the form of others."""
     return [DirectionalTable(side.wavelengths, np.ones_like(side.values)) for side in sides]
 
 
 def between(
-    tables: Sequence[DirectionalTable], nodes: tuple[float, float], height_scale: float
+    tables: Sequence[DirectionalTable], nodes: Sequence[float], height_scale: float
 ) -> DirectionalTable:
     """Interpolate between two height scales."""
     low, high = tables

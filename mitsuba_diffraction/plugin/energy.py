@@ -26,7 +26,7 @@ from ..tables.energy.conservation import Conservation, Energy
 from ..tables.table import DiffractionTable
 from .arithmetic import plain
 from .boundary import Boundary
-from .direction_lookup import DirectionLookup, at_horizon, between, scales_of
+from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of
 from .directions import Site
 from .energy_factors import ScaleRange
 from .materials import Dielectric, Material
@@ -73,13 +73,16 @@ class EnergyModel:
         self._table, self._material_of = table, material_of
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self.beneath = conserving, beneath
-        self._scale, self._ratio = DirectionLookup(), DirectionLookup()
+        self._scale: DirectionLookup | None = None
+        self._ratio: DirectionLookup | None = None
+        self._ones: list[DirectionalTable] | None = None
 
     def update(self, factors: ScaleRange) -> None:
         """Look up, or compute, what belongs to other factors or another material.
 
         Values are linear between height scales, 1 among them. At a height scale their derivative
-        is taken from the interval above.
+        is taken from the interval above. While derivatives are taken, scales of 1 stand for none
+        after there were some: an optimisation compiles no other kernel.
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
         material = self._material_of(factors.centre, self._range)
@@ -89,9 +92,14 @@ class EnergyModel:
         energies = [self._energy.at(node) for node in nodes]
         if self.conserving:
             scales = scales_of([energy.scales for energy in energies])
-            self._scale.update(scales, nodes, factors)
+            if scales is None and factors.differentiable and self._ones is not None:
+                scales = [self._ones] * len(nodes)
+            if scales is not None and factors.differentiable:
+                self._ones = ones_like(scales[0])
+            self._scale = None if scales is None else DirectionLookup(scales, nodes, factors)
         if self.beneath:
-            self._ratio.update([self._ratio_of(energy) for energy in energies], nodes, factors)
+            ratios = [self._ratio_of(energy) for energy in energies]
+            self._ratio = DirectionLookup(ratios, nodes, factors)
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
@@ -108,17 +116,17 @@ class EnergyModel:
     @property
     def scales(self) -> bool:
         """Whether the BSDF is multiplied by `factor`."""
-        return self.conserving and (self._both_sides or self._scale.present)
+        return self.conserving and (self._both_sides or self._scale is not None)
 
     def kernel_constants(self) -> tuple[object, ...]:
         """Plain values that choose kernels, as of `PluginBSDF.kernel_constants`."""
-        return self.scales, self._scale.present
+        return self.scales, self._scale is not None
 
     def factor(self, site: Site, wo: Vector3f) -> Colour:
         """Return s(ωi) s(ωo) per channel, less at the horizon."""
         product, horizon = mi.UnpolarizedSpectrum(1.0), mi.Float(1.0)
         for direction in (site.si.wi, wo):
-            if self._scale.present:
+            if self._scale is not None:
                 product *= mi.UnpolarizedSpectrum(self._scale.at(direction, site))
             cosine = mi.Frame3f.cos_theta(direction)
             horizon *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
@@ -126,7 +134,7 @@ class EnergyModel:
 
     def reflected(self, direction: Vector3f, site: Site) -> Colour:
         """Return a(ω) over the flat interface's reflectance, per channel; 1 without `beneath`."""
-        if not self.beneath:
+        if self._ratio is None:
             return mi.UnpolarizedSpectrum(1.0)
         return mi.UnpolarizedSpectrum(self._ratio.at(direction, site))
 
@@ -149,7 +157,7 @@ class EnergyModel:
         """Return the function that a look-up shows above the surface; None where it is 1."""
         centre = self._factors.centre
         height_scale /= centre
-        nodes = self._energy.nodes(height_scale)
+        nodes = self._energy.nodes(height_scale, height_scale)
         tables = scales_of([sides_of(self._energy.at(node)) for node in nodes])
         if tables is None:
             return None

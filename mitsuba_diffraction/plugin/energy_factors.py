@@ -45,9 +45,9 @@ class ScaleRange(NamedTuple):
 
     def nodes(self, scales: Energy) -> list[float]:
         """Return the height scales at which a function of them is tabulated."""
-        if not self.varies:
-            return list(scales.nodes(self.height_scale, interval=self.differentiable))
-        return scales.between(self.heights[0] / self.stretch[1], self.height_scale)
+        high = self.height_scale
+        low = self.heights[0] / self.stretch[1] if self.varies else high
+        return scales.nodes(low, high, interval=self.differentiable)
 
     def wavelengths(self, wavelength_range: tuple[float, float]) -> tuple[float, float]:
         """Return the range λ/a of wavelengths λ, nm."""

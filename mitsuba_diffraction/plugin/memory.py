@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import weakref
 from collections.abc import Callable
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -22,20 +22,17 @@ PACKET = 16
 
 Table = TypeVar("Table")
 Shared = TypeVar("Shared")
-Further = ParamSpec("Further")
 
 
-def once_a_table(
-    make: Callable[Concatenate[Table, Further], Shared],
-) -> Callable[Concatenate[Table, Further], Shared]:
+def once_a_table(make: Callable[[Table], Shared]) -> Callable[[Table], Shared]:
     """Let all BSDFs of a table share the result of a function, in each variant's memory."""
     made: weakref.WeakKeyDictionary[Any, dict[str, Shared]] = weakref.WeakKeyDictionary()
 
     @functools.wraps(make)
-    def shared(table: Table, /, *args: Further.args, **kwargs: Further.kwargs) -> Shared:
+    def shared(table: Table) -> Shared:
         variants = made.setdefault(table, {})
         if mi.variant() not in variants:
-            variants[mi.variant()] = make(table, *args, **kwargs)
+            variants[mi.variant()] = make(table)
         return variants[mi.variant()]
 
     return shared

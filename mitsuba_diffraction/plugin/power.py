@@ -7,7 +7,7 @@ wavelengths, `rgb_power` those with colours.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -16,7 +16,7 @@ from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
 from .device_table import device_table
 from .directions import Pair, PairThrough, TablePoint
-from .rgb import rgb_power
+from .rgb import RGBPower, rgb_power
 from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
 from .window_positions import PlacedWindow, WindowPositions
@@ -24,35 +24,6 @@ from .window_positions import PlacedWindow, WindowPositions
 #: Light up to so many times a table's longest wavelength is looked up; longer waves have the values
 #: of this one, shorter ones than the table's are not reflected.
 INFRARED = 4.0
-
-
-class PowerModel(Protocol):
-    """Diffracted power in the variant's channels, and a density to draw directions from."""
-
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
-        """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
-
-    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
-        """Density per solid angle with which `draw` draws ωo."""
-
-    def both(
-        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
-    ) -> tuple[Powers, Float]:
-        """`power` at `height_scale`, and `density` at `drawing_scale`, outside of a coat."""
-
-    def wavenumbers(self, si: Interaction) -> list[Float]:
-        """2π/λ of each channel, rad/µm."""
-
-    def bounded(self, si: Interaction) -> Interaction:
-        """Interaction whose wavelengths are among those that are looked up."""
-
-    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
-        """`power` of a flat surface."""
-
-    def draw(
-        self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
-    ) -> Vector2f:
-        """(u, v) of an ωi + ωo in the coordinates of the table, from three uniform numbers."""
 
 
 class PerWavenumber(NamedTuple):
@@ -88,19 +59,19 @@ class SpectralPower:
         dr.make_opaque(self._fixed)
 
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
-        """See `PowerModel.power`."""
+        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
         functions = [self._power(pair, height_scale, si)]
         return _powers(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
-        """See `PowerModel.density`; the mean over all wavelengths."""
+        """Return the density of `draw` per solid angle, the mean over wavelengths."""
         functions = [self._density(pair, height_scale)]
         return _mean(self._each(functions, si, pair, height_scale)[0])
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Powers, Float]:
-        """See `PowerModel.both`.
+        """Return `power` at `height_scale`, and `density` at `drawing_scale`, outside of a coat.
 
         The density is computed first: the look-up of power evicts its small tables from the cache.
         """
@@ -136,7 +107,10 @@ class SpectralPower:
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
-        """See `PowerModel.draw`; the wavelength to draw for is random, too."""
+        """Draw (u, v) of an ωi + ωo in the coordinates of the table, by three uniform numbers.
+
+        The wavelength to draw for is random, too.
+        """
         wavelengths = self._wavelengths(si)
         count = len(wavelengths)
         hero = dr.clip(mi.UInt32(sample1 * count), 0, count - 1)
@@ -148,11 +122,11 @@ class SpectralPower:
         return self._sampler.draw(k, cos_i, height_scale, remaining, sample2) * dr.rcp(k)
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
-        """See `PowerModel.wavenumbers`."""
+        """Return 2π/λ of each channel, rad/µm."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
 
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
-        """See `PowerModel.flat`: (σ₀/σ)² exp(−σ₀²k²|(u, v)|²)/λ²."""
+        """Return `power` of a flat surface, (σ₀/σ)² exp(−σ₀²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma_0**2) * dr.squared_norm(pair.uv)
         peak = self._ratio * (0.5 / dr.pi) ** 2
         squares = [dr.select(self._serves(k), dr.square(k), 0.0) for k in self.wavenumbers(si)]
@@ -161,7 +135,7 @@ class SpectralPower:
         )
 
     def bounded(self, si: Interaction) -> Interaction:
-        """See `PowerModel.bounded`; light of shorter wavelengths has no power."""
+        """Return the interaction with known wavelengths; light of shorter ones has no power."""
         if not mi.is_spectral:
             return si
         known = mi.SurfaceInteraction3f(si)
@@ -222,6 +196,10 @@ def _powers(values: list[list[Float]]) -> Powers:
 def _mean(values: list[list[Float]]) -> Float:
     densities = [density for (density,) in values]
     return sum(densities[1:], densities[0]) * (1.0 / len(densities))
+
+
+#: Diffracted power in a variant's channels, and a density to draw directions from.
+PowerModel = SpectralPower | RGBPower
 
 
 def power_model(

@@ -66,18 +66,10 @@ class ColourLookup:
 
     def others(self, uv: Vector2f, z: Float) -> Colour:
         """Return the RGB of all orders but 0 in 1/µm², signed; z must not be beyond the table's."""
-        return mi.Color3f(*self._other_orders(uv, dr.squared_norm(uv), z))
-
-    def zeroth(self, uv: Vector2f, z: Float) -> Colour:
-        """Return the RGB of order 0."""
-        radius = dr.sqrt(maximum(dr.squared_norm(uv), 1e-14))
-        return mi.Color3f(*self._zeroth_order(radius, z))
-
-    def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
         offset, interval = series_interval(self.expansion, z)
         weights = series_weights(self.expansion, TERMS, offset, interval, z)
         coordinates = self.coordinates
-        ring, t = _split(coordinates.ring(squared_radius), coordinates.rings)
+        ring, t = _split(coordinates.ring(dr.squared_norm(uv)), coordinates.rings)
         turn = coordinates.turn(uv)
         starts = [coordinates.start(ring + n) for n in range(3)]
         total = [mi.Float(0.0)] * (3 * TERMS)
@@ -94,10 +86,11 @@ class ColourLookup:
             for term in range(1, TERMS):
                 value = dr.fma(total[c * TERMS + term], weights[term], value)
             colours.append(value * self._inverse_scale)
-        return colours
+        return mi.Color3f(*colours)
 
-    def _zeroth_order(self, radius: Float, z: Float) -> list[Float]:
-        """Order 0's colour, 0 beyond its lobe."""
+    def zeroth(self, uv: Vector2f, z: Float) -> Colour:
+        """Return the RGB of order 0, 0 beyond its lobe."""
+        radius = dr.sqrt(maximum(dr.squared_norm(uv), 1e-14))
         inside = radius < self._radius_end
         at_radius = radius * ((self._radii - 1) / self._radius_end)
         row, s = _split(dr.select(inside, at_radius, 0.0), self._radii)
@@ -108,7 +101,7 @@ class ColourLookup:
                 packet = read_record(self._order_0, (row + n) * self._zs + column + m, 4)
                 share = dr.select(inside, of_radius * of_z, 0.0)
                 result = [dr.fma(p, share, r) for p, r in zip(packet, result, strict=False)]
-        return result
+        return mi.Color3f(*result)
 
 
 def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
@@ -119,7 +112,7 @@ def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
 
 
 class RGBPower:
-    """The `power.PowerModel` of variants without wavelengths, which are summed.
+    """The `power.SpectralPower` of variants without wavelengths, which are summed.
 
     coherent : whether orders interfere.
     """
@@ -142,7 +135,7 @@ class RGBPower:
         self._sharpness = [(2.0 * math.pi * table.sigma_0 / lam) ** 2 for lam in LOBES]
 
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
-        """See `PowerModel.power`."""
+        """See `SpectralPower.power`."""
         z = pair.w * height_scale
         others, zeroth = self._lookup.others(pair.uv, z), self._lookup.zeroth(pair.uv, z)
         if self._coherent:  # order 0 has its own power, or less where speckle is darker
@@ -152,27 +145,27 @@ class RGBPower:
         return Powers(others, zeroth)
 
     def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
-        """See `PowerModel.density`."""
+        """See `SpectralPower.density`."""
         strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
         return self._density(pair.uv, *strategy) * pair.cos_o * pair.frame.area
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Powers, Float]:
-        """See `PowerModel.both`."""
+        """See `SpectralPower.both`."""
         density = self.density(pair.outer, drawing_scale, si)
         return self.power(pair, height_scale, si), density
 
     def bounded(self, si: Interaction) -> Interaction:
-        """See `PowerModel.bounded`; colours have no bounds."""
+        """See `SpectralPower.bounded`; colours have no bounds."""
         return si
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
-        """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
+        """See `SpectralPower.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers
 
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
-        """See `PowerModel.flat`: of order 0 where no phase tells heights apart."""
+        """See `SpectralPower.flat`: of order 0 where no phase tells heights apart."""
         return self._lookup.zeroth(pair.uv, mi.Float(0.0))
 
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
@@ -199,7 +192,7 @@ class RGBPower:
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
-        """See `PowerModel.draw`."""
+        """See `SpectralPower.draw`."""
         share, band = self._strategy(cos_i, height_scale)
         lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
         lobe = mi.UInt32(lobe)

@@ -17,7 +17,7 @@ from ..heights.read import LoadOptions, treat
 from ..settings import SURFACE, checked
 from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
-from .dictionary import HeightData, TableData
+from .dictionary import Data
 from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
 from .types import Properties
 
@@ -51,8 +51,8 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
         del given["coherence_width"]
     asked = {name: checked(name, value) for name, value in given.items()}
     value = props.get(name)
-    if isinstance(value, TableData):
-        table = value.table
+    if isinstance(value, Data) and not isinstance(value.value, HeightField):
+        table = value.value
         if not isinstance(table, DiffractionTable):
             raise DiffractionError("a table of orders has a BSDF of its own, 'diffraction_orders'")
         shown = str(table.source.get("name") or "data")
@@ -101,10 +101,12 @@ def _heights_of(data: Any, options: LoadOptions) -> HeightField:
     for name in ("max_height", "height_unit"):
         if getattr(options, name) is not None:
             raise DiffractionError(f"{name} is for files; the heights in data are in µm already")
-    if isinstance(data, HeightData):
-        if options.pixel_size not in (None, data.field.pixel_size):
+    if isinstance(data, Data):
+        field = data.value
+        assert isinstance(field, HeightField)
+        if options.pixel_size not in (None, field.pixel_size):
             raise DiffractionError("pixel_size is for arrays; a HeightField has its own already")
-        return treat(data.field, options)
+        return treat(field, options)
     if options.pixel_size is None:
         raise DiffractionError("data needs pixel_size, the distance between its heights in µm")
     values = np.array(data, np.float64)

@@ -88,7 +88,6 @@ class DiffractingSurface(SurfaceBSDF):
         self.window_positions = read.window_positions(props, self.table)
         self.power = power_model(self.table, self.wavelength, self.window_positions)
         material = read.layered(props, material, self.table)
-        read.check_combination(props, material, nested)
         read.warn_of_film(material, self.table, largest)
         self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
@@ -188,10 +187,6 @@ class DiffractingSurface(SurfaceBSDF):
     def reflected_share(self, site: Site, active: Mask) -> Colour:
         """See `SurfaceBSDF.reflected_share`."""
         return self.fresnel.reflectance(mi.Frame3f.cos_theta(site.si.wi), site.si, active)
-
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `SurfaceBSDF.normal_reflectance`."""
-        return mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), site.si, active))
 
     def site_at(self, si: Interaction, active: Mask) -> Site:
         """See `SurfaceBSDF.site_at`."""

@@ -8,11 +8,12 @@ Contents
 model         the default model in one file: the equations, numbered as in docs/theory.md
 bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
 coat          wrapper of the model
-fresnel, boundary, through  float64 judges of the formulas of the same names in `optics`
+fresnel, through  float64 judges of the formulas of the same names in `optics`
+boundary      Jones and Mueller matrices, and the axes that they are about
 mirror        the correction of order 0 at the horizon, by its equation
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders
-scan          windows of a scan, whose screens fade towards their edges
+screens       orders of phase screens: of a patch, and of a scan, which fade towards their edges
 integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
 arguments     checks of the arguments
 """
@@ -24,7 +25,7 @@ from ..settings import COHERENCES
 from .bsdf import brdf, mueller
 from .grating import orders_brdf
 from .integral import screen_power, window_power
-from .model import Sigmas
+from .screens import Sigmas
 from .transmission import btdf
 
 __all__ = [

@@ -15,8 +15,8 @@ from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import COHERENCES, SURFACE, TableSettings, checked
-from .model import Light, Sigmas
-from .scan import ScanWindows
+from .model import Light
+from .screens import ScanWindows, Sigmas
 
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:

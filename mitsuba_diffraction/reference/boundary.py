@@ -1,6 +1,4 @@
-"""Jones matrices K and B of a boundary, bare or filmed: the judge of `optics.boundary` (float64).
-
-`reference.model` has the same matrices for a bare material in their shortest form.
+"""Jones and Mueller matrices, and the axes that they are about (NumPy, float64).
 
 Conventions: time is exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
 d = −ωi, then along d = ωo. The axes are s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is
@@ -13,86 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..optics.fresnel import Filmed, Index
-from .fresnel import amplitudes, faces, reflectance
-
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 # sinθ below which a direction is the normal itself: its azimuth is rounding
 _NORMAL = 1e-12
-
-
-def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
-    """Jones matrices B of the first-order small-slope approximation, (..., 2, 2), eq. 8 by fields.
-
-    Parameters
-    ----------
-    wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material relative to the medium above it, finite, k ≥ 0; or
-        the index under a film, `optics.fresnel.Filmed`.
-    """
-    s_in, s_out = polarisation_axes(wi, wo)
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    # t̂ is s turned by 90°, so products of the s axes equal products of t̂
-    (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
-    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
-    products = [
-        jones_matrix(
-            ss=-there.s * came.s * dot,
-            sp=there.s * came.x * cross,
-            ps=there.x * came.s * cross,
-            pp=there.x * came.x * dot - came.normal * there.p * came.p * sine * sine0,
-        )
-        * came.contrast[..., None, None]
-        for came, there in zip(
-            faces(incident[..., 2], sine0**2, index),
-            faces(outgoing[..., 2], sine**2, index),
-            strict=True,
-        )
-    ]
-    return np.asarray(sum(products[1:], products[0]))
-
-
-def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
-    """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
-
-    Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
-    the axes of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
-    4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
-    """
-    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    total = incident + outgoing
-    # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
-    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
-    cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
-    if isinstance(index, Filmed):
-        index = index.tilted(0.5 * total[..., 2] / cos_half)
-    s_in, s_out = polarisation_axes(incident, outgoing)
-    axis, (r_s, r_p) = facet_axis(incident, outgoing, s_in), amplitudes(cos_half, index)
-    zero = np.zeros_like(r_s)
-    facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
-    turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
-    scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
-    return np.asarray(scale[..., None, None] * turned)
-
-
-def small_slope_weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
-    """s of eq. 9 for κ (rad/µm) and σ_q² (µm²), any shapes that broadcast; a film counts in R₀."""
-    roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
-    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
-
-
-def blended(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
-    """(1−s) K + s B of eq. 6, (..., 2, 2); arguments as for `small_slope`, s (...)."""
-    return mixed(kirchhoff(wi, wo, index), small_slope(wi, wo, index), s)
-
-
-def mixed(tangent_plane: Complex, gentle: Complex, s: ArrayLike) -> Complex:
-    """J of eq. 6 from K and B, (..., 2, 2), and s (...)."""
-    weight = np.asarray(s, np.float64)[..., None, None]
-    return np.asarray((1 - weight) * tangent_plane + weight * gentle)
 
 
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:

@@ -7,7 +7,6 @@ its equation (4).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,23 +31,6 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 #: A measure of Jones matrices (n, 2, 2): N of unpolarised light (n,), or Mueller matrices.
 Measure = Callable[[Complex], Real]
-
-
-@dataclass(frozen=True)
-class SurfaceMaterial:
-    """Material of a surface, and the model of its boundary.
-
-    Attributes
-    ----------
-    model : one of `optics.boundary.MODELS`.
-    index : (n,) n + ik relative to the medium above it, under a film where there is one; None for
-        a perfect reflector.
-    coat : index of a clear coat over the surface, relative to the medium above it, or None.
-    """
-
-    model: str
-    index: Complex | Filmed | None
-    coat: float | None
 
 
 def brdf(
@@ -96,14 +78,15 @@ def brdf(
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
-    material = _material(model, index_of(eta, k, light.wavelength, film), coat)
-    if material.index is None:
+    index = index_of(eta, k, light.wavelength, film)
+    name = _model_of(model, index, coat)
+    if index is None:
         others, zeroth, cosine = window_powers(field, *light, *window)
         others *= kirchhoff_factor(*light, window.sigmas.orders)
         zeroth *= horizon_correction(light, window.sigmas.zeroth)
         area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
         return interfering(others, zeroth / area, cosine)
-    return _reflected(boundary.unpolarised, field, light, material, window)
+    return _reflected(boundary.unpolarised, field, light, window, name, index, coat)
 
 
 def mueller(
@@ -128,16 +111,15 @@ def mueller(
     """
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
-    material = _material(model, index_of(eta, k, light.wavelength, film), coat)
-    if material.index is None:
+    index = index_of(eta, k, light.wavelength, film)
+    name = _model_of(model, index, coat)
+    if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    return _reflected(boundary.mueller, field, light, material, window)
+    return _reflected(boundary.mueller, field, light, window, name, index, coat)
 
 
-def _material(
-    model: str | None, index: Complex | Filmed | None, coat: float | None
-) -> SurfaceMaterial:
-    """Check what goes together."""
+def _model_of(model: str | None, index: Complex | Filmed | None, coat: float | None) -> str:
+    """Return the name of the model, after a check of what goes together."""
     if coat is not None:
         if index is None:
             raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
@@ -147,20 +129,24 @@ def _material(
             )
         if not (np.isfinite(coat) and coat >= 1.0):
             raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    return SurfaceMaterial(model_of(model, index), index, coat)
+    return model_of(model, index)
 
 
 def _reflected(
-    measure: Measure, field: HeightField, light: Light, material: SurfaceMaterial, window: Window
+    measure: Measure,
+    field: HeightField,
+    light: Light,
+    window: Window,
+    name: str,
+    index: Complex | Filmed,
+    coat: float | None,
 ) -> Real:
     """Measured light where both directions are above the surface, 0 elsewhere."""
-    assert material.index is not None
     lit = (light.wi[:, 2] > 0) & (light.wo[:, 2] > 0)
     values = measure(np.zeros((len(lit), 2, 2), complex))
     if lit.any():
         above = Light(*(part[lit] for part in light))
-        index = material.index[lit]
-        values[lit] = _lit(measure, field, above, index, material, window.at(lit))
+        values[lit] = _lit(measure, field, above, window.at(lit), name, index[lit], coat)
     return values
 
 
@@ -168,23 +154,22 @@ def _lit(
     measure: Measure,
     field: HeightField,
     light: Light,
-    index: Complex | Filmed,
-    material: SurfaceMaterial,
     window: Window,
+    name: str,
+    index: Complex | Filmed,
+    coat: float | None,
 ) -> Real:
     """Measured light of directions above the surface."""
-    if material.coat is not None:
+    if coat is not None:
         assert not isinstance(index, Filmed)
-        inside, relative = coats.refracted_light(light, material.coat), index / material.coat
-        jones = _matrices(field, inside, relative, material.model)
+        inside, relative = coats.refracted_light(light, coat), index / coat
+        jones = _matrices(field, inside, relative, name)
         powers = window_powers(field, *inside, *window)
-        return coats.reflected(
-            light, window.sigmas, material.coat, relative, powers, jones, measure
-        )
+        return coats.reflected(light, window.sigmas, coat, relative, powers, jones, measure)
     averaged = window.coherence == COHERENCES[0]
-    if material.model == "small_slope" and averaged and not isinstance(index, Filmed):
+    if name == "small_slope" and averaged and not isinstance(index, Filmed):
         return models.default_brdf(field, light, index, window.sigmas, measure)
-    jones = _matrices(field, light, index, material.model)
+    jones = _matrices(field, light, index, name)
     others, zeroth, cosine = window_powers(field, *light, *window)
     rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
     mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
@@ -194,9 +179,9 @@ def _lit(
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:
     """J of the heights, in the medium where `light` and `index` are given."""
     if name == "kirchhoff":
-        return boundary.kirchhoff(light.wi, light.wo, index)
+        return models.kirchhoff(light.wi, light.wo, index)
     if name == "small_slope":
-        return boundary.blended(light.wi, light.wo, index, models.share(field, light, index))
+        return models.blended(light.wi, light.wo, index, models.share(field, light, index))
     return registered(registered_model(name), field, light, index)
 
 

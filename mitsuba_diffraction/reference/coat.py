@@ -12,6 +12,7 @@ from . import model
 from .fresnel import amplitudes
 from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light
+from .screens import Sigmas
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,7 +25,7 @@ def refracted_light(light: Light, coat: float) -> Light:
 
 def reflected(
     light: Light,
-    sigmas: model.Sigmas,
+    sigmas: Sigmas,
     coat: float,
     index: Complex,
     powers: Real,
@@ -44,7 +45,7 @@ def reflected(
     ends, sigma, sigma_0 = (light.wi, light.wo, coat, index), sigmas.orders, sigmas.zeroth
     others = model.reflected(inside, sigma, powers[0] / coat**2, transmitted(jones, *ends), measure)
     beneath = beneath_amplitudes(mirror_cosine(light, sigma_0), coat, index)
-    mirror = model.facets_of(inside, *beneath)
+    mirror = model.facets(inside.wi, inside.wo, *beneath)
     visible = horizon_correction(light, sigma_0)
     area = (light.wavelength * 1e-3) ** 2 * np.pi * sigma**2
     zeroth = (visible * powers[1] / area * measure(mirror).T).T

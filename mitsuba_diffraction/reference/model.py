@@ -21,13 +21,13 @@ medium above it. Lengths are in µm. The equations have the numbers of docs/theo
 (2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
 size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
 over positions of the window (Stam 1999, eq. 7–12). Any patch knows order 0, the mirror, whose
-window has the light's σ₀; a small scan, which is seen through windows (scan.py), limits σ of other
-orders alone. C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p at θm,
-whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's r_s,
-r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
-d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order small
-slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py and
-transmission.py wrap this.
+window has the light's σ₀; a small scan, which is seen through windows, limits σ of other orders
+alone (screens.py). C makes up for the part of its lobe beyond the horizon, and J_0 has r_s and r_p
+at θm, whose mean over the lobe is that of ωi (mirror.py). K is Kirchhoff's tangent plane: Fresnel's
+r_s, r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light
+along d. Rows and columns of J are s and p of the outgoing and the incoming light. B is first-order
+small slope (Rice 1951; Voronovich 1985). Indices and results are arrays (n,) as in `Light`. coat.py
+and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
-from ..optics.fresnel import Index
-from . import boundary, scan
-from .boundary import facet_axis, jones_matrix, mixed, polarisation_axes, turn, unpolarised
-from .fresnel import amplitudes, decaying_root
+from ..optics.fresnel import Filmed, Index
+from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
+from .fresnel import amplitudes, faces, reflectance
 from .mirror import horizon_correction, mirror_cosine
+from .screens import Orders, Sigmas, Sums, patch_power, sharpened
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,17 +58,6 @@ class Light(NamedTuple):
     wavelength: Real
 
 
-class Sigmas(NamedTuple):
-    """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
-
-    `windows`: a scan's, which does not tile the plane.
-    """
-
-    orders: float
-    zeroth: float
-    windows: scan.ScanWindows | None = None
-
-
 def default_brdf(
     field: HeightField,
     light: Light,
@@ -77,8 +66,8 @@ def default_brdf(
     measure: Callable[[Complex], Real] = unpolarised,
 ) -> Real:
     """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
-    jones = mixed(kirchhoff(light, index), small_slope(light, index), share(field, light, index))
-    others, zeroth = ensemble_power(field, light, sigmas)
+    jones = blended(light.wi, light.wo, index, share(field, light, index))
+    others, zeroth, _ = ensemble_power(field, light, sigmas)
     rest = reflected(light, sigmas.orders, others, jones, measure)
     return rest + mirrored(light, sigmas, zeroth, index, measure)
 
@@ -98,71 +87,32 @@ def mirrored(
     """f_0 of (10) from ⟨|P_0|²⟩."""
     visible = horizon_correction(light, sigmas.zeroth)
     factor = visible * power / ((light.wavelength * 1e-3) ** 2 * np.pi * sigmas.orders**2)
-    jones = facets(light, index, mirror_cosine(light, sigmas.zeroth))[0]
-    return (factor * measure(jones).T).T
+    r = amplitudes(mirror_cosine(light, sigmas.zeroth), index)
+    return (factor * measure(facets(light.wi, light.wo, *r)).T).T
 
 
-def ensemble_power(field: HeightField, light: Light, sigmas: Sigmas) -> Real:
-    """Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ of (3) in µm⁴, (2, n)."""
-    k, powers = 2e3 * np.pi / light.wavelength, np.zeros((2, len(light.wavelength)))
-    parts, tapers = scan.parts(field, sigmas.windows), scan.tapers(field, sigmas.windows)
-    for n, (u, v, w) in enumerate(light.wi + light.wo):
-        q, kappa = (k[n] * u, k[n] * v), k[n] * w  # (1): frequency q, and phase per height κ
-        screens = (np.exp(1j * kappa * part) for part in parts)
-        orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
-        powers[:, n] = np.mean([window_sums(each, q, sigmas) for each in orders], axis=0)
-    return np.maximum(powers, 0.0)  # sharpened powers of a scan dip below 0 between strong orders
-
-
-class Orders(NamedTuple):
-    """Orders about q: q_j along x and y, plane waves exp(i q_j·r) at the pixels, and a_j (y, x).
-
-    `tapers`: of a scan's windows.
-    """
-
-    qx: Real
-    qy: Real
-    waves_x: Complex
-    waves_y: Complex
-    a: Complex
-    tapers: scan.Tapers | None = None
-
-
-def orders_near(
-    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float],
-    tapers: scan.Tapers | None = None,
-) -> Orders:  # fmt: skip
-    """Orders (2) of a screen (ny, nx), or of a faded one, that the window about q reaches."""
-    (ny, nx), (screen, mean) = screen.shape, scan.faded(screen, tapers)
-    qx, waves_x = plane_waves(screen.shape[1], pixel_size[0], q[0], sigma)
-    qy, waves_y = plane_waves(screen.shape[0], pixel_size[1], q[1], sigma)
-    a = waves_y @ screen @ waves_x.T / screen.size
-    if mean is not None:
-        a[np.ix_(qy == 0, qx == 0)] = mean
-    return Orders(qx, qy, waves_x[:, :nx], waves_y[:, :ny], a, tapers)
-
-
-def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
-    """Frequencies q_j of a DFT of n pixels near q, and exp(i q_j x) at the pixels."""
-    # exp(−8.6²/2) = 9e-17: amplitudes farther from q are below the last bit of the sum
-    spacing, reach = 2 * np.pi / (n * pixel), 8.6 / sigma
-    first, last = np.ceil((q - reach) / spacing), np.floor((q + reach) / spacing)
-    # A DFT of an even number of points has −n/2 but not +n/2
-    j = np.arange(max(first, -(n // 2)), min(last, (n - 1) // 2) + 1)
-    turns = np.outer(j, np.arange(n)) % n  # exact integers keep the phase exact
-    return j * spacing, np.exp(2j * np.pi / n * turns)
-
-
-def window_sums(orders: Orders, q: tuple[float, float], sigmas: Sigmas) -> tuple[float, float]:
-    """Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ of (3)."""
+def window_sums(
+    orders: Orders, q: tuple[float, float], sigmas: Sigmas
+) -> tuple[float, float, float]:
+    """`Sums` of (3), the mean over positions of the window, where no orders interfere."""
     sigma, ratio = sigmas.orders, (sigmas.zeroth / sigmas.orders) ** 2
     window_x, window_y = (np.exp(-((sigma * d) ** 2)) for d in (q[0] - orders.qx, q[1] - orders.qy))
-    powers, mirror = np.abs(orders.a) ** 2, np.ix_(orders.qy == 0, orders.qx == 0)
-    zeroth, powers[mirror] = powers[mirror].sum(), 0.0
+    powers, mirror = np.abs(orders.a) ** 2, (orders.qy == 0, orders.qx == 0)
+    powers[np.ix_(*mirror)] = 0.0
     if orders.tapers is not None:
-        powers = scan.sharpened(powers, (orders.qy == 0, orders.qx == 0), orders.tapers)
+        powers = sharpened(powers, mirror, orders.tapers)
     lobe, unit = np.exp(-(sigmas.zeroth**2) * (q[0] ** 2 + q[1] ** 2)), 4 * np.pi**2 * sigma**4
-    return float(unit * (window_y @ powers @ window_x)), float(unit * ratio * lobe * zeroth)
+    zeroth = ratio * lobe * abs(orders.zeroth) ** 2 * np.any(np.outer(*mirror))  # within reach
+    return float(unit * (window_y @ powers @ window_x)), float(unit * zeroth), 0.0
+
+
+def ensemble_power(
+    field: HeightField, light: Light, sigmas: Sigmas, sums: Sums = window_sums
+) -> Real:
+    """`sums` for each pair of directions, (3, n)."""
+    total = (2e3 * np.pi / light.wavelength)[:, None] * (light.wi + light.wo)  # (1): q, κ
+    powers = [patch_power(field, kappa, (x, y), sigmas, sums) for x, y, kappa in total]
+    return np.reshape(powers, (-1, 3)).T
 
 
 def share(field: HeightField, light: Light, index: Index) -> Real:
@@ -170,47 +120,71 @@ def share(field: HeightField, light: Light, index: Index) -> Real:
     total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
     q = k * np.hypot(total[:, 0], total[:, 1])
     variance = ScaleRoughness.from_heights(field.heights, field.pixel_size).at(q)
-    return boundary.small_slope_weight(k * total[:, 2], variance, index)
+    return small_slope_weight(k * total[:, 2], variance, index)
 
 
-def kirchhoff(light: Light, index: Complex) -> Complex:
-    """K of (7), (n, 2, 2)."""
-    jones, one_plus_dot = facets(light, index)
-    return (one_plus_dot / (2 * light.wi[:, 2] * light.wo[:, 2]))[:, None, None] * jones
+def small_slope_weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
+    """s of (9) for κ (rad/µm) and σ_q² (µm²), any shapes that broadcast; a film counts in R₀."""
+    roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
+    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
 
 
-def facets(light: Light, index: Index, cosine: Real | None = None) -> tuple[Complex, Real]:
-    """U(ωo) diag(r_s, r_p) U(ωi), (n, 2, 2), and 1 + ωi·ωo; r at the half vector or a cosine."""
-    half = light.wi + light.wo
-    # |ωi + ωo|²/2 = 1 + ωi·ωo, and cosθ at the half vector is √((1 + ωi·ωo)/2)
-    one_plus_dot = 0.5 * np.sum(half * half, axis=1)
-    if cosine is None:
-        cosine = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
-    return facets_of(light, *amplitudes(cosine, index)), one_plus_dot
+def blended(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
+    """J of (6), (..., 2, 2); s (...), other arguments as for `small_slope`."""
+    weight = np.asarray(s, np.float64)[..., None, None]
+    k, b = kirchhoff(wi, wo, index), small_slope(wi, wo, index)
+    return np.asarray((1 - weight) * k + weight * b)
 
 
-def facets_of(light: Light, r_s: Complex, r_p: Complex) -> Complex:
-    """U(ωo) diag(r_s, r_p) U(ωi), (n, 2, 2)."""
-    wi, wo, _ = light
+def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
+    """K of (7), (..., 2, 2); arguments as for `small_slope`.
+
+    Its N is R(cosθ_half) (1 + ωi·ωo)² / (2 cosθi cosθo)² (Stam 1999, eq. 7).
+    """
+    wi, wo = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    half = wi + wo
+    # |ωi + ωo|²/2 = 1 + ωi·ωo is the form that survives opposite grazing directions
+    one_plus_dot = 0.5 * np.sum(half * half, axis=-1)
+    cosine = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
+    if isinstance(index, Filmed):
+        index = index.tilted(0.5 * half[..., 2] / cosine)
+    scale = one_plus_dot / (2 * wi[..., 2] * wo[..., 2])
+    return np.asarray(scale[..., None, None] * facets(wi, wo, *amplitudes(cosine, index)))
+
+
+def facets(wi: Real, wo: Real, r_s: Complex, r_p: Complex) -> Complex:
+    """U(ωo) diag(r_s, r_p) U(ωi), (..., 2, 2)."""
     s_in, s_out = polarisation_axes(wi, wo)
     axis = facet_axis(wi, wo, s_in)
     facet = jones_matrix(ss=r_s, sp=0.0, ps=0.0, pp=r_p)
     return turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi)
 
 
-def small_slope(light: Light, index: Complex) -> Complex:
-    """B of (8), (n, 2, 2); t0 and t are the tangential parts of −ωi and ωo (no unit)."""
-    wi, wo, _ = light
-    (x0, y0, _), (x, y, _) = (axis.T for axis in polarisation_axes(wi, wo))
+def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
+    """B of (8), (..., 2, 2): products of the fields that light makes along −ωi and back along ωo.
+
+    At a bare interface fields are s = 1/(cosθ + q'), p = 1/(ε cosθ + q') and x = q' p with
+    q' = √(ε − sin²θ) (`fresnel.faces`); both interfaces of a film add up.
+
+    Parameters
+    ----------
+    wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
+    index : (...) n + ik of the material relative to the medium above it, finite, k ≥ 0; or
+        the index under a film, `optics.fresnel.Filmed`.
+    """
+    wi, wo = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    (x0, y0, _), (x, y, _) = (np.moveaxis(axis, -1, 0) for axis in polarisation_axes(wi, wo))
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x  # t̂·t̂0 and ẑ·(t̂0×t̂)
-    t0, t, epsilon = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1]), index * index
-    inside0, inside = decaying_root(epsilon - t0**2), decaying_root(epsilon - t**2)
-    over_s0, over_s = 1 / (wi[:, 2] + inside0), 1 / (wo[:, 2] + inside)
-    over_p0, over_p = 1 / (epsilon * wi[:, 2] + inside0), 1 / (epsilon * wo[:, 2] + inside)
-    entries = jones_matrix(
-        ss=-over_s * over_s0 * dot,
-        sp=over_s * (inside0 * over_p0) * cross,
-        ps=(inside * over_p) * over_s0 * cross,
-        pp=(inside * over_p) * (inside0 * over_p0) * dot - epsilon * over_p * over_p0 * t * t0,
-    )
-    return entries * (epsilon - 1)[:, None, None]
+    sine0, sine = (np.hypot(w[..., 0], w[..., 1]) for w in (wi, wo))
+    ends = faces(wi[..., 2], sine0**2, index), faces(wo[..., 2], sine**2, index)
+    matrices = [
+        at.contrast[..., None, None]  # ε − 1
+        * jones_matrix(
+            ss=-to.s * at.s * dot,
+            sp=to.s * at.x * cross,
+            ps=to.x * at.s * cross,
+            pp=to.x * at.x * dot - at.normal * to.p * at.p * sine * sine0,
+        )
+        for at, to in zip(*ends, strict=True)
+    ]
+    return np.asarray(sum(matrices[1:], matrices[0]))

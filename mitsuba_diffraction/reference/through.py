@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
+from .boundary import Complex, Real, facet_axis, jones_matrix, polarisation_axes, turn
 from .fresnel import amplitudes, decaying_root
 
 
@@ -29,11 +29,12 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
     s0, s = 1.0 / (q0 + q0_inside), 1.0 / (q + q_inside)
     p0, p = 1.0 / (n * n * q0 + q0_inside), n / (n * n * q + q_inside)
-    rows = [
-        [s * s0 * dot, -s * q0_inside * p0 * cross],
-        [q * p * s0 * cross, p * p0 * (q * q0_inside * dot + sine * sine0)],
-    ]
-    matrix = np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+    matrix = jones_matrix(
+        ss=s * s0 * dot,
+        sp=-s * q0_inside * p0 * cross,
+        ps=q * p * s0 * cross,
+        pp=p * p0 * (q * q0_inside * dot + sine * sine0),
+    )
     return np.asarray((n * n - 1.0) * matrix)
 
 
@@ -54,8 +55,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     scale = np.where(refracts, cos_out * cos_in * length[..., 0], 0.0)
     scale /= -incident[..., 2] * outgoing[..., 2]
     t_s, t_p = scale / (cos_in + n * cos_out), scale / (n * cos_in + cos_out)
-    zero = np.zeros_like(t_s)
-    facet = np.stack([t_s, zero, zero, t_p], axis=-1).reshape(*t_s.shape, 2, 2)
+    facet = jones_matrix(ss=t_s, sp=0.0, ps=0.0, pp=t_p)
     return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
 
 
@@ -72,12 +72,9 @@ def order_0(wi: ArrayLike, wo: ArrayLike, passed: ArrayLike) -> Complex:
     dot = np.sum(s_in * s_out, axis=-1)
     cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
     half = 0.5 * np.arctan2(cross, dot)
-    turn = np.stack([np.cos(half), -np.sin(half), np.sin(half), np.cos(half)], axis=-1)
-    turn = turn.reshape(*half.shape, 2, 2)
+    turned = jones_matrix(ss=np.cos(half), sp=-np.sin(half), ps=np.sin(half), pp=np.cos(half))
     s, p = np.sqrt(np.asarray(passed, np.float64))
-    zero = np.zeros_like(s)
-    level = np.stack([s, zero, zero, p], axis=-1).reshape(*s.shape, 2, 2)
-    return np.asarray(turn @ level @ turn, np.complex128)
+    return np.asarray(turned @ jones_matrix(ss=s, sp=0.0, ps=0.0, pp=p) @ turned)
 
 
 def flat_transmittances(cosine: ArrayLike, index: float, thin: bool) -> Real:

@@ -13,10 +13,10 @@ from ..optics.geometry import wavenumber
 from ..settings import checked
 from . import boundary, mirror, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
-from .boundary import mixed
 from .coat import refracted
-from .integral import field_powers
-from .model import Light
+from .integral import sums_of
+from .model import Light, small_slope_weight
+from .screens import patch_power
 
 
 def btdf(
@@ -62,14 +62,15 @@ def btdf(
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
         variance = roughness.at(k * np.hypot(*total[:, :2].T))
-        s = boundary.small_slope_weight(kappa, variance, eta)
-        jones = mixed(jones, through.small_slope(above, inside, eta), s)
+        s = small_slope_weight(kappa, variance, eta)[:, None, None]
+        jones = (1 - s) * jones + s * through.small_slope(above, inside, eta)
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
     frequency = -k[:, None] * total[:, :2]
+    sums = sums_of(coherence, 0.5 * np.array(field.extent))
     others, zeroth, cosine = np.transpose(
         [
-            field_powers(field, phase, (x, y), sigmas, coherence)
+            patch_power(field, phase, (x, y), sigmas, sums)
             for phase, (x, y) in zip(kappa, frequency, strict=True)
         ]
     )

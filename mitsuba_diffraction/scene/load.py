@@ -11,6 +11,7 @@ traceback; warnings go to a logger of its own.
 from __future__ import annotations
 
 import contextlib
+import functools
 import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -149,12 +150,13 @@ def load_scene(
 def _check_parameters_act(
     file: Path, values: SceneValues, defaults: Mapping[str, str | None]
 ) -> None:
-    """Refuse values other than the defaults that the surfaces put on ids leave without effect."""
+    """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
     import mitsuba as mi
 
-    from .surfaces import check_parameters_act, effective, put_materials
+    from .surfaces import effective, put_materials
 
-    def state(without: str = "", *, covered: bool = True) -> Any:
+    @functools.cache
+    def read(without: str, covered: bool) -> list[str]:
         config = mi.parser.ParserConfig(mi.variant())
         # without `light`, its file's own parameters have no use
         config.unused_parameters = mi.LogLevel.Debug
@@ -162,19 +164,20 @@ def _check_parameters_act(
         parsed = mi.parser.parse_file(config, str(file), **given)
         if covered:
             put_materials(parsed, values.materials)
-        return parsed
+        return effective(parsed)
 
-    changed = [
-        name
-        for name, value in values.parameters.items()
-        if (default := defaults.get(name)) is not None and not _same(str(value), default)
-    ]
-    if values.materials and changed:
+    for name, value in values.parameters.items() if values.materials else ():
+        default = defaults.get(name)
+        if default is None or _same(str(value), default):
+            continue
         # a value may be the default in other words, such as the whole path of a file
-        whole = effective(state(covered=False))
-        acting = [n for n in changed if effective(state(n, covered=False)) != whole]
-        plain = {name: state(name) for name in acting}
-        check_parameters_act(state(), plain, values.parameters, values.materials)
+        before, after = (read("", covered) != read(name, covered) for covered in (False, True))
+        if before and not after:
+            raise DiffractionError(
+                f"{name}={value} changes nothing: the scene uses it in a BSDF that the "
+                f"surface on {', '.join(values.materials)} replaces; give that surface the "
+                f"parameter instead, e.g. cd,{name}={value}, or leave it out"
+            )
 
 
 def _same(value: str, default: str) -> bool:

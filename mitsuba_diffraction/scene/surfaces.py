@@ -7,7 +7,7 @@ of that id. `twosided`, `mask`, `bumpmap` and `normalmap` around it are kept.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,28 +140,6 @@ def _within(state: Any, node: Any) -> Iterator[int]:
         if state.nodes[target].type == mi.ObjectType.BSDF:
             yield target
             yield from _within(state, state.nodes[target])
-
-
-def check_parameters_act(
-    edited: Any, plain: Mapping[str, Any], values: Mapping[str, Any], materials: Collection[str]
-) -> None:
-    """Refuse parameters of a scene that only a replaced BSDF reads.
-
-    edited : `mi.parser.ParserState` with all parameters, its surfaces put on ids.
-    plain : by parameter, the same with the default of that parameter.
-    values : of the parameters.
-    materials : ids that surfaces were put on.
-
-    Raises a DiffractionError that names the parameter.
-    """
-    expected = effective(edited)
-    for name, state in plain.items():
-        if effective(state) == expected:
-            raise DiffractionError(
-                f"{name}={values[name]} changes nothing: the scene uses it in a BSDF that the "
-                f"surface on {', '.join(materials)} replaces; give that surface the parameter "
-                f"instead, e.g. cd,{name}={values[name]}, or leave it out"
-            )
 
 
 def effective(state: Any) -> list[str]:

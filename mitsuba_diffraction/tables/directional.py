@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
-
-from .fields import numbers, require
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -119,14 +117,6 @@ class DirectionalTable:
 
     wavelengths: Real
     values: Array
-
-    @classmethod
-    def parse(cls, wavelengths: Any, values: NDArray[Any]) -> DirectionalTable:
-        """Return the table of a file's numbers; raises a ValueError for what does not fit."""
-        count = len(values) if values.ndim == 3 else None
-        require(count is not None, f"function of direction of shape {values.shape}")
-        require(bool(np.isfinite(values).all()), "function of direction that is not finite")
-        return cls(numbers(wavelengths, "wavelengths", (count,)), values)
 
     @property
     def grid(self) -> DirectionGrid:

@@ -111,16 +111,12 @@ def _window_sums(
 ) -> tuple[NDArray[np.float64], ...]:
     grid = table.grid
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
-    summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
-    order_0 = order_0_sum(table, qx, qy, kappa, kernels)[:, 0]
-    cosine = np.zeros_like(qx)
+    rest = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
+    order_0 = order_0_sum(table, qx, qy, kappa, kernels)
+    others, zeroth, cosine = np.maximum(rest.real, 0.0), order_0.real, np.zeros_like(qx)
     if grid.coherent:
-        rest = summed[:, 0] + 1j * summed[:, 1] - order_0
         others, zeroth = np.abs(rest) ** 2, np.abs(order_0) ** 2
         cosine = (rest * np.conj(order_0)).real / np.maximum(np.sqrt(others * zeroth), 1e-300)
-    else:
-        zeroth = order_0
-        others = np.maximum(summed[:, 0] - zeroth, 0.0)
     for part in (others, zeroth):
         part[~table.covers(qx, qy, kappa)] = 0.0
     others[~table.reachable(qx, qy, kappa)] = np.nan
@@ -135,11 +131,11 @@ def weighted_sum(
     kernels: tuple[Kernel, Kernel],
     taps: tuple[int, int],
     place: Sequence[NDArray[np.float64]] = (),
-) -> NDArray[np.float64]:
-    """Σ_j of the series at κ times kernel_x(x − j_x)·kernel_y(y − j_y), with x = qx/dqx in bins.
+) -> NDArray[Any]:
+    """Σ_j≠0 of the series at κ times kernel_x(x − j_x)·kernel_y(y − j_y), with x = qx/dqx in bins.
 
     Only the `taps` bins nearest to (x, y) are read, less the corners that the table's own taps
-    leave out, besides order 0, which is never left out.
+    leave out; `order_0_sum` has order 0.
 
     Parameters
     ----------
@@ -150,8 +146,8 @@ def weighted_sum(
 
     Returns
     -------
-    (n, components): for `patch` the real and imaginary part of an amplitude, for `ensemble` a power
-    (components 1), also where the table stores amplitudes: these are squared first.
+    (n,): for `patch` a complex amplitude, for `ensemble` a power, also where the table stores
+    amplitudes: these are squared first.
     """
     grid, expansion = table.grid, table.expansion
     interval = expansion.interval(kappa)
@@ -166,14 +162,14 @@ def weighted_sum(
         weight_x = weight_x * _phases(column, taps[0], grid.last[0], place[0], table.spacing[0])
         weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])
 
-    total = order_0_sum(table, qx, qy, kappa, kernels)
+    total: Any = np.zeros(len(qx))
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):
             packet = table.coefficients[interval, row + j, column + i].astype(float)
             value = _bin_value(table, np.einsum("npt,nt->np", packet, scaled))
-            total += (weight_x[:, i] * weight_y[:, j])[:, None] * value
-    return np.concatenate([total.real, total.imag], axis=1) if grid.coherent else total
+            total = total + weight_x[:, i] * weight_y[:, j] * value
+    return np.asarray(total)
 
 
 def order_0_sum(
@@ -183,20 +179,18 @@ def order_0_sum(
     kappa: NDArray[np.float64],
     kernels: tuple[Kernel, Kernel],
 ) -> NDArray[Any]:
-    """Return order 0's part of `weighted_sum`, (n, 1); its complex amplitude of `patch`."""
+    """Return what order 0 adds to `weighted_sum`."""
     ratio = table.order_0_ratio
     x, y = qx / table.spacing[0], qy / table.spacing[1]
     lobe = ratio * (kernels[0](x) * kernels[1](y)) ** ratio
-    return np.asarray(_bin_value(table, table.order_0_at(kappa)) * lobe[:, None])
+    return np.asarray(_bin_value(table, table.order_0_at(kappa)) * lobe)
 
 
 def _bin_value(table: DiffractionTable, values: NDArray[np.float64]) -> NDArray[Any]:
-    """Return the power or the complex amplitude, (n, 1), of numbers stored in a table."""
+    """Return the power or the complex amplitude, (n,), of numbers stored in a table."""
     if table.grid.coherent:
-        return values[:, :1] + 1j * values[:, 1:]
-    if table.expansion.kind == "amplitude":
-        return np.sum(values**2, axis=1, keepdims=True)
-    return values
+        return values[:, 0] + 1j * values[:, 1]
+    return np.asarray(np.sum(values**2, axis=1) if len(values.T) == 2 else values[:, 0])
 
 
 def _phases(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,19 +30,13 @@ def power_expansion(table: DiffractionTable) -> Expansion:
     )
 
 
-def powers_of(
-    coefficients: NDArray[np.float32], old: Expansion, new: Expansion
-) -> NDArray[np.float32]:
-    """Series of |a_j|², (intervals, ny, nx, terms), from one of a_j; order 0 is zero in both."""
-    ny, nx = coefficients.shape[1:3]
-    result = np.empty((new.intervals, ny, nx, new.terms), np.float32)
-    for interval in range(new.intervals):
-        values = np.empty((ny, nx, new.terms), np.float32)
-        for n, kappa in enumerate(new.nodes(interval)):
-            parts = coefficients[int(old.interval(kappa))] @ old.weights(kappa).astype(np.float32)
-            values[..., n] = (parts**2).sum(axis=2)
-        result[interval] = values @ new.fit(interval).astype(np.float32)
-    return result
+def fitted(expansion: Expansion, values_at: Callable[[float], NDArray[Any]]) -> NDArray[Any]:
+    """Series (intervals, …, terms) of a function of κ, in the precision of its values (…)."""
+    series = []
+    for interval in range(expansion.intervals):
+        values = np.stack([values_at(float(k)) for k in expansion.nodes(interval)], axis=-1)
+        series.append(values @ expansion.fit(interval).astype(values.dtype))
+    return np.stack(series)
 
 
 def order_0_power(table: DiffractionTable, kappa: ArrayLike) -> NDArray[np.float64]:
@@ -78,12 +74,10 @@ def power_series(
     table.require_whole("a list of powers is made of")
     old = table.expansion
     if old.kind == "power":
-        order_0 = table.order_0[:, 0]
-        return table.coefficients[:, :, :, 0], order_0, table.scale, old
+        return table.coefficients[:, :, :, 0], table.order_0[:, 0], table.scale, old
     new = power_expansion(table)
-    coefficients = powers_of(table.coefficients.astype(np.float32), old, new)
-    order_0 = np.empty((new.intervals, new.terms))
-    for interval in range(new.intervals):
-        values = order_0_power(table, new.nodes(interval)) - new.order_0_offset(interval)
-        order_0[interval] = values @ new.fit(interval)
-    return coefficients, order_0, table.scale**2, new
+    coefficients = fitted(new, lambda kappa: powers_at(table, kappa))
+    order_0 = fitted(
+        new, lambda kappa: order_0_power(table, kappa) - new.order_0_offset(new.interval(kappa))
+    )
+    return coefficients, order_0, 1.0, new

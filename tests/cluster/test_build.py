@@ -14,8 +14,8 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField,
 from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
 from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
 from mitsuba_diffraction.settings import TableSettings  # noqa: E402
-from mitsuba_diffraction.tables.build import windows as windows_module  # noqa: E402
-from mitsuba_diffraction.tables.build.windows import Windows  # noqa: E402
+from mitsuba_diffraction.tables.build import screens as screens_module  # noqa: E402
+from mitsuba_diffraction.tables.build.screens import Screens  # noqa: E402
 from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 WANTED = TableSettings(**SETTINGS)
@@ -33,8 +33,8 @@ def alone(scan):
 
 
 def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):
-    monkeypatch.setattr(windows_module, "BATCH_POINTS", 1)
-    whole = Windows([scan], 12.0, 14.0)
+    monkeypatch.setattr(screens_module, "BATCH_POINTS", 1)
+    whole = Screens([scan], 12.0, 14.0)
     batches = whole.batches()
     assert len(batches) == len(whole) == 8
     sent = [pickle.loads(pickle.dumps(batch)) for batch in batches]
@@ -44,9 +44,9 @@ def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, m
 
 
 def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch):
-    ny, nx = Windows([scan], 6.0, 7.0).shape
-    monkeypatch.setattr(windows_module, "BATCH_POINTS", 3 * ny * nx)
-    whole = Windows([scan, scan], 6.0, 7.0)
+    ny, nx = Screens([scan], 6.0, 7.0).shape
+    monkeypatch.setattr(screens_module, "BATCH_POINTS", 3 * ny * nx)
+    whole = Screens([scan, scan], 6.0, 7.0)
     batches = whole.batches()
     assert {len(batch) for batch in batches} <= {1, 2, 3}
     found = [batch[n].heights for batch in batches for n in range(len(batch))]

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import gratings
 from mitsuba_diffraction.optics.blend import NODES_PER_OCTAVE, ScaleRoughness
-from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.reference import model
 from tests.support.directions import polar, rough_patch
 
 PATCH = rough_patch((40, 56), (0.11, 0.09), 0.3)
@@ -80,9 +80,9 @@ def test_a_flat_surface_has_no_roughness_at_any_scale():
 @pytest.mark.parametrize("index", [1.56, 0.65 + 5.6j])
 def test_smooth_surfaces_follow_small_slope_and_rough_ones_kirchhoff(index):
     wi, wo = polar(60, 0), polar(20, 100)
-    gentle, tangent = boundary.small_slope(wi, wo, index), boundary.kirchhoff(wi, wo, index)
-    smooth = (boundary.small_slope_weight(20.0, rms**2, index) for rms in (0.0, 0.001))
-    assert np.array_equal(boundary.blended(wi, wo, index, next(smooth)), gentle)
-    assert boundary.blended(wi, wo, index, next(smooth)) == pytest.approx(gentle, abs=1e-3)
-    rough = boundary.blended(wi, wo, index, boundary.small_slope_weight(20.0, 1.0, index))
+    gentle, tangent = model.small_slope(wi, wo, index), model.kirchhoff(wi, wo, index)
+    smooth = (model.small_slope_weight(20.0, rms**2, index) for rms in (0.0, 0.001))
+    assert np.array_equal(model.blended(wi, wo, index, next(smooth)), gentle)
+    assert model.blended(wi, wo, index, next(smooth)) == pytest.approx(gentle, abs=1e-3)
+    rough = model.blended(wi, wo, index, model.small_slope_weight(20.0, 1.0, index))
     assert np.array_equal(rough, tangent)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from mitsuba_diffraction.reference import boundary, fresnel
+from mitsuba_diffraction.reference import boundary, fresnel, model
 from tests.support.directions import polar
 from tests.support.matrices import MATRICES, REVERSED, pairs
 
@@ -35,7 +35,7 @@ def test_reciprocity(matrix, index):
 @pytest.mark.parametrize("index", INDICES)
 def test_kirchhoff_s_power_is_the_scalar_form_with_fresnel_at_the_half_vector(index):
     wi, wo = pairs()
-    power = boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
+    power = boundary.unpolarised(model.kirchhoff(wi, wo, index))
     w = wi[:, 2] + wo[:, 2]
     cos_half = np.sqrt(0.5 * (1 + np.sum(wi * wo, axis=1)))
     sigma, wavelength = 1.0, 1000.0  # λ²A is then π
@@ -116,7 +116,7 @@ def test_a_mirror_s_mueller_matrix_is_mitsuba_s(index):
     mi.set_variant("scalar_spectral_polarized")
     for theta in (5.0, 45.0, 56.0, 80.0):
         wi = polar(theta, 70)
-        mine = boundary.mueller(boundary.small_slope(wi, wi * [-1, -1, 1], index))
+        mine = boundary.mueller(model.small_slope(wi, wi * [-1, -1, 1], index))
         eta = mi.Complex2f(complex(index).real, complex(index).imag)
         theirs = np.array(mi.mueller.specular_reflection(float(wi[2]), eta))
         assert mine == pytest.approx(theirs, abs=2e-6)  # single precision
@@ -141,7 +141,7 @@ def test_axes_of_stokes_vectors_turn_as_mitsuba_s_do(matrix):
     mine = boundary.mueller(matrix(wi, wo, 0.65 + 5.6j))
     assert abs(theirs[0, 2]) > 1e-3  # there is something to turn
     # near the mirror both matrices are alike to second order (4e-3); Kirchhoff's exactly
-    tolerance = 5e-6 if matrix is boundary.kirchhoff else 2e-2
+    tolerance = 5e-6 if matrix is model.kirchhoff else 2e-2
     assert mine / mine[0, 0] == pytest.approx(theirs / theirs[0, 0], abs=tolerance)
 
 
@@ -174,6 +174,6 @@ def test_between_the_planes_of_incidence_it_has_the_signs_of_coupled_waves(order
     wi = polar(50, -35)
     x, y = order * 0.55 / 2.5 - wi[0], -wi[1]
     wo = np.array([x, y, np.sqrt(1 - x * x - y * y)])
-    found = boundary.mueller(boundary.small_slope(wi, wo, 1.56))
+    found = boundary.mueller(model.small_slope(wi, wo, 1.56))
     # the grating has a depth, and circular terms of its staircase
     assert found / found[0, 0] == pytest.approx(np.array(CONICAL[order]), abs=7e-3)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.reference.boundary import small_slope
 from mitsuba_diffraction.reference.coat import refracted, transmitted
 from mitsuba_diffraction.reference.fresnel import amplitudes
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import polar
 
 

@@ -12,6 +12,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed, amplitudes, normal_reflec
 from mitsuba_diffraction.reference import boundary as judge
 from mitsuba_diffraction.reference import coat as coat_judge
 from mitsuba_diffraction.reference import fresnel as fresnel_judge
+from mitsuba_diffraction.reference import model as model_judge
 from mitsuba_diffraction.reference import through as through_judge
 from tests.support.matrices import pairs
 
@@ -87,7 +88,7 @@ def numbers(request):
 def test_matrices_are_those_of_the_reference(matrix, name, numbers):
     of, kernel = numbers
     wi, wo, index, _ = of(INDICES[name])
-    expected = getattr(judge, matrix)(WI, WO, INDICES[name])
+    expected = getattr(model_judge, matrix)(WI, WO, INDICES[name])
     agree(getattr(boundary, matrix)(geometry(wi, wo), index), expected, kernel)
 
 
@@ -95,10 +96,10 @@ def test_matrices_are_those_of_the_reference(matrix, name, numbers):
 def test_the_default_model_is_the_blend_of_the_reference(name, numbers):
     of, kernel = numbers
     wi, wo, index, heights = of(INDICES[name])
-    s = judge.small_slope_weight(KAPPA, VARIANCE, INDICES[name])
+    s = model_judge.small_slope_weight(KAPPA, VARIANCE, INDICES[name])
     jones = boundary.MODELS["small_slope"].jones(geometry(wi, wo), index, heights)
     weight = kirchhoff_weight(*heights, normal_reflectance(index))
-    agree(jones, judge.blended(WI, WO, INDICES[name], s), kernel)
+    agree(jones, model_judge.blended(WI, WO, INDICES[name], s), kernel)
     # 1 − s is exact where it is small: its own relative error counts
     x = -np.expm1(np.log(np.maximum(s, 1e-300)))
     large = x > 1e-4
@@ -115,7 +116,7 @@ def test_a_coat_s_face_is_that_of_the_reference(name, numbers):
     jones = coat.transmitted(boundary.kirchhoff(pair, index), pair, index, *faces)
     below = [coat_judge.refracted(w, n) for w in (WI, WO)]
     expected = coat_judge.transmitted(
-        judge.kirchhoff(*below, INDICES[name]), WI, WO, n, INDICES[name]
+        model_judge.kirchhoff(*below, INDICES[name]), WI, WO, n, INDICES[name]
     )
     expected = expected * (below[0][:, 2] * below[1][:, 2] / (WI[:, 2] * WO[:, 2]))[:, None, None]
     agree(jones, expected, kernel)

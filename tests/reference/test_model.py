@@ -19,25 +19,34 @@ INDICES = [np.full(len(WI), n, complex) for n in (1.5, 0.8, 0.65 + 5.6j)]
 
 
 @pytest.mark.parametrize("index", INDICES)
-def test_matrices_are_those_of_the_tables(index):
-    """`optics.boundary` writes B by fields at interfaces, which may have a film."""
-    assert model.kirchhoff(LIGHT, index) == pytest.approx(boundary.kirchhoff(WI, WO, index))
-    assert model.small_slope(LIGHT, index) == pytest.approx(boundary.small_slope(WI, WO, index))
-    s = model.share(FIELD, LIGHT, index)
+def test_fields_at_a_bare_interface_make_the_matrix_of_equation_8(index):
+    """In the form in which first-order small slope is published; a film has more fields."""
+    (x0, y0, _), (x, y, _) = (axis.T for axis in boundary.polarisation_axes(WI, WO))
+    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
+    (t0, q0), (t, q) = ((np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (WI, WO))
+    epsilon = index * index
+    inside0, inside = (np.sqrt(epsilon - sine**2) for sine in (t0, t))
+    s0, s, p0, p = q0 + inside0, q + inside, epsilon * q0 + inside0, epsilon * q + inside
+    pp = (inside * inside0 * dot - epsilon * t * t0) / (p * p0)
+    expected = [[-dot / (s * s0), inside0 * cross / (s * p0)], [inside * cross / (p * s0), pp]]
+    found = np.moveaxis(model.small_slope(WI, WO, index), 0, -1)
+    assert found == pytest.approx((epsilon - 1.0) * np.array(expected))
+
+
+def test_the_share_of_small_slope_follows_the_heights():
+    index = INDICES[2]
     total = wavenumber(LIGHT.wavelength)[:, None] * (WI + WO)
-    variance = blend.ScaleRoughness.from_heights(FIELD.heights, FIELD.pixel_size).at(
-        np.hypot(*total[:, :2].T)
-    )
-    assert s == pytest.approx(boundary.small_slope_weight(total[:, 2], variance, index))
-    both = boundary.mixed(model.kirchhoff(LIGHT, index), model.small_slope(LIGHT, index), s)
-    assert both == pytest.approx(boundary.blended(WI, WO, index, s))
+    roughness = blend.ScaleRoughness.from_heights(FIELD.heights, FIELD.pixel_size)
+    variance = roughness.at(np.hypot(*total[:, :2].T))
+    s = model.share(FIELD, LIGHT, index)
+    assert s == pytest.approx(model.small_slope_weight(total[:, 2], variance, index))
 
 
 def test_the_reference_s_default_is_the_model():
     light = {"eta": 1.5, "coherence_width": 2.0}
     found = reference.brdf(FIELD, WI, WO, LIGHT.wavelength, **light)
     expected = model.default_brdf(
-        FIELD, LIGHT, INDICES[0], model.Sigmas(sigma_of(2.0), sigma_of(2.0))
+        FIELD, LIGHT, INDICES[0], reference.Sigmas(sigma_of(2.0), sigma_of(2.0))
     )
     assert np.array_equal(found, expected)
     matrices = reference.mueller(FIELD, WI, WO, LIGHT.wavelength, **light)

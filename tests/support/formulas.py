@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction.optics.arithmetic import of
 from mitsuba_diffraction.optics.blend import RoughnessTable
 from mitsuba_diffraction.optics.boundary import Geometry, Heights, Jones, Model, kirchhoff
-from mitsuba_diffraction.reference import boundary, coat
+from mitsuba_diffraction.reference import boundary, coat, model
 from tests.support.directions import uniform_directions
 
 Array = NDArray[np.float64]
@@ -46,8 +46,8 @@ def exact_power(given: Pairs, index: complex, *, coated: bool = False) -> Array:
     n = COAT if coated else 1.0
     inner = [coat.refracted(w, n) for w in (wi, wo)] if coated else [wi, wo]
     relative = np.full(len(wi), index / n)
-    s = boundary.small_slope_weight(given.kappa, given.variance, relative)
-    jones = boundary.blended(*inner, relative, s)
+    s = model.small_slope_weight(given.kappa, given.variance, relative)
+    jones = model.blended(*inner, relative, s)
     if coated:
         jones = coat.transmitted(jones, wi, wo, n, relative)
     return boundary.unpolarised(jones) * (2.0 * inner[0][:, 2] * inner[1][:, 2]) ** 2
@@ -72,7 +72,7 @@ FADED = Model("faded", faded_jones, halved)
 
 def exact_faded(given: Pairs, index: complex) -> Array:
     """Return N' of `FADED` by `md.reference` in double precision, (n,)."""
-    jones = boundary.kirchhoff(given.wi, given.wo, np.full(len(given.wi), index))
+    jones = model.kirchhoff(given.wi, given.wo, np.full(len(given.wi), index))
     power = boundary.unpolarised(jones) * (2.0 * given.wi[:, 2] * given.wo[:, 2]) ** 2
     return power * np.exp(-(given.kappa**2) * given.variance)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.reference import model
 from tests.support.directions import uniform_directions
 
-MATRICES = (boundary.small_slope, boundary.kirchhoff)
+MATRICES = (model.small_slope, model.kirchhoff)
 #: Reversed light has its s axis reversed, its p axis as it was.
 REVERSED = np.array([[1, -1], [-1, 1]])
 

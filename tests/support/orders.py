@@ -14,7 +14,8 @@ from scipy.special import jv
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
-from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, small_slope, turn
+from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, turn
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import Array, as_single, uniform_directions
 
 PERIOD = 1.6  # µm

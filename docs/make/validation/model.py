@@ -10,7 +10,7 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
     η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
 For a mirror this is R; for m = 0 of any grating R·|a_0|², eq. 10 with C = 1. Kirchhoff's model has
-R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.boundary`.
+R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.reference.model`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.reference import model as models
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
@@ -111,12 +112,12 @@ def jones_of(
 ) -> NDArray[np.complex128]:
     """Jones matrices (n, 2, 2) of one of `MODELS`; arguments as `efficiencies`."""
     if model == "kirchhoff":
-        return boundary.kirchhoff(wi, wo, index)
+        return models.kirchhoff(wi, wo, index)
     if model == "small_slope_alone":
-        return boundary.small_slope(wi, wo, index)
+        return models.small_slope(wi, wo, index)
     if model == "half_and_half":
-        return boundary.blended(wi, wo, index, 0.5)
-    return boundary.blended(wi, wo, index, share_of(field, index, wi, wo, wavelength))
+        return models.blended(wi, wo, index, 0.5)
+    return models.blended(wi, wo, index, share_of(field, index, wi, wo, wavelength))
 
 
 def share_of(
@@ -130,7 +131,7 @@ def share_of(
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
-    return np.asarray(boundary.small_slope_weight(k * total[:, 2], variance, index))
+    return np.asarray(models.small_slope_weight(k * total[:, 2], variance, index))
 
 
 @cache

@@ -191,10 +191,6 @@ class DiffractionOrders(SurfaceBSDF):
         """See `SurfaceBSDF.reflected_share`."""
         return self._albedo(site.si.wi, site)
 
-    def normal_reflectance(self, site: Site, active: Mask) -> Spectrum:
-        """See `SurfaceBSDF.normal_reflectance`."""
-        return mi.Spectrum(self._albedo(mi.Vector3f(0.0, 0.0, 1.0), site))
-
     def _albedo(self, direction: Vector3f, site: Site) -> Colour:
         """Return Σ η_m of light from a direction in the shading frame."""
         tangential = site.frame.turned(direction)

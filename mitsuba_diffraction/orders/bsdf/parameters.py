@@ -6,7 +6,7 @@ import weakref
 
 from ...errors import DiffractionError
 from ...heights.lengths import is_auto
-from ...plugin.dictionary import ORDERS, TableData
+from ...plugin.dictionary import ORDERS, Data
 from ...plugin.parameters import resolved_path
 from ...plugin.properties import class_of
 from ...plugin.types import BSDF, Properties
@@ -45,9 +45,9 @@ def _loaded(props: Properties) -> OrderTable:
         )
     if "data" in props:
         data = props.get("data")
-        if not isinstance(data, TableData) or not isinstance(data.table, OrderTable):
+        if not isinstance(data, Data) or not isinstance(data.value, OrderTable):
             raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
-        return data.table
+        return data.value
     name = props.get("filename")
     if not isinstance(name, str):
         raise DiffractionError(f"filename={name!r} must be the name of a file")

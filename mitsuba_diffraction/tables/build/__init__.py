@@ -5,8 +5,8 @@ Contents
 build         tries until the tolerance is met: `build_table`
 choose        how many terms and intervals a tolerance takes
 checks        what cannot be built
-windows       a wide scan cut into overlapping ones, averaged
-powers        the mean power of several patches, by batches, on workers if given
+screens       patches as tiles, or a scan cut into overlapping windows, averaged
+powers        the mean power of screens, by batches, on workers if given
 spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients  of the series, from transforms of the heights; as half floats
 error         the one error measure of the project

@@ -43,7 +43,7 @@ from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .powers import PatchSpectra
-from .windows import Run, extent_of, shape_of, windows_of
+from .screens import Run, Screens, screens_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4
@@ -64,14 +64,14 @@ class Attempt:
     """
 
     def __init__(self, wanted: _Wanted, setting: _Setting, tell: Progress) -> None:
-        patches, expansion, functions = wanted.patches, setting.expansion, setting.functions
+        expansion, functions = setting.expansion, setting.functions
         self.grid = grid = _grid(wanted, setting.taps)
         check_size(grid, expansion, functions)
         double = expansion.basis == "taylor" or wanted.settings.tolerance < DOUBLE_BELOW
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
         self._tick = _Ticks(tell)
-        self._spectra = PatchSpectra(patches, outer, double, self._tick)
+        self._spectra = PatchSpectra(wanted.screens, outer, double, self._tick)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
         transforms = expansion.intervals * expansion.series_terms * self._spectra.count
         self._tick.transforms = transforms
@@ -135,19 +135,19 @@ _ATTEMPTS = 8
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Patches and settings of a table, and the limits that follow from them."""
+    """Screens and settings of a table, and the limits that follow from them."""
 
-    patches: Sequence[HeightField]
+    screens: Screens
     settings: TableSettings
 
     @cached_property
     def deepest(self) -> HeightField:
-        return max(self.patches, key=lambda patch: patch.range)
+        return max(self.screens, key=lambda patch: patch.range)
 
     @property
     def spacing(self) -> tuple[float, float]:
         """rad/µm between bins."""
-        extent = extent_of(self.patches)
+        extent = self.screens.extent
         return (2 * np.pi / extent[0], 2 * np.pi / extent[1])
 
     @property
@@ -234,13 +234,12 @@ def build_with(
     """
     scans = [heights] if isinstance(heights, HeightField) else list(heights)
     settings = resolved(settings, scans)
-    patches = windows_of(scans, settings, run)
-    if patches is scans:
-        check_patches(scans, settings)
+    check_patches(scans, settings)
+    screens = screens_of(scans, settings, run)
     check_units(scans)
     try:
-        check_window(extent_of(patches), settings)
-        table = _built(_Wanted(patches, settings), progress or silent)
+        check_window(screens.extent, settings)
+        table = _built(_Wanted(screens, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in scans if (question := units_warning(patch))]
         if not questions:
@@ -317,7 +316,7 @@ def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
 
 def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionTable:
     """Make the table of an attempt, with its error, roughness and source."""
-    patches, settings = wanted.patches, wanted.settings
+    settings = wanted.settings
     limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
     settings = replace(settings, frequency_limit=limit)
     return DiffractionTable(
@@ -329,8 +328,8 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
         spacing=wanted.spacing,
         settings=settings,
         error=attempt.measured,
-        roughness=roughness_of(patches, wanted.q_limit),
-        source=describe(patches, settings),
+        roughness=roughness_of(wanted.screens, wanted.q_limit),
+        source=describe(wanted.screens, settings),
     )
 
 
@@ -338,9 +337,9 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     """Grid of DFT bins, wide enough for window sums with so many taps (x, y)."""
     limit, spacing = wanted.frequency_limit, wanted.spacing
     if max(taps) > MAX_TAPS:
-        raise too_wide(extent_of(wanted.patches), wanted.settings, taps)
+        raise too_wide(wanted.screens.extent, wanted.settings, taps)
     radius = (limit[0] / spacing[0], limit[1] / spacing[1])
-    ny, nx = shape_of(wanted.patches)
+    ny, nx = wanted.screens.tile
     # A margin as wide as the taps: see tables.lookup
     last_x = min(math.ceil(radius[0]), nx // 2) + taps[0]
     last_y = min(math.ceil(radius[1]), ny // 2) + taps[1]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 import scipy
@@ -184,7 +183,7 @@ class _Trial:
         self._spectrum = Spectrum(field, (last[0], last[1]), double=True)
         self._centre = (last[1], last[0])
         self._lengths: dict[int, int] = {}
-        self._values: dict[tuple[float, str], NDArray[Any]] = {}
+        self._known: dict[tuple[float, str], NDArray[np.floating]] = {}
 
     def length(self, make: _Maker, intervals: int, budget: float) -> int:
         """Terms of a Chebyshev series that is so good that the functions' number is what counts."""
@@ -202,43 +201,32 @@ class _Trial:
         """
         count = min(expansion.intervals, _TRIALS)
         errors, exact = [], []
-        for interval in np.unique(np.linspace(0, expansion.intervals - 1, count).round()):
-            values = np.stack([self._value(k, expansion) for k in expansion.nodes(int(interval))])
-            specular = float(expansion.order_0_offset(interval))
-            values[:, *self._centre] -= specular
+        for interval in np.unique(np.linspace(0, expansion.intervals - 1, count).round()).astype(
+            int
+        ):
+            values = np.stack([self._values(k, expansion) for k in expansion.nodes(interval)])
+            specular = expansion.order_0_offset(interval)
+            values[:, *self._centre, 0] -= specular
+            fit, series = expansion.fit(interval), np.eye(len(values))
+            order_0 = values[:, *self._centre].T @ fit
+            values[:, *self._centre] = 0.0
+            flat = values.reshape(len(values), -1)
             if functions is not None:
-                values = self._projected(values, expansion, int(interval), functions)
-            coefficients = np.tensordot(expansion.fit(int(interval)), values, (0, 0))
-            for kappa in expansion.extrema(int(interval)):
-                series = np.tensordot(expansion.weights(kappa), coefficients, 1)
-                series[self._centre] += specular
-                truth = self._value(kappa, expansion)
+                near = self._near(values.shape[-1])
+                fit, series = principal_functions(flat, expansion, interval, functions, near)
+            bins = (flat.T @ fit).reshape(*values.shape[1:], -1)
+            for kappa in expansion.extrema(interval):
+                weights = expansion.series_weights(kappa)
+                table, truth = bins @ (weights @ series), self._values(kappa, expansion)
+                table[self._centre] = order_0 @ weights
+                table[*self._centre, 0] += specular
                 if expansion.kind == "amplitude":
-                    series, truth = np.abs(series) ** 2, np.abs(truth) ** 2
-                difference = np.abs(series - truth)
-                errors.append(self._parts(difference))
+                    table, truth = table**2, truth**2
+                table, truth = table.sum(axis=-1), truth.sum(axis=-1)
+                errors.append(self._parts(np.abs(table - truth)))
                 exact.append(self._parts(truth))
         scale = np.maximum(exact, FLOOR * np.max(exact, axis=0))
         return float(np.max(np.array(errors) / np.maximum(scale, 1e-30)))
-
-    def _projected(
-        self, values: NDArray[Any], expansion: Expansion, interval: int, functions: int
-    ) -> NDArray[Any]:
-        """The nodes' values with all bins but order 0 made of a few functions."""
-        centre = values[:, *self._centre].copy()
-        values[:, *self._centre] = 0.0
-        parts = [values] if expansion.kind == "power" else [values.real, values.imag]
-        flat = np.stack(parts, axis=-1).reshape(len(values), -1)
-        projection, series = principal_functions(
-            flat, expansion, interval, functions, self._near(len(parts))
-        )
-        back = np.linalg.solve(expansion.fit(interval).T, series)  # functions at the nodes
-        flat = back @ (projection.T @ flat)
-        parts_back = flat.reshape(*values.shape, len(parts))
-        real = parts_back[..., 0]
-        result = real if len(parts) == 1 else real + 1j * parts_back[..., 1]
-        result[:, *self._centre] = centre
-        return np.asarray(result)
 
     def _near(self, parts: int) -> NDArray[np.int64]:
         """Indices (…, parts) of the bins around order 0."""
@@ -247,15 +235,16 @@ class _Trial:
         bins = (rows * (2 * column + 1) + columns)[np.arange(9) != 4]
         return np.asarray((bins[:, None] * parts + np.arange(parts)).ravel())
 
-    def _value(self, kappa: float, expansion: Expansion) -> NDArray[Any]:
-        """Powers or amplitudes of all bins; trials of several numbers of functions share nodes."""
+    def _values(self, kappa: float, expansion: Expansion) -> NDArray[np.floating]:
+        """Powers (ny, nx, 1), or the parts of amplitudes (ny, nx, 2); trials share nodes."""
         key = float(kappa), expansion.kind
-        if key not in self._values:
+        if key not in self._known:
             amplitude = self._spectrum.of_phase(kappa, minus_one=True)
             amplitude[self._centre] += 1.0
             power = expansion.kind == "power"
-            self._values[key] = np.abs(amplitude) ** 2 if power else amplitude
-        return self._values[key]
+            parts = (np.abs(amplitude) ** 2,) if power else (amplitude.real, amplitude.imag)
+            self._known[key] = np.stack(parts, axis=-1)
+        return self._known[key]
 
     def _parts(self, bins: NDArray[np.floating]) -> tuple[float, float]:
         row, column = self._centre

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -13,13 +13,8 @@ from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
 from ..layout import Grid
-from .error import alternate
-from .powers import PatchSpectra
-from .spectrum import GLOSSY_RADIUS, Spectrum
-
-#: Fills an array (nodes, …) with the expanded values of all bins at the nodes of an interval, one
-#: after the other; gives order 0's.
-ValuesAt = Callable[[int, NDArray[np.float32]], Iterable[Sequence[float]]]
+from .powers import PatchSpectra, alternate
+from .spectrum import GLOSSY_RADIUS
 
 
 class Coefficients(NamedTuple):
@@ -37,31 +32,25 @@ class Coefficients(NamedTuple):
     expansion: Expansion
 
 
-def series_of(
-    values_at: ValuesAt,
-    shape: tuple[int, int, int],
-    expansion: Expansion,
-    functions: int | None,
-    near: NDArray[np.int64],
+def coefficients_of(
+    spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
 ) -> Coefficients:
-    """Series coefficients (intervals, ny, nx, components, terms) of whatever has values at nodes.
+    """Series coefficients of every bin, and of order 0.
 
-    Parameters
-    ----------
-    values_at : values to expand, at the nodes of an interval.
-    shape : (ny, nx, components) of the values.
-    functions : number of functions of basis "svd", or None; the
-        expansion returned then has them.
-    near : indices of the values close to order 0, see `principal_functions`.
+    functions : number of functions of basis "svd", or None; the expansion returned then has them.
     """
-    terms = functions or expansion.terms
+    if expansion.basis == "taylor":
+        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
+    values_at, components = (_powers_at, 1) if expansion.kind == "power" else (_amplitudes_at, 2)
+    terms, near = functions or expansion.terms, _near(grid, components)
+    shape = *grid.shape, components
     result = np.empty((expansion.intervals, *shape, terms), np.float32)
-    order_0 = np.empty((expansion.intervals, shape[2], expansion.terms))
-    values = np.empty((expansion.terms, *shape), np.float32)
+    order_0 = np.empty((expansion.intervals, components, expansion.terms))
+    values = np.empty((expansion.terms, *shape), np.float32)  # at the nodes of an interval
     flat = values.reshape(expansion.terms, -1)
     all_series = []
     for interval in range(expansion.intervals):
-        at_nodes = list(values_at(interval, values))
+        at_nodes = list(values_at(spectra, grid, expansion, interval, values))
         fit = expansion.fit(interval)
         order_0[interval] = np.transpose(at_nodes) @ fit
         if functions is not None:
@@ -73,22 +62,6 @@ def series_of(
     return Coefficients(result, order_0, expansion)
 
 
-def coefficients_of(
-    spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
-) -> Coefficients:
-    """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
-
-    functions : see `series_of`.
-    """
-    if expansion.basis == "taylor":
-        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
-    components = 1 if expansion.kind == "power" else 2
-    of_kind = _powers_at if expansion.kind == "power" else _amplitudes_at
-    values_at = partial(of_kind, spectra, grid, expansion)
-    near = _near(grid, components)
-    return series_of(values_at, (*grid.shape, components), expansion, functions, near)
-
-
 def _taylor(
     spectra: PatchSpectra, grid: Grid, expansion: Expansion
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
@@ -96,7 +69,7 @@ def _taylor(
     result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
     for n in range(1, expansion.terms + 1):
         amplitude = spectra.first.of(partial(_height_power, expansion.half_range, n))
-        amplitude = amplitude[_inner(spectra.first, grid)]
+        amplitude = amplitude[_inner(spectra, grid)]
         if grid.coherent:
             alternate(amplitude, grid.last)
         amplitude *= 1j**n
@@ -131,7 +104,7 @@ def _powers_at(
     altogether, so that it takes double precision.
     """
     specular = float(expansion.order_0_offset(interval))
-    inner = _inner(spectra.first, grid)
+    inner = _inner(spectra, grid)
     for out, power in zip(values, spectra.powers(expansion.nodes(interval).tolist()), strict=True):
         out[..., 0] = power.bins[inner]
         yield (power.change if specular else power.order_0,)
@@ -145,24 +118,20 @@ def _amplitudes_at(
     values: NDArray[np.float32],
 ) -> Iterator[tuple[float, float]]:
     """Real and imaginary parts of the only patch's (ny, nx, 2), likewise."""
-    specular, spectrum = float(expansion.order_0_offset(interval)), spectra.first
-    for out, kappa in zip(values, expansion.nodes(interval), strict=True):
-        # The transform is of exp(iκh) − 1, so this is a_0 − 1
-        amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
-        less = complex(amplitude[grid.middle])
+    specular = float(expansion.order_0_offset(interval))
+    for out, kappa in zip(values, expansion.nodes(interval).tolist(), strict=True):
+        amplitude = spectra.amplitudes(kappa, grid.coherent)[_inner(spectra, grid)]
+        less = complex(amplitude[grid.middle])  # a_0 − 1
         amplitude[grid.middle] = 0.0
-        if grid.coherent:
-            alternate(amplitude, grid.last)
         out[..., 0], out[..., 1] = amplitude.real, amplitude.imag
-        spectra.tick()
         yield less.real + 1.0 - specular, less.imag
 
 
-def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:
+def _inner(spectra: PatchSpectra, grid: Grid) -> tuple[slice, slice]:
     """Slices of the grid's bins within a spectrum, whose margin serves the error estimate."""
     rows, columns = (
         slice(outer - last, outer + last + 1)
-        for outer, last in zip(spectrum.last[::-1], grid.last[::-1], strict=True)
+        for outer, last in zip(spectra.last[::-1], grid.last[::-1], strict=True)
     )
     return rows, columns
 

@@ -48,8 +48,8 @@ class ErrorMeter:
 
     def __init__(self, spectra: PatchSpectra, grid: Grid, expansion: Expansion) -> None:
         self.spectra, self.grid, self.expansion = spectra, grid, expansion
-        spectrum = spectra.first
-        self._real, self._outer = spectrum.real_type, spectrum.last
+        self._real: Any = np.float64 if spectra.double else np.float32
+        self._outer = spectra.last
         rng = np.random.default_rng(_SEED)
         axes = []
         self._lobe: list[NDArray[Any]] = []
@@ -57,23 +57,23 @@ class ErrorMeter:
         tapped: list[list[scipy.sparse.csr_array]] = []
         rows = rows_by_trim(grid.taps, grid.trims)
         for axis in (0, 1):
-            outer = min(int(grid.radius[axis]), spectrum.last[axis])
+            outer = min(int(grid.radius[axis]), spectra.last[axis])
             bins = np.arange(-outer, outer + 1)
             # Bins of a short period are far apart: half-way between them there is no light at all
             most = min(0.5, _WITHIN / grid.steps[axis])
             positions = bins + rng.uniform(-most, most, len(bins))
             exponent, last = grid.exponents[axis], grid.last[axis]
             wide = tap_matrix(
-                positions, -spectrum.last[axis], spectrum.shape[1 - axis], exponent, None
+                positions, -spectra.last[axis], spectra.shape[1 - axis], exponent, None
             )
             chosen = [range(trim, grid.taps[0] - trim) for trim in rows]
             few = [
                 tap_matrix(positions, -last, 2 * last + 1, exponent, grid.taps[axis], numbers)
                 for numbers in (chosen if axis == 0 else rows.values())
             ]
-            self._wide.append(wide.astype(spectrum.real_type))
-            tapped.append([matrix.astype(spectrum.real_type) for matrix in few])
-            self._lobe.append(np.exp(-exponent * positions**2).astype(spectrum.real_type))
+            self._wide.append(wide.astype(self._real))
+            tapped.append([matrix.astype(self._real) for matrix in few])
+            self._lobe.append(np.exp(-exponent * positions**2).astype(self._real))
             axes.append(bins)
         self._tapped = list(zip(*tapped, strict=True))
         x, y = np.meshgrid(axes[0], axes[1])
@@ -145,11 +145,8 @@ class ErrorMeter:
                 yield bins
             return
         for kappa in kappas:
-            amplitude = self.spectra.first.of_phase(kappa, minus_one=True)
+            amplitude = self.spectra.amplitudes(kappa, self.grid.coherent)
             amplitude[middle] += 1.0
-            if self.grid.coherent:
-                alternate(amplitude, self._outer)
-            self.spectra.tick()
             yield amplitude
 
     def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
@@ -198,13 +195,6 @@ def worst(kappas: Sequence[float], parts: Sequence[Parts]) -> dict[str, float]:
         "kappa_near": float(kappas[where[0]]),
         "kappa_far": float(kappas[where[1]]),
     }
-
-
-def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
-    """Multiply bin (jx, jy) by (−1)^(jx+jy), in place: exp(−i q_j·x₀) for x₀ = half the patch."""
-    parity = (last[0] + last[1]) % 2
-    amplitude[0::2, 1 - parity :: 2] *= -1
-    amplitude[1::2, parity::2] *= -1
 
 
 def _power(amplitude: NDArray[Any]) -> NDArray[np.floating]:

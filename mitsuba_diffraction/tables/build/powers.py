@@ -1,4 +1,4 @@
-"""The mean power of several patches' orders, κ after κ; of windows by batches, on workers if given.
+"""The mean power of the orders of screens, κ after κ: by batches, on workers if given.
 
 Sums are of the same batches in the same order whoever makes them, in double precision: a table is
 the same, to the last bit, with any number of workers.
@@ -6,19 +6,19 @@ the same, to the last bit, with any number of workers.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...heights.field import HeightField
+from .screens import Screens
 from .spectrum import Spectrum
-from .windows import Windows
 
 #: Bytes of sums that a batch of windows gives at once: of several κ, for which it is read once.
 _GROUP = 2**26
@@ -67,69 +67,68 @@ class Power:
 
 
 class PatchSpectra:
-    """Transforms of patches.
+    """Transforms of screens.
 
     Parameters
     ----------
-    patches : `Windows`, or some of one extent.
     last, double : as in `Spectrum`.
     tick : called when one of the `count` parts of a κ's work is done.
     """
 
     def __init__(
         self,
-        patches: Sequence[HeightField],
+        screens: Screens,
         last: tuple[int, int],
         double: bool = False,
         tick: Callable[[], None] = lambda: None,
     ) -> None:
-        self.tick, self._patches = tick, patches
-        self._of = last, double
-        self._batches = patches.batches() if isinstance(patches, Windows) else []
-        self._spectra = (
-            [patches.spectrum(0, last, double)]
-            if isinstance(patches, Windows)
-            else [Spectrum(patch, last, double) for patch in patches]
-        )
+        self.tick, self.last, self.double, self._screens = tick, last, double, screens
+        self._batches = screens.batches()
+        self.shape = 2 * last[1] + 1, 2 * last[0] + 1
 
-    @property
+    @cached_property
     def first(self) -> Spectrum:
-        """Spectrum of the only patch, or of one that stands for the shape and precision of all."""
-        return self._spectra[0]
+        """Spectrum of the only patch."""
+        return self._screens.spectrum(0, self.last, self.double)
 
     @property
     def count(self) -> int:
         """Calls of `tick` for a κ."""
-        return len(self._batches) or 1
+        return len(self._batches)
+
+    def amplitudes(self, kappa: float, centred: bool) -> NDArray[np.complexfloating]:
+        """Amplitudes a_j − δ_j0 of the only patch; centred : under a window on its middle."""
+        amplitudes = self.first.of_phase(kappa, minus_one=True)
+        if centred:
+            alternate(amplitudes, self.last)
+        self.tick()
+        return amplitudes
 
     def powers(self, kappas: Sequence[float]) -> Iterator[Power]:
-        """The mean over all patches, at one κ after the other."""
-        if not self._batches:
-            for kappa in kappas:
-                (total,) = _sums(self._spectra, [kappa])
-                self.tick()
-                yield total.over(len(self._spectra))
-            return
-        ny, nx = self.first.shape
-        size = max(1, _GROUP // (8 * ny * nx))
+        """The mean over all screens, at one κ after the other."""
+        size = max(1, _GROUP // (8 * math.prod(self.shape)))
         for start in range(0, len(kappas), size):
-            yield from self._of_windows(tuple(kappas[start : start + size]))
+            few, total = tuple(kappas[start : start + size]), list[Power]()
+            sums_of = partial(_batch_sums, self.last, self.double, few)
+            for powers in self._screens.run(sums_of, self._batches):
+                _add(total, powers)
+                for _ in few:
+                    self.tick()
+            for power in total:
+                mean = power.over(len(self._screens))
+                mean.bins = self._screens.sharpened(mean.bins)
+                yield mean
 
-    def _of_windows(self, kappas: tuple[float, ...]) -> Iterator[Power]:
-        assert isinstance(self._patches, Windows)
-        total: list[Power] = []
-        for powers in self._patches.run(partial(_batch_sums, *self._of, kappas), self._batches):
-            _add(total, powers)
-            for _ in kappas:
-                self.tick()
-        for power in total:
-            mean = power.over(len(self._patches))
-            mean.bins = self._patches.sharpened(mean.bins)
-            yield mean
+
+def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
+    """Multiply bin (jx, jy) by (−1)^(jx+jy), in place: exp(−i q_j·x₀) for x₀ = half the patch."""
+    parity = (last[0] + last[1]) % 2
+    amplitude[0::2, 1 - parity :: 2] *= -1
+    amplitude[1::2, parity::2] *= -1
 
 
 def _batch_sums(
-    last: tuple[int, int], double: bool, kappas: tuple[float, ...], windows: Windows
+    last: tuple[int, int], double: bool, kappas: tuple[float, ...], windows: Screens
 ) -> list[Power]:
     """Sums over some windows, one for every κ; as many windows at a time as there are threads."""
     threads = min(os.cpu_count() or 1, _MOST_THREADS, len(windows))

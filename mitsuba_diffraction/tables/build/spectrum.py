@@ -36,9 +36,8 @@ class Spectrum:
     last : (jx, jy), the outermost bins wanted.
     double : compute in double precision instead of single.
     tapers : along y and x, of mean square 1, what f without its mean fades with: bin 0 is then the
-        mean, weighted by the tapers, and all others are of the rest. None along an axis, or
-        altogether, for no fading.
-    tile : (ny, nx), number of points that screens are filled up to with zeros.
+        mean, weighted by the tapers, and all others are of the rest, filled up with zeros to twice
+        its length. None along an axis for no fading.
     threaded : whether a transform may use several threads.
     """
 
@@ -48,7 +47,6 @@ class Spectrum:
         last: tuple[int, int],
         double: bool = False,
         tapers: Tapers = (None, None),
-        tile: tuple[int, int] | None = None,
         threaded: bool = True,
     ) -> None:
         self.real_type: Any = np.float64 if double else np.float32
@@ -59,7 +57,7 @@ class Spectrum:
         self.heights = np.empty(field.shape, self.real_type)
         middle = 0.5 * (highest + lowest)
         np.subtract(field.heights, middle, out=self.heights, dtype=np.float64, casting="same_kind")
-        self.last, self._tile, self._threaded = last, tile or field.shape, threaded
+        self.last, self._tile, self._threaded = last, filled(field.shape, tapers), threaded
         self._columns = _Crop(self._tile[1], last[0])
         self._rows = _Crop(self._tile[0], last[1])
         self._tapers = None if tapers[0] is None and tapers[1] is None else self._filled(tapers)
@@ -149,6 +147,12 @@ class Spectrum:
             for n, taper, tile in zip(self.heights.shape, tapers, self._tile, strict=True)
         )
         return y.astype(self.real_type), x.astype(self.real_type)
+
+
+def filled(shape: tuple[int, int], tapers: Tapers) -> tuple[int, int]:
+    """Return (ny, nx) of a screen of this shape with the zeros beyond its tapers."""
+    y, x = (n if taper is None else 2 * n for n, taper in zip(shape, tapers, strict=True))
+    return y, x
 
 
 class _Crop:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion
-from ..powers import order_0_power, power_expansion, power_series
+from ..powers import fitted, order_0_power, power_expansion, power_series
 from ..table import DiffractionTable
 from ..window import taps_at
 
@@ -251,17 +251,16 @@ class OtherOrders:
         parts = amplitudes.reshape(len(amplitudes), old.intervals, 2, old.terms)
         x, y = qx / table.spacing[0], qy / table.spacing[1]
         lobe = np.exp(-table.grid.exponents[0] * x * x - table.grid.exponents[1] * y * y)
-        result = np.empty((len(amplitudes), new.intervals, new.terms), np.float32)
-        for interval in range(new.intervals):
-            values = np.empty((len(amplitudes), new.terms), np.float32)
-            for n, kappa in enumerate(new.nodes(interval)):
-                source, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
-                amplitude = parts[:, source] @ weights * np.float32(1.0 / table.scale)
-                centre = table.order_0_at(kappa)
-                # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
-                values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
-            result[:, interval] = values @ new.fit(interval).astype(np.float32)
-        return result.reshape(len(amplitudes), -1) * np.float32(self._scale)
+
+        def powers(kappa: float) -> NDArray[np.float32]:
+            weights = (old.weights(kappa) / table.scale).astype(np.float32)
+            amplitude = parts[:, int(old.interval(kappa))] @ weights
+            # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
+            beats = 2.0 * lobe * (amplitude @ table.order_0_at(kappa))
+            return np.asarray((amplitude**2).sum(axis=1) + beats, np.float32)
+
+        series = fitted(new, powers) * np.float32(self._scale)
+        return np.moveaxis(series, 0, 1).reshape(len(amplitudes), -1)
 
 
 @dataclass(frozen=True)

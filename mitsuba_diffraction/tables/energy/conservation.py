@@ -14,14 +14,13 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
 from functools import partial
 
 import numpy as np
 
 from ...optics.paths import Path
 from ..directional import Array, DirectionalTable, DirectionGrid, Real
-from ..fields import check_names, mapping
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, cached, key_of
 from ..table import DiffractionTable
@@ -69,11 +68,9 @@ class Conservation:
 
     @classmethod
     def from_record(cls, record: Record) -> Conservation:
-        """Return the functions of such a record; raises a ValueError for what does not fit."""
-        document = mapping(record.document, "energy")
-        check_names(document, (field.name for field in fields(cls)), ())
-        pairs = zip(document.items(), record.arrays, strict=True)
-        return cls(**{name: DirectionalTable.parse(lam, values) for (name, lam), values in pairs})
+        """Return the functions of such a record."""
+        pairs = zip(record.document.items(), record.arrays, strict=True)
+        return cls(**{name: DirectionalTable(np.array(lam), a) for (name, lam), a in pairs})
 
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
@@ -230,24 +227,26 @@ class Energy:
     wavelength_range: tuple[float, float]
     stretch: float = 1.0
 
-    def nodes(self, height_scale: float, *, interval: bool = False) -> tuple[float, float]:
-        """Return the two height scales around one, for which something is made; equal at a node.
+    def nodes(self, low: float, high: float, *, interval: bool = False) -> list[float]:
+        """Return even height scales around all from low to high, for which something is made.
 
-        They lie evenly, 1 among them, so close that an order's power bends little in between. An
+        1 is in their lattice, which is so close that an order's power bends little in between. An
         optimisation of the heights thus sees a continuous scale with derivatives, and waits only
-        where it enters an interval that nobody has been in before.
+        where it enters an interval that nobody has been in before. There are two scales at least,
+        equal where one will do.
 
-        interval : two nodes even if the scale is at one, for derivatives.
+        interval : two that differ even if a single scale is at one, for derivatives.
         """
-        steps, most = self._lattice
-
-        def node(n: int) -> float:
-            return min(max(n / steps, _FLAT), most)
-
-        position = height_scale * steps  # of a scale in single precision
-        lower = min(math.floor(position + 1e-4), math.ceil(most * steps - 1e-4) - 1)
-        at_node = abs(position - lower) < 1e-4
-        return node(lower), node(lower if at_node and not interval else lower + 1)
+        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
+        steps = max(_FEWEST_STEPS, math.ceil(phase / _PHASE))
+        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter;
+        # κ of a stretched patch stays within the table
+        most = max(self.table.height_scale_max / self.stretch, _FLAT)
+        # of scales in single precision
+        first = min(math.floor(low * steps + 1e-4), math.ceil(most * steps - 1e-4) - 1)
+        last = max(math.ceil(high * steps - 1e-4), first + interval)
+        start, end = (min(max(n / steps, _FLAT), most) for n in (first, last))
+        return np.linspace(start, end, 1 + max(1, last - first)).tolist()
 
     def at(self, height_scale: float) -> Conservation:
         """Conserve energy at a height scale: from memory, from disk, or computed."""
@@ -261,19 +260,3 @@ class Energy:
         made_of = versions, limits, height_scale, material, self.wavelength_range
         key, memory = key_of(self.table.digest(), made_of), _known.setdefault(self.table, {})
         return cached("energy", key, memory, make, Conservation)
-
-    @property
-    def _lattice(self) -> tuple[int, float]:
-        """Height scales a unit, and the largest."""
-        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
-        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter;
-        # κ of a stretched patch stays within the table
-        most = max(self.table.height_scale_max / self.stretch, _FLAT)
-        return max(_FEWEST_STEPS, math.ceil(phase / _PHASE)), most
-
-    def between(self, low: float, high: float) -> list[float]:
-        """Height scales at even distances, as close together, for all between two."""
-        steps, most = self._lattice
-        first = max(math.floor(low * steps) / steps, _FLAT)
-        last = min(math.ceil(high * steps) / steps, most)
-        return np.linspace(first, last, 1 + max(1, math.ceil((last - first) * steps))).tolist()

@@ -16,7 +16,7 @@ from ...errors import DiffractionError, check_choice
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...tables.build.spectrum import GLOSSY_RADIUS
-from ...tables.lookup import Kernel, weighted_sum
+from ...tables.lookup import Kernel, order_0_sum, weighted_sum
 from ...tables.table import DiffractionTable
 from .method import SPECULAR_WAVELENGTH, Array, FullSpectrum, Gain, Method, UniformMethod
 from .periods import Period
@@ -192,10 +192,9 @@ class Repeated(UniformMethod):
         """Return S = |B|²·D₁²·D₂²."""
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
-        amplitude = weighted_sum(
-            self.table, k * u, k * v, k * w, (self._kernel, self._kernel), self._taps
-        )
-        power = np.sum(amplitude**2, axis=1)
+        at, kernels = (self.table, k * u, k * v, k * w), (self._kernel, self._kernel)
+        amplitude = weighted_sum(*at, kernels, self._taps) + order_0_sum(*at, kernels)
+        power: Array = np.abs(amplitude) ** 2
         for frequency, spacing, n in zip((u, v), self.table.spacing, self.repeats, strict=True):
             power = power * copies(k * frequency / spacing, n) ** 2
         return power

@@ -11,7 +11,7 @@ from docs.make.validation.compare import compare
 from docs.make.validation.model import in_plane, order_efficiencies
 from docs.make.validation.models import compare_all
 from docs.make.validation.solutions import shipped
-from mitsuba_diffraction.reference import boundary
+from mitsuba_diffraction.reference import boundary, model
 
 pytestmark = pytest.mark.thorough
 
@@ -63,8 +63,8 @@ def test_shares_lie_between_the_two_matrices():
     _, sines = order_sines(grating.period, wavelength, theta)
     lit = in_plane(np.sin(np.radians(theta))), in_plane(sines), index
     direct = order_efficiencies(grating, "aluminium", theta, wavelength)
-    direct *= boundary.unpolarised(boundary.blended(*lit, 0.25))
-    direct /= boundary.unpolarised(boundary.kirchhoff(*lit))
+    direct *= boundary.unpolarised(model.blended(*lit, 0.25))
+    direct /= boundary.unpolarised(model.kirchhoff(*lit))
     assert goals._by_share(models)[25] == pytest.approx(direct, rel=1e-9)
 
 

@@ -10,7 +10,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.lists import read_efficiencies
-from mitsuba_diffraction.reference.boundary import small_slope
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.orders import shallow_grating, thin_grating
 
 INDEX = 1.2 + 6.0j

@@ -10,7 +10,8 @@ from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import sinusoidal
 from mitsuba_diffraction.orders.solve.stations import Grating
-from mitsuba_diffraction.reference.boundary import mueller, small_slope
+from mitsuba_diffraction.reference.boundary import mueller
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.orders import groove_matrices
 
 pytest.importorskip("gratinglab")

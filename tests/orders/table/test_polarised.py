@@ -9,7 +9,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
-from mitsuba_diffraction.reference.boundary import mueller, small_slope
+from mitsuba_diffraction.reference.boundary import mueller
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.orders import groove_matrices, shallow_grating
 from tests.support.stokes import REVERSAL
 

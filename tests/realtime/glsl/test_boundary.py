@@ -20,7 +20,7 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_responses,
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from mitsuba_diffraction.reference import boundary, fresnel
+from mitsuba_diffraction.reference import boundary, fresnel, model
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import as_single, uniform_directions
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
@@ -61,7 +61,7 @@ def factor(
 ) -> NDArray[np.float64]:
     """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
     s = share(table, kind, wi + wo, lam)
-    jones = boundary.blended(wi[:, None], wo[:, None], index(kind, lam), s)
+    jones = model.blended(wi[:, None], wo[:, None], index(kind, lam), s)
     scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
     return boundary.unpolarised(jones) * scale[:, None] ** 2
 
@@ -72,7 +72,7 @@ def share(
     """What small slope has of the blend, (n, m)."""
     k = wavenumber(lam)
     q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
-    return boundary.small_slope_weight(
+    return model.small_slope_weight(
         HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam)
     )
 
@@ -104,7 +104,7 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
-        tangent = boundary.kirchhoff(pair[0][:, None], pair[1][:, None], own)
+        tangent = model.kirchhoff(pair[0][:, None], pair[1][:, None], own)
         scale = 2 * pair[0][:, 2] * pair[1][:, 2] / (2 * pair[2][:, 3] ** 2)
         expected /= boundary.unpolarised(tangent) * scale[:, None] ** 2
         expected *= probed_reflectance(gl, colours, plain, pair[2])

@@ -8,7 +8,8 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.reference import Sigmas, screen_power
-from mitsuba_diffraction.tables.build.error import FLOOR, GLOSSY_RADIUS, alternate, worst
+from mitsuba_diffraction.tables.build.error import FLOOR, GLOSSY_RADIUS, worst
+from mitsuba_diffraction.tables.build.powers import alternate
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough

@@ -12,8 +12,8 @@ from mitsuba_diffraction.heights.validity import tilt_warning
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
-from mitsuba_diffraction.tables.build import windows as module
-from mitsuba_diffraction.tables.build.windows import Windows, windows_of
+from mitsuba_diffraction.tables.build import screens as module
+from mitsuba_diffraction.tables.build.screens import Screens, screens_of
 from tests.support.scans import PIXEL, SETTINGS, rough
 
 #: Width of a window, µm.
@@ -58,7 +58,7 @@ def test_a_grating_s_order_is_where_its_equation_says_however_many_periods_the_s
 
 
 def test_powers_of_all_orders_add_up_to_1():
-    patches = Windows([sinusoid(10.5, 20.0)], 10.0)
+    patches = Screens([sinusoid(10.5, 20.0)], 10.0)
     ny, nx = patches.tile
     for kappa in (1e-3, 0.3, 12.0, 40.0):
         powers = np.abs(patches.spectrum(0, (nx // 2, ny // 2), double=True).of_phase(kappa)) ** 2
@@ -81,7 +81,7 @@ def test_the_width_of_windows_follows_the_scan_and_the_light(side, light, window
     settings = resolved(TableSettings(light), [field])
     assert settings.width == pytest.approx(window)
     assert settings.lookup_width == pytest.approx(1.7 * window)
-    assert len(windows_of([field], settings)) == count
+    assert len(screens_of([field], settings)) == count
 
 
 def test_a_scan_that_is_not_square_has_windows_along_its_longer_side():
@@ -114,17 +114,17 @@ def test_several_windows_are_levelled_each_and_a_single_one_is_as_it_is():
     n = 480
     bent = 4e-5 * np.square(PIXEL * (np.arange(n) - n / 2))  # slopes to ±0.002
     plain, waved = (HeightField(rough() + a * bent, PIXEL) for a in (0.0, 1.0))
-    straight, other = (Windows([one], WIDTH) for one in (plain, waved))
+    straight, other = (Screens([one], WIDTH) for one in (plain, waved))
     difference = other[0].heights - straight[0].heights
     assert np.ptp(bent[: straight.shape[1]]) > 10 * np.ptp(difference[0])
-    (alone,) = Windows([waved], 48.0)
+    (alone,) = Screens([waved], 48.0)
     np.testing.assert_array_equal(alone.heights, waved.heights)
 
 
 @pytest.mark.parametrize("count", [2, 7])
 def test_the_mean_over_noise_scatters_as_welch_has_it(count):
     length = 64
-    windows = Windows([HeightField(rough(length * (count + 1) // 2), 1.0, cut_out=True)], 64.0)
+    windows = Screens([HeightField(rough(length * (count + 1) // 2), 1.0, cut_out=True)], 64.0)
     rng = np.random.default_rng(2)
     ny, nx = windows.scans[0].shape
     corners = [(top, left) for _, top, left in windows._places]
@@ -149,21 +149,21 @@ def test_windows_of_a_large_grid_are_those_of_one_colour_of_a_chessboard():
 def test_memory_is_of_one_window_for_each_thread(monkeypatch):
     scan = HeightField(rough(240), PIXEL, cut_out=True)
     alive = []
-    made = Windows.__getitem__
+    made = Screens.__getitem__
 
     def counted(self, n):
         result = made(self, n)
         alive.append(result.heights.size)
         return result
 
-    monkeypatch.setattr(Windows, "__getitem__", counted)
+    monkeypatch.setattr(Screens, "__getitem__", counted)
     found = DiffractionTable.build(scan, windows=8.0, **{**SETTINGS, "coherence_width": 65.0})
     assert found.source["windows"]["number"] == 13
     assert max(alive) <= 0.25 * scan.heights.size
 
 
 def test_the_table_is_the_same_with_any_number_of_threads(monkeypatch, scan, table):
-    monkeypatch.setattr(module.Windows, "batches", lambda self: [self])
+    monkeypatch.setattr(module.Screens, "batches", lambda self: [self])
     monkeypatch.setattr(powers_module, "_MOST_THREADS", 1)
     again = DiffractionTable.build(scan, **SETTINGS)
     np.testing.assert_array_equal(again.coefficients, table.coefficients)

@@ -1,4 +1,4 @@
-"""A scan seen through tapered windows, whose powers are averaged.
+"""Phase screens of patches: a tile each, or a scan's tapered windows, whose powers are averaged.
 
 A scan is part of a larger surface: its edges do not meet, so it must not tile the plane. Windows
 W = 4σ wide overlap by half (Welch 1967, IEEE Transactions on Audio and Electroacoustics 15, 70);
@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import scipy
@@ -29,7 +29,7 @@ from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber
 from ...settings import TableSettings
 from ..table import build_error
-from .spectrum import GLOSSY_RADIUS, Spectrum
+from .spectrum import GLOSSY_RADIUS, Spectrum, Tapers, filled
 
 #: Windows that the roughness by spatial frequency is taken from, which is smooth.
 _ROUGHNESS_OF = 16
@@ -48,13 +48,12 @@ class _Axis:
 
     Attributes
     ----------
-    starts, length, tile : first pixels of the windows, their length, and that with zeros.
+    starts, length : first pixels of the windows, and their length.
     taper : of mean square 1; None along an axis without any change of height.
     """
 
     starts: Sequence[int]
     length: int
-    tile: int
     taper: Reals | None
 
     @classmethod
@@ -63,12 +62,7 @@ class _Axis:
         starts, length = window_places(pixels, window)
         turn = 2.0 * np.pi / length * (np.arange(length) - 0.5 * (length - 1))
         taper = 1.0 + sum(c * np.cos(n * turn) for n, c in enumerate(TAPER, 1))
-        return cls(starts, length, 2 * length, taper / np.sqrt(np.mean(taper**2)))
-
-    @classmethod
-    def even(cls, pixels: int) -> _Axis:
-        """The one window of an axis without any change of height, which tiles."""
-        return cls([0], pixels, pixels, None)
+        return cls(starts, length, taper / np.sqrt(np.mean(taper**2)))
 
     def alike(self) -> Reals:
         """Share that the powers of two windows have in common, by how many steps they are apart."""
@@ -84,44 +78,47 @@ class _Axis:
         return shares
 
 
-class Windows(Sequence[HeightField]):
-    """The windows of one or several scans, all of one size.
+class Screens:
+    """The windows of one or several scans, all of one size, or patches that tile the plane.
 
     Parameters
     ----------
-    scans : with pixels of one size.
-    width : of a window, µm.
+    scans : with pixels of one size; patches of one extent.
+    width : of a window, µm; None of patches, each of which is a window without a taper.
     run : what does the work of batches, as `map` does here.
 
     Attributes
     ----------
-    shape, tile : (ny, nx) of a window, and of its screen with zeros around it.
-    tapers : along y and x, of mean square 1; None where heights do not change.
+    windowed : whether they are windows of scans.
+    shape : (ny, nx) of a window, of the largest patch.
+    tapers : along y and x, of mean square 1; None where heights do not change, and of patches.
     variance_factor : variance of the mean over all windows, of one window's.
     """
 
-    def __init__(self, scans: Sequence[HeightField], width: float, run: Run = map) -> None:
-        self.scans, self.run = list(scans), run
+    def __init__(
+        self, scans: Sequence[HeightField], width: float | None = None, run: Run = map
+    ) -> None:
+        self.scans, self.windowed, self.run = list(scans), width is not None, run
         changes = [any(scan.varies_along(axis) for scan in scans) for axis in (0, 1)]
 
         def axis_of(pixels: int, pixel: float, varies: bool) -> _Axis:
-            if not varies:
-                return _Axis.even(pixels)
+            if width is None or not varies:
+                return _Axis([0], pixels, None)
             return _Axis.of(pixels, width / pixel)
 
         axes = [
             [axis_of(*each) for each in zip(scan.shape, self._pixels, changes, strict=True)]
             for scan in self.scans
         ]
-        self._check(axes)
+        if self.windowed:
+            self._check(axes)
         self._places = [
             (scan, top, left)
             for scan, (along_y, along_x) in zip(self.scans, axes, strict=True)
             for top, left in window_corners(along_y.starts, along_x.starts)
         ]
-        self.shape = axes[0][0].length, axes[0][1].length
-        self.tile = axes[0][0].tile, axes[0][1].tile
-        self.tapers = axes[0][0].taper, axes[0][1].taper
+        self.shape = max(y.length for y, _ in axes), max(x.length for _, x in axes)
+        self.tapers: Tapers = axes[0][0].taper, axes[0][1].taper
         self._several = [any(len(each[n].starts) > 1 for each in axes) for n in (0, 1)]
         self.counts = [(len(x.starts), len(y.starts)) for y, x in axes]
         self.variance_factor = sum(_pairs(y, x) for y, x in axes) / len(self) ** 2
@@ -139,14 +136,13 @@ class Windows(Sequence[HeightField]):
     def __len__(self) -> int:
         return len(self._places)
 
-    @overload
-    def __getitem__(self, n: int) -> HeightField: ...
-    @overload
-    def __getitem__(self, n: slice) -> Sequence[HeightField]: ...
-    def __getitem__(self, n: int | slice) -> HeightField | Sequence[HeightField]:
-        if isinstance(n, slice):
-            return [self[m] for m in range(*n.indices(len(self)))]
+    def __iter__(self) -> Iterator[HeightField]:
+        return (self[n] for n in range(len(self)))
+
+    def __getitem__(self, n: int) -> HeightField:
         scan, top, left = self._places[n]
+        if not self.windowed:
+            return scan
         ny, nx = self.shape
         heights = scan.heights[top : top + ny, left : left + nx].copy()
         heights.setflags(write=False)  # so that it is not copied once more
@@ -160,7 +156,20 @@ class Windows(Sequence[HeightField]):
         heights.setflags(write=False)
         return HeightField(heights, scan.pixel_size, name=f"{scan.name}, window {n + 1}")
 
-    def batches(self) -> list[Windows]:
+    @property
+    def tile(self) -> tuple[int, int]:
+        """(ny, nx) of a screen with the zeros around it."""
+        return filled(self.shape, self.tapers)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Period (x, y) of the transforms, µm: of a patch, or of a window with its zeros."""
+        if not self.windowed:
+            return self.scans[0].extent
+        (dx, dy), (ny, nx) = self.scans[0].pixel_size, self.tile
+        return nx * dx, ny * dy
+
+    def batches(self) -> list[Screens]:
         """All windows, some neighbours at a time; the same whoever does their work."""
         ny, nx = self.shape
         most = max(1, int(BATCH_POINTS / (ny * nx)))
@@ -168,7 +177,7 @@ class Windows(Sequence[HeightField]):
         for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
             places = list(row)
             for start in range(0, len(places), most):
-                batch = Windows.__new__(Windows)
+                batch = Screens.__new__(Screens)
                 part = {"scans": [places[0][0]], "_places": places[start : start + most]}
                 vars(batch).update(vars(self), **part)
                 batches.append(batch)
@@ -187,7 +196,7 @@ class Windows(Sequence[HeightField]):
         self, n: int, last: tuple[int, int], double: bool = False, threaded: bool = True
     ) -> Spectrum:
         """Transforms of one window."""
-        return Spectrum(self[n], last, double, self.tapers, self.tile, threaded)
+        return Spectrum(self[n], last, double, self.tapers, threaded)
 
     def standard_error(self, coherence_width: float) -> dict[str, float]:
         """Relative standard error of the mean over windows, from their scatter.
@@ -280,7 +289,7 @@ def _pairs(along_y: _Axis, along_x: _Axis) -> float:
 
 
 def _scatter(
-    last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Windows
+    last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Screens
 ) -> tuple[int, Reals, Reals]:
     """Number of windows, mean and sum of squared deviations of what look-ups find in them."""
     mean, squares = np.zeros(1), np.zeros(1)
@@ -293,36 +302,18 @@ def _scatter(
     return len(windows), mean, squares
 
 
-def windows_of(
-    scans: Sequence[HeightField], settings: TableSettings, run: Run = map
-) -> Sequence[HeightField]:
+def screens_of(scans: Sequence[HeightField], settings: TableSettings, run: Run = map) -> Screens:
     """Return the windows of scans by resolved settings; the patches if they tile the plane.
 
     run : what does their work.
 
     Raises a DiffractionError if their powers cannot be averaged.
     """
-    if settings.taper_width is None or not scans:
-        return scans
+    if settings.taper_width is None:
+        return Screens(scans)
     if settings.coherent or settings.basis == "taylor":
         raise build_error(
             "windows have their powers averaged, which coherence='patch' and basis='taylor' "
             "cannot; use coherence='ensemble' and basis='svd', or leave windows out"
         )
-    return Windows(scans, settings.width, run)
-
-
-def extent_of(patches: Sequence[HeightField]) -> tuple[float, float]:
-    """Period (x, y) of the transforms, µm: of a patch, or of a window with its zeros."""
-    if not isinstance(patches, Windows):
-        return patches[0].extent
-    (dx, dy), (ny, nx) = patches.scans[0].pixel_size, patches.tile
-    return nx * dx, ny * dy
-
-
-def shape_of(patches: Sequence[HeightField]) -> tuple[int, int]:
-    """The largest (ny, nx) of all patches."""
-    if isinstance(patches, Windows):
-        return patches.tile
-    ny, nx = np.max([patch.shape for patch in patches], axis=0)
-    return int(ny), int(nx)
+    return Screens(scans, settings.width, run)

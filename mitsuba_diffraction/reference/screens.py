@@ -1,9 +1,9 @@
-"""Orders of a scan, which is a part of a larger surface and does not tile the plane.
+"""Orders of phase screens, eq. (2) of `model`: of a patch that tiles the plane, or of a scan.
 
-A scan is seen through windows of width W, half overlapping, over which powers are averaged (Welch,
-IEEE Transactions on Audio and Electroacoustics 15, 70, 1967). With the taper t = t(x) t(y),
-t(x) = 1 + 0.47 cos(2πx/W) − 0.16 cos(4πx/W) about the middle of a window, and s = exp(iκh), order 0
-is a_0 = Σ t² s / Σ t². The other orders are DFTs of
+A scan is a part of a larger surface. It is seen through windows of width W, half overlapping, over
+which powers are averaged (Welch, IEEE Transactions on Audio and Electroacoustics 15, 70, 1967).
+With the taper t = t(x) t(y), t(x) = 1 + 0.47 cos(2πx/W) − 0.16 cos(4πx/W) about the middle of a
+window, and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are DFTs of
 
     f = c t (s − a_0)   in the window, 0 around it up to 2W,   Σ_j |a_j|² = 1 over all orders,
 
@@ -18,6 +18,7 @@ under them is as wide as under the light's window σ = W/4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,66 @@ class ScanWindows(NamedTuple):
         return 1.7 * 0.25 * self.width
 
 
-def parts(field: HeightField, windows: ScanWindows | None) -> list[Real]:
+class Sigmas(NamedTuple):
+    """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
+
+    `windows`: a scan's, which does not tile the plane.
+    """
+
+    orders: float
+    zeroth: float
+    windows: ScanWindows | None = None
+
+
+class Orders(NamedTuple):
+    """Orders about q: q_j along x and y, a_j (y, x), and a_0; `tapers`: of a scan's windows."""
+
+    qx: Real
+    qy: Real
+    a: Complex
+    zeroth: complex
+    tapers: Tapers | None = None
+
+
+#: Function of orders about q that returns Σ_j≠0 ⟨|P_j|²⟩ and ⟨|P_0|²⟩ in µm⁴, and the cosine of the
+#: phase between both under one window.
+Sums = Callable[[Orders, tuple[float, float], Sigmas], tuple[float, float, float]]
+
+
+def patch_power(
+    field: HeightField, kappa: float, q: tuple[float, float], sigmas: Sigmas, sums: Sums
+) -> Real:
+    """`sums` at q and κ, (3,); means over the windows of a"""
+    parts, tapers = parts_of(field, sigmas.windows), tapers_of(field, sigmas.windows)
+    screens = (np.exp(1j * kappa * part) for part in parts)
+    orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
+    others, *rest = np.mean([sums(each, q, sigmas) for each in orders], axis=0)
+    return np.array([max(others, 0.0), *rest])  # sharpened powers dip below 0 between strong orders
+
+
+def orders_near(
+    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float],
+    tapers: Tapers | None = None,
+) -> Orders:  # fmt: skip
+    """Orders (2) of a screen (ny, nx), or of a faded one, that the window about q reaches."""
+    screen, zeroth = faded(screen, tapers)
+    qx, waves_x = plane_waves(screen.shape[1], pixel_size[0], q[0], sigma)
+    qy, waves_y = plane_waves(screen.shape[0], pixel_size[1], q[1], sigma)
+    return Orders(qx, qy, waves_y @ screen @ waves_x.T / screen.size, zeroth, tapers)
+
+
+def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
+    """Frequencies q_j of a DFT of n pixels near q, and exp(i q_j x) at the pixels."""
+    # exp(−8.6²/2) = 9e-17: amplitudes farther from q are below the last bit of the sum
+    spacing, reach = 2 * np.pi / (n * pixel), 8.6 / sigma
+    first, last = np.ceil((q - reach) / spacing), np.floor((q + reach) / spacing)
+    # A DFT of an even number of points has −n/2 but not +n/2
+    j = np.arange(max(first, -(n // 2)), min(last, (n - 1) // 2) + 1)
+    turns = np.outer(j, np.arange(n)) % n  # exact integers keep the phase exact
+    return j * spacing, np.exp(2j * np.pi / n * turns)
+
+
+def parts_of(field: HeightField, windows: ScanWindows | None) -> list[Real]:
     """Heights (ny, nx) of the windows, µm; of the whole patch, without, if it tiles the plane."""
     if windows is None:
         return [field.heights]
@@ -61,7 +121,7 @@ def parts(field: HeightField, windows: ScanWindows | None) -> list[Real]:
     return levelled
 
 
-def tapers(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
+def tapers_of(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     """Tapers of the windows; None if the patch tiles the plane."""
     if windows is None:
         return None
@@ -73,10 +133,10 @@ def tapers(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     return found[0], found[1]
 
 
-def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex | None]:
-    """Return f with the zeros around it, and a_0; the screen itself and None without tapers."""
+def faded(screen: Complex, along: Tapers | None) -> tuple[Complex, complex]:
+    """Return f with the zeros around it, and a_0; the screen itself and its mean without tapers."""
     if along is None:
-        return screen, None
+        return screen, complex(screen.mean())
     t_y, t_x = (np.ones(n) if t is None else t for n, t in zip(screen.shape, along, strict=True))
     t = np.outer(t_y, t_x)
     mean = complex(np.sum(t**2 * screen) / np.sum(t**2))
