@@ -44,6 +44,19 @@ def test_values_at_nodes_are_the_tables():
         assert found == pytest.approx(expected, abs=2e-3)
 
 
+def test_light_that_a_coat_traps_has_the_efficiencies_at_its_nodes():
+    table, k = thin_grating(superstrate=1.58), 3
+    tau, rho, w = table.response.nodes(k)
+    big_k, optical = k + cells.sine_squared(rho[2]), table.optical_period
+    # the shortest wavelength of this K comes from beyond the critical angle
+    wavelength = cells.wavelength_of(big_k, w[0], table.wavelengths, optical)
+    at = cells.from_cell(k, cells.A, 1, tau[4], rho[2], wavelength, optical)
+    assert abs(at.y) > 1.0 / 1.58
+    for q in range(k + 1):
+        found = table.efficiency(at.x, at.y, at.wavelength, 1 - q)
+        assert found == pytest.approx(table.bands[k].a[4, 2, 0, 1, q, 0], abs=2e-3)
+
+
 def test_orders_sum_to_no_more_than_one_and_are_the_visible_ones():
     x, y, wavelength = light()
     values, steps = orders_of(GRATING, x, y, wavelength)
