@@ -141,7 +141,7 @@ class Profile:
 
 @dataclass(frozen=True, eq=False)
 class UnitCell:
-    """One period of the heights of a crossed grating.
+    """Heights of one period of a crossed grating.
 
     Raises a DiffractionError if a period is out of its range.
 
