@@ -18,7 +18,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import Figures, check_outputs, elapsed, output_name
+from .report import Figures, elapsed, output_of
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -155,11 +155,10 @@ def run(args: argparse.Namespace) -> Figures:
     """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
-    output = output_name(args.output, Path(f"{args.source.stem}-map.exr"), _files)
+    output = output_of(args, Path(f"{args.source.stem}-map.exr"), _files)
     *exr, png = written = _files(output)
     if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
-    check_outputs(written)
 
     from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
 

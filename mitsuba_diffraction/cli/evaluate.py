@@ -16,7 +16,7 @@ from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import Figures, check_outputs, elapsed, output_name, save_figure
+from .report import Figures, beside, elapsed, output_of, save_figure
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -75,12 +75,8 @@ class _Experiment(NamedTuple):
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure, fit, draw, and return the figures."""
-
-    def files(output: Path) -> list[Path]:
-        return [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
-
-    written = files(output_name(args.output, Path(f"{args.source.stem}-evaluation.png"), files))
-    check_outputs(written)
+    files = beside(".csv", ".npz")
+    written = files(output_of(args, Path(f"{args.source.stem}-evaluation.png"), files))
     experiment = _prepared(args)
     result = _measured(args, experiment)
     report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines

@@ -13,7 +13,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings
 from .options import whole_number
-from .report import Figures, check_outputs, elapsed, output_name
+from .report import Figures, elapsed, output_of
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
 _SUFFIXES = {
@@ -50,12 +50,11 @@ _SUFFIXES = {
 def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)
-    output = output_name(args.output, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
+    output = output_of(args, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
     suffix = output.suffix.lower()
     name = args.format or next(name for name, known in _SUFFIXES.items() if suffix in known)
     if suffix not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
-    check_outputs([output])
 
     from ..scene.load import set_variant
 

@@ -12,7 +12,7 @@ from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in
-from .report import Figures, check_outputs, elapsed, output_name
+from .report import Figures, check_outputs, elapsed, output_of
 
 
 @options.command(
@@ -47,8 +47,7 @@ def run(args: argparse.Namespace) -> Figures:
     def files_in(folder: Path) -> list[Path]:
         return [folder / f"{name}{suffix}" for suffix in (".osl", ".json")]
 
-    folder = output_name(args.output, Path(f"{look}-osl"), files_in)
-    check_outputs(files_in(folder), make_folder=True)
+    folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
 
     from ..osl import export
     from ..scene.load import set_variant

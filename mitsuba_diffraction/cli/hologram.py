@@ -8,7 +8,7 @@ from pathlib import Path
 from . import options
 from .console import mitsuba_warnings
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, output_name
+from .report import Figures, output_of
 
 
 @options.command(
@@ -37,8 +37,8 @@ def run(args: argparse.Namespace) -> Figures:
     from ..scene.load import set_variant
     from ..scene.logo import areas
 
-    folder = output_name(args.output, Path(f"{args.picture.stem}_hologram"), label.files_in)
-    check_outputs(label.files_in(folder), make_folder=True)
+    default = Path(f"{args.picture.stem}_hologram")
+    folder = output_of(args, default, label.files_in, make_folder=True)
     parts = areas(args.picture, colours=args.colours, dots=args.dots, keep_ground=args.keep_ground)
     ny, nx = parts.labels.shape
     values = {}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from . import options
 from .options import number_between
-from .report import Figures, check_outputs, output_name
+from .report import Figures, output_of
 
 
 @options.command(
@@ -45,8 +45,7 @@ def run(args: argparse.Namespace) -> Figures:
     from ..orders.file import load_orders
     from ..orders.listing import list_orders
 
-    output = output_name(args.output, Path(f"{args.table.stem}.csv"))
-    check_outputs([output])
+    output = output_of(args, Path(f"{args.table.stem}.csv"))
     table = load_orders(args.table)
     low, high = table.wavelengths
     steps = max(int(np.ceil((high - low) / args.step - 1e-9)), 1)

@@ -34,7 +34,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import Figures, check_outputs, default_output, elapsed, output_name
+from .report import Figures, check_outputs, default_output, elapsed, output_name, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
 
@@ -135,9 +135,7 @@ def _outputs(args: argparse.Namespace) -> Outputs:
             f"argument -o: expected a name ending in .exr or .png, got {str(args.output)!r}"
         )
     default = Path(default_output(args.name, ".exr").name)
-    output = output_name(args.output, default, partial(_files, args))
-    check_outputs(_files(args, output))
-    return Outputs.called(output)
+    return Outputs.called(output_of(args, default, partial(_files, args)))
 
 
 def _files(args: argparse.Namespace, output: Path) -> list[Path]:

@@ -198,3 +198,21 @@ def output_name(
     if read:
         say(f"this command reads '{read[0]}', so its output is called '{name}'")
     return name
+
+
+def output_of(
+    args: argparse.Namespace, default: Path,
+    files: Callable[[Path], Iterable[Path]] = lambda path: [path], *, make_folder: bool = False,
+) -> Path:  # fmt: skip
+    """Return the output of -o, or its default name, after the checks of all its files.
+
+    Parameters are those of `output_name` and `check_outputs`.
+    """
+    output = output_name(args.output, default, files)
+    check_outputs(files(output), make_folder=make_folder)
+    return output
+
+
+def beside(*suffixes: str) -> Callable[[Path], list[Path]]:
+    """Return the function that lists the files of an output: itself, and some of its name."""
+    return lambda output: [output, *(output.with_suffix(suffix) for suffix in suffixes)]

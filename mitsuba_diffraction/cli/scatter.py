@@ -9,7 +9,7 @@ from typing import Any
 from ..columns import save_numbers
 from . import options
 from .console import Bar
-from .report import Figures, check_outputs, output_name, save_figure
+from .report import Figures, beside, output_of, save_figure
 
 #: He-Ne laser, nm.
 _WAVELENGTH = 632.8
@@ -31,12 +31,7 @@ _WAVELENGTH = 632.8
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the spectrum, and return the figures."""
-
-    def files(output: Path) -> list[Path]:
-        return [output, output.with_suffix(".png")]
-
-    output = output_name(args.output, Path(f"{args.source.stem}-scatter.csv"), files)
-    check_outputs(files(output))
+    output = output_of(args, Path(f"{args.source.stem}-scatter.csv"), beside(".png"))
     import numpy as np
     from matplotlib.figure import Figure
 

@@ -16,7 +16,7 @@ from .brdf_map import surface_options
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, elapsed, output_name, save_figure
+from .report import Figures, elapsed, output_of, save_figure
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
@@ -99,8 +99,7 @@ def run(args: argparse.Namespace) -> Figures:
     first = next(iter(groups))
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     default = Path(f"{first or files[0].stem}-spectrum.csv")
-    output = output_name(args.output, default, partial(_files, args, repeated))
-    check_outputs(_files(args, repeated, output))
+    output = output_of(args, default, partial(_files, args, repeated))
     written = _files(args, False, output)
     errors, angular = _beside(output, "errors"), _beside(output, "iridescence")
     lam = _wavelengths(args)

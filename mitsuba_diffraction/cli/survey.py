@@ -17,7 +17,7 @@ from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .interrupt import INTERRUPTED
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, elapsed, output_name
+from .report import Figures, elapsed, output_of
 from .workers import THREADS, WORKERS, client_of, on_workers, say_files, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
@@ -110,8 +110,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     from ..analysis.survey import files_in
 
     args.files = scan_files(args.files)
-    args.output = output_name(args.output, Path("survey"), files_in)
-    check_outputs(files_in(args.output), make_folder=True)
+    args.output = output_of(args, Path("survey"), files_in, make_folder=True)
 
     from ..analysis.known_wavelengths import known_range
     from ..analysis.media import medium_index

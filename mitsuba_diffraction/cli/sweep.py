@@ -14,7 +14,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import Figures, check_outputs, elapsed, output_name, save_figure
+from .report import Figures, beside, elapsed, output_of, save_figure
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -55,12 +55,8 @@ def run(args: argparse.Namespace) -> Figures:
     from ..analysis.maps.picture import contact_sheet
     from ..thesis.sweeps import sweep
 
-    def files(sheet: Path) -> list[Path]:
-        return [sheet, sheet.with_suffix(".csv")]
-
-    output = output_name(args.output, Path(f"{args.source.stem}-{args.kind}.png"), files)
-    output, numbers = files(output)
-    check_outputs([output, numbers])
+    files = beside(".csv")
+    output, numbers = files(output_of(args, Path(f"{args.source.stem}-{args.kind}.png"), files))
     light, values, gain = LightDirection(args.theta, args.phi), _values(args), gain_of(args)
     patch, settings = options.load_patch(args)
     settings |= options.wavelengths(args)

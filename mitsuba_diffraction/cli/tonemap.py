@@ -8,7 +8,7 @@ from pathlib import Path
 from ..scene.load import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
-from .report import Figures, check_outputs, default_output, output_name
+from .report import Figures, default_output, output_of
 
 
 @options.command(
@@ -23,8 +23,7 @@ from .report import Figures, check_outputs, default_output, output_name
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the PNG, which has no figures."""
-    output = output_name(args.output, default_output(args.picture, ".png"))
-    check_outputs([output])
+    output = output_of(args, default_output(args.picture, ".png"))
     set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one
     write_png(read_exr(args.picture), output, args.exposure, args.view)
     print(f"{output}: view {args.view}, {args.exposure:+g} stops")

@@ -13,7 +13,7 @@ from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
-from .report import Figures, check_outputs, output_name, save_json
+from .report import Figures, output_of, save_json
 
 #: Pixels of the default patch along an axis, pairs of directions, calls in a kernel launch, timed
 #: launches, height scales.
@@ -44,8 +44,7 @@ def run(args: argparse.Namespace) -> Figures:
     """Measure, write and recommend, and return the figures."""
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
-    args.output = output_name(args.output, Path("tradeoff"), _files_in)
-    check_outputs(_files_in(args.output), make_folder=True)
+    args.output = output_of(args, Path("tradeoff"), _files_in, make_folder=True)
     from ..analysis.machine import describe_machine
     from ..analysis.timing import PIXEL
     from ..analysis.tradeoff import (

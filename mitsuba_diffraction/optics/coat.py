@@ -76,6 +76,19 @@ def transmittances(cosine: Number, n: Number) -> Powers:
     return s, p
 
 
+def passage(through: Number, kept: Number) -> Number:
+    """Return T/√N of a face's transmittance T, with N = 1 − ρ (1 − T).
+
+    A mirror of reflectance R under the face sends out T R T/(1 − R (1 − T)). Tables of solved
+    orders under a coat hold what is between both passages, times √N √N: R itself if ρ is R, at
+    most R if ρ is more, and smooth where T falls to 0.
+
+    kept : ρ, below 1: the largest share of light that the grating sends back.
+    """
+    xp = of(through, kept)
+    return through * xp.reciprocal(xp.sqrt(1.0 - kept * (1.0 - through)))
+
+
 def face_transmittance(cosine: Number, n: Number) -> Number:
     """Return the transmittance of a face for unpolarised light, for the cosine outside."""
     s, p = transmittances(cosine, n)

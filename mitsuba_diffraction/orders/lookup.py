@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..optics.arithmetic import Mask, Number, of
-from ..optics.coat import face_transmittance
+from ..optics.coat import face_transmittance, passage
 from ..optics.orders import (
     cell_wavelengths,
     least_c,
@@ -25,6 +25,7 @@ from ..optics.orders import (
 )
 from .grid import OrderGrid
 from .polarised import ODD
+from .rows import kept
 from .table import OrderTable
 
 #: Against division by 0, in single precision.
@@ -89,6 +90,7 @@ class Row(NamedTuple):
     lit : whether the table has light of the wavelength.
     x, y, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
+    entering : `optics.coat.passage` of the rest.
     """
 
     kind: Index
@@ -103,6 +105,7 @@ class Row(NamedTuple):
     y: Number
     wavelength: Number
     face: Number
+    entering: Number
 
 
 class Share(NamedTuple):
@@ -139,6 +142,7 @@ class Lookup:
         self._step = 1e-3 / table.period
         self.coated = coated and table.superstrate != 1.0
         self.index = table.superstrate if self.coated else 1.0
+        self._kept = kept(table) if self.coated else 0.0
         self._least_c = least_c(self.index)
         if not self.coated:  # directions within the medium are given
             self._step /= table.superstrate
@@ -168,8 +172,12 @@ class Lookup:
         if self.sides == 2:
             port = port + xp.where(cos_i < 0.0, channels, 0)
         start = self.memory.start("starts", kind) + (cell * ports + port) * (ports + 1)
-        face = 1.0 - self._through(cos_i) if self.coated else 0.0 * x
-        return Row(kind, cell, start, channel, port, channels, weights, lit, x, y, vacuum, face)
+        face, entering = 0.0 * x, 1.0 + 0.0 * x
+        if self.coated:
+            through = self._through(cos_i)
+            face, entering = 1.0 - through, passage(through, self._kept)
+        cells = kind, cell, start, channel, port, channels, weights
+        return Row(*cells, lit, x, y, vacuum, face, entering)
 
     def ports(self, row: Any) -> Index:
         """Return the number of a row's ports."""
@@ -211,14 +219,20 @@ class Lookup:
         leaves = propagates & (square > 0.0)
         through = self._through(xp.sqrt(xp.maximum(square, 0.0)))
         mirror = xp.where(order == 0.0, row.face, 0.0)
-        # of light that enters, and by reciprocity of light that leaves, no order has more than all:
-        # between corners of total reflection and others, a mirror would have hundreds of times that
-        most = through * xp.reciprocal(xp.maximum(through, xp.maximum(1.0 - row.face, 1e-6)))
         shares = (
-            xp.minimum(self.at_port(row, port, 0, propagates) * through, most),
+            self.at_port(row, port, 0, propagates) * passage(through, self._kept),
             self.at_port(row, port, 1, propagates),
         )
         return Share(*(xp.where(leaves, self._outside(row, s, mirror), 0.0) for s in shares))
+
+    def repeated(self, row: Row, order: Number, active: Mask = True) -> Number:
+        """Return an order's efficiency within the coat, with all reflections between its face."""
+        xp = of(row.wavelength)
+        port, propagates = self.port(row, order, active)
+        square = order_direction(row.x, row.y, order, self._step * row.wavelength).square
+        ends = 1.0 - row.face, self._through(xp.sqrt(xp.maximum(square, 0.0)))
+        came, left = (1.0 - self._kept * (1.0 - end) for end in ends)
+        return self.at_port(row, port, 0, propagates) * xp.reciprocal(xp.sqrt(came * left))
 
     def total(self, row: Row, active: Mask = True) -> Number:
         """Return the sum of all orders' chances, rounded up; meaningless where inactive."""
@@ -268,7 +282,7 @@ class Lookup:
     @staticmethod
     def _outside(row: Row, within: Number, mirror: Number) -> Number:
         """Return light that enters through the coat's face, and adds to the face's light."""
-        return of(within).fma(1.0 - row.face, within, mirror)
+        return of(within).fma(row.entering, within, mirror)
 
     def _through(self, cosine: Number) -> Number:
         return face_transmittance(cosine, self.index + 0.0 * cosine)

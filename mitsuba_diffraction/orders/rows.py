@@ -24,7 +24,7 @@ from .table import OrderTable
 #: Cells along τ, ρ and w, if the corners take no more memory than this. Linear interpolation in as
 #: many cells is off by less than 0.1 % of the light on gratings as deep as λ/4. Under a coat the
 #: critical angles of orders lie along w.
-CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 16), 96 << 20
+CELLS, CELLS_UNDER_COAT, MOST_BYTES = Counts(32, 24, 6), Counts(20, 14, 12), 96 << 20
 #: Nodes along an axis above which a table, as of gold, has more cells there, and cells over nodes.
 COMMON, SHARES = Counts(36, 24, 8), (1.25, 1.25, 2.0)
 #: Share of the light that a totally reflecting face sends back: trapped light would never end.
@@ -38,8 +38,9 @@ class Rows(NamedTuple):
 
     Attributes
     ----------
-    within : of the grating, with all reflections between the coat's face and the grating.
-    through : times the face's transmittance towards q.
+    within : of the grating; under a coat with all reflections between its face and the grating,
+        times √N of the face for light of j and of q (`optics.coat.passage`).
+    through : under a coat the same times T/√N towards q.
     """
 
     within: Array
@@ -84,10 +85,23 @@ def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) ->
     through = leaving_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
+    most = kept(table)
     back = _TRAPPED * (1.0 - through)
     repeated = np.eye(len(channels)) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
-    return Rows(within, within * np.maximum(through, _MIN_TRANSMITTANCE)[..., None, :])
+    root = np.sqrt(1.0 - most * (1.0 - through))
+    within *= root[..., :, None] * root[..., None, :]
+    leaving = np.maximum(through, _MIN_TRANSMITTANCE) / root
+    return Rows(within, within * leaving[..., None, :])
+
+
+def kept(table: OrderTable) -> float:
+    """Return ρ of `optics.coat.passage`: the largest sum of a grating's efficiencies, below 1."""
+    table, most = on_cells(table), 0.0
+    for of in kinds_of(table):
+        values = clamped(table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64))
+        most = max(most, float(values.sum(axis=-1).max()))
+    return min(most, _TRAPPED)
 
 
 def resampled(table: OrderTable, k: int, values: NDArray[Any], counts: Counts) -> Array:

@@ -12,6 +12,7 @@ from ..optics.coat import (
     coated_reflectance,
     cosine_within,
     face_transmittance,
+    passage,
     refracted,
 )
 from ..optics.fresnel import reflectance
@@ -44,7 +45,7 @@ def order_formulas() -> str:
     program = _program()
     for formula, count in (
         (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 5), (wavelength_coordinate, 4),
-        (face_transmittance, 2), (order_direction, 4),
+        (face_transmittance, 2), (passage, 2), (order_direction, 4),
     ):  # fmt: skip
         program.add(formula, *["float"] * count)
     return program.text

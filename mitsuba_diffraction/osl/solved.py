@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..optics.orders import least_c
 from ..orders import OrderTable, cells
 from ..orders.cells import Counts
-from ..orders.rows import constant, kinds_of, leaving_transmittance, middles, rows
+from ..orders.rows import constant, kept, kinds_of, leaving_transmittance, middles, rows
 from .spectrum import NODES, drawn_spectrum
 
 #: Cells along τ, ρ and w of a table in air, and under a clear layer; fewer in large tables.
@@ -97,6 +97,7 @@ def order_constants(table: OrderTable, texture: OrderTexture) -> dict[str, float
         "PERIOD": table.period,
         "OPTICAL_PERIOD": 1e3 * table.optical_period,
         "INDEX": table.superstrate,
+        "KEPT": kept(table),
         "LEAST_C": least_c(table.superstrate),
         "LOW": low,
         "HIGH": high,

@@ -23,8 +23,8 @@ _DIRECTIONS, _VALUES = 3, 256
 _SAMPLES = 1 << 13, 1 << 17
 #: Angle (degrees) beyond which half of the directions are; shares by which R + T may exceed 1, in
 #: light that scales of energy are tabulated for (nm) and beyond, where the scale is that of the
-#: last one; and the standard errors of its mean that are added.
-_GRAZING, _EXCESS, _ERRORS = 85.0, (0.005, 0.01), 5.0
+#: last one (docs/energy.md); and the standard errors of its mean that are added.
+_GRAZING, _EXCESS, _ERRORS = 85.0, (0.005, 0.07), 5.0
 _TABULATED = 360.0, 830.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))

@@ -48,8 +48,9 @@ def test_white_mirror_under_a_layer_is_white(tmp_path):
 def test_lossless_grating_is_white(tmp_path):
     """Light in equal parts in all orders, also where the lobes are wide."""
     equal = table_of(lambda n: np.full((n, n), 1.0 / n))
-    seen = plane_seen(exported(equal, tmp_path), [20, 50])
-    assert seen.mean == pytest.approx(1.0, abs=0.02)
+    seen = plane_seen(exported(equal, tmp_path), [20, 50], samples=1000)
+    assert np.all(np.abs(seen.mean - 1.0) < 4.0 * seen.error + 5e-3), seen.mean
+    assert seen.error.max() < 6e-3
 
 
 def test_order_follows_the_grating_equation(tmp_path):

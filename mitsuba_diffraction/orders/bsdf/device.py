@@ -89,7 +89,7 @@ def _drawn_at_a_corner(lookup: Lookup, row: Any, sample: Float) -> Drawn:
     target, mirrored = sample * lookup.total(row), mi.Mask(False)
     if lookup.coated:  # the face's mirror direction comes first
         mirrored = target < row.face * RAISED
-        target = (target - row.face * RAISED) * dr.rcp(dr.maximum(1.0 - row.face, _MIN_DIVISOR))
+        target = (target - row.face * RAISED) * dr.rcp(dr.maximum(row.entering, _MIN_DIVISOR))
     node, rest, found, before = mi.UInt32(0), mi.Float(0.0), mi.Mask(False), mi.Float(0.0)
     corners = zip(lookup.nodes(row), row.weights, lookup.totals(row), strict=True)
     for corner, weight, total in corners:

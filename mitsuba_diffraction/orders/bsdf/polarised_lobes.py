@@ -24,6 +24,7 @@ from ...plugin.boundary import mueller, turn, turned
 from ...plugin.directions import Pair
 from ...plugin.types import Context, Float, Mask, Spectrum, Vector3f
 from ..efficiency import AnyLookup
+from ..lookup import Lookup
 from .lobes import Lit, SpectralLobes
 
 _MIN_DIVISOR, _MIN_POWER = 1e-12, 1e-30
@@ -46,9 +47,8 @@ def _wave(lookup: AnyLookup, row: Any, order: Any, y: Float, active: Mask) -> Wa
     """Return the light of an order; y : direction cosine of the light along the grooves."""
     elements = lookup.elements(row, order, y, active)
     share = mi.Float(1.0)
-    if lookup.coated:
-        port, active = lookup.port(row, order, active & row.lit)
-        within = lookup.at_port(row, port, 0, active)
+    if isinstance(lookup, Lookup) and lookup.coated:
+        within = lookup.repeated(row, order, active & row.lit)
         share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
     return Wave(_nearest(elements), share)
 

@@ -12,6 +12,7 @@ from ...optics.coat import (
     coated_reflectance,
     cosine_within,
     face_transmittance,
+    passage,
     refracted,
 )
 from ...optics.colour import encoded_colour
@@ -40,7 +41,7 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
         order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
         order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4, horizon_correction: 3,
     },
-    "FACE": {face_transmittance: 2, order_direction: 4},
+    "FACE": {face_transmittance: 2, passage: 2, order_direction: 4},
     "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},

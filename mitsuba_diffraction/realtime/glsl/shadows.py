@@ -6,8 +6,7 @@ shifted by a part of a texel, so that the edges of shadows average over frames.
 
 Of a closed surface, only the triangles that face away from the light are drawn. They hide all that
 the others hide, and no lit point lies on them: drawing costs half as much, and lit points cannot be
-in the shadow of their own triangles. A plane with the light and all of the scene on one side is not
-drawn, since it casts no shadow.
+in the shadow of their own triangles.
 """
 
 from __future__ import annotations
@@ -59,29 +58,18 @@ class Solid:
     high: Array  # (3,) highest corner
     # 1: closed, and triangles are counter-clockwise from outside; −1: clockwise; 0: open
     winding: int
-    # (4,) normal and offset of the plane that the surface lies in, if all of the scene is on the
-    # side of the normal; None for other surfaces
-    plane: Array | None
     bias: float  # depth bias, texels
 
     @classmethod
-    def analyse(cls, triangles: Array, normals: Array, corners: Array) -> Solid:
-        """Analyse triangles (n, 3, 3) of a scene.
-
-        normals : (n, 3, 3) shading normals.
-        corners : (m, 3) points whose convex hull contains the scene.
-        """
+    def analyse(cls, triangles: Array, normals: Array) -> Solid:
+        """Analyse triangles (n, 3, 3) with shading normals (n, 3, 3)."""
         low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         bias = float(np.clip(_BENT * _bend(triangles, normals), *_BIAS))
-        return cls(low, high, _winding(triangles), _plane(triangles, corners), bias)
+        return cls(low, high, _winding(triangles), bias)
 
     def encloses(self, place: Array) -> bool:
         """Return whether a point lies in the surface's box."""
         return bool(np.all((place >= self.low) & (place <= self.high)))
-
-    def hides_nothing(self, light: Lamp) -> bool:
-        """Return whether the scene and the light lie on one side of the surface."""
-        return self.plane is not None and float(self.plane @ light.place) > 0.0
 
 
 class Casters:
@@ -103,11 +91,11 @@ class Casters:
         self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
         self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
         vertices = [s.vertices[:, :6].reshape(-1, 3, 6).astype(np.float64) for s in surfaces]
-        triangles = [v[..., :3] for v in vertices]
         self._shapes = [int(s.shape.ptr) for s in surfaces]
-        hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
-        self.solids = [Solid.analyse(v[..., :3], v[..., 3:], hulls) for v in vertices]
-        self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)  # corners of a box around all
+        self.solids = [Solid.analyse(v[..., :3], v[..., 3:]) for v in vertices]
+        # corners of a box around all
+        self.low = np.min([solid.low for solid in self.solids], axis=0)
+        self.high = np.max([solid.high for solid in self.solids], axis=0)
         self.corners = box_corners(self.low, self.high)
 
     def draw(self, matrix: Array) -> None:
@@ -172,9 +160,7 @@ def outline(places: Array) -> Array:
 
 
 def _needed(solid: Solid, light: Lamp, from_outside: bool) -> str:
-    """Return the triangles that a map needs: "all", those facing "away" from the light, "none"."""
-    if solid.hides_nothing(light):
-        return "none"
+    """Return the triangles that a map needs: "all", or those facing "away" from the light."""
     inside = light.place[3] > 0.0 and solid.encloses(light.place[:3])
     return "away" if from_outside and not inside else "all"
 
@@ -201,22 +187,6 @@ def _winding(triangles: Array) -> int:
         return 0
     a, b, c = (triangles - triangles.mean(axis=(0, 1))).transpose(1, 0, 2)
     return int(np.sign(np.einsum("ni,ni->", a, np.cross(b, c))))
-
-
-def _plane(triangles: Array, corners: Array) -> Array | None:
-    """Return `Solid.plane`."""
-    places = triangles.reshape(-1, 3)
-    sides = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    largest = sides[np.linalg.norm(sides, axis=1).argmax()]
-    normal = largest / max(float(np.linalg.norm(largest)), 1e-300)
-    room = _SAME * float(np.ptp(corners, axis=0).max())
-    if np.abs((places - places[0]) @ normal).max() > room:
-        return None
-    above = (corners - places[0]) @ normal
-    for sign in (1.0, -1.0):
-        if (sign * above).min() >= -room:
-            return sign * np.append(normal, -normal @ places[0])
-    return None
 
 
 class ShadowMap:

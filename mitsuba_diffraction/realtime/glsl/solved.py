@@ -15,7 +15,7 @@ from ...optics.orders import least_c
 from ...orders import OrderTable
 from ...orders.cells import Counts
 from ...orders.daylight import ENDS, daylight_weights
-from ...orders.rows import kinds_of, leaving_transmittance, rows
+from ...orders.rows import kept, kinds_of, leaving_transmittance, rows
 from ...plugin.description import Surface
 from .lobes import AZIMUTHS, RINGS, pack_lobes
 from .texels import PAGE, Packed, Texture
@@ -24,10 +24,8 @@ Array = NDArray[np.float64]
 
 #: Cells of a tile along τ, ρ and w, in air and under a layer, whose critical angles lie along w;
 #: fewer where a table would need more memory than this.
-CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(16, 12, 15), 48 << 20
+CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(20, 14, 12), 48 << 20
 
-#: Efficiency within a layer at most: where more light is trapped, the face lets nearly none out.
-MOST_WITHIN = 8.0
 
 # lobes: directions and wavelengths of the mean efficiencies
 _DIRECTIONS, _WAVELENGTHS = 32, 24
@@ -101,8 +99,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
     for of in kinds_of(table):
         values = rows(table, of, counts)
         whole = values.through.sum(axis=-1, keepdims=True)
-        within = np.minimum(values.within, MOST_WITHIN)
-        row = np.concatenate([within, whole], axis=-1).astype(np.float16)
+        row = np.concatenate([values.within, whole], axis=-1).astype(np.float16)
         groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
         # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
         row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
@@ -121,6 +118,7 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
             "last_band": float(table.last_band),
             "period": table.period,
             "superstrate": table.superstrate,
+            "kept": kept(table),
             "least_c": least_c(table.superstrate),
             "solved_range": (1e-3 * low, 1e-3 * high),
             "solved_reach": tuple(1e-3 * end for end in table.reach),

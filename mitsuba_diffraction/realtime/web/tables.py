@@ -20,7 +20,7 @@ from ...tables.powers import power_series, powers_at
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
-from ..glsl.solved import MOST_WITHIN, cells_within, pack_orders
+from ..glsl.solved import cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, converted, packed_array
 
@@ -61,7 +61,11 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
         if orders is None
         else _solved(method, orders, surface.described.sigma, digits)
     )
-    sections = {t.name: packed_array(as_columns(t.data, width)) for t in packed.textures}
+    sections = {}
+    for texture in packed.textures:  # rows are series, or texels: whichever takes fewer bytes
+        widths = width, texture.data.shape[2]
+        layouts = [packed_array(as_columns(texture.data, columns)) for columns in widths]
+        sections[texture.name] = min(layouts, key=lambda layout: len(layout.data))
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 
@@ -110,7 +114,7 @@ def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.f
     of_bands = [of for of in kinds_of(table) if of.kind == cells.A]
     for of in of_bands[:: max(1, len(of_bands) // _BANDS)]:
         fine = rows(table, of, Counts(*(2 * n for n in counts)))
-        nodes = np.minimum(fine.within, MOST_WITHIN)[::2, ::2, ::2]
+        nodes = fine.within[::2, ::2, ::2]
         lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
         exact, face = (values[1::2, 1::2, 1::2] for values in fine)
         rho, w = ((np.arange(n) + 0.5) / n for n in (counts.rho, counts.w))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError, check_choice
+from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...realtime.glsl.packing import area_factor
 from ...realtime.glsl.texels import Packed, as_half, listed, texels
@@ -16,7 +16,6 @@ from ...tables.source import cached_table
 from ...tables.table import DiffractionTable
 from ..methods import FullSpectrum, OrdersOnly, Repeated, make
 from ..methods.method import SPECULAR_WAVELENGTH, Method
-from . import FILES
 
 #: Values of the thesis: terms of the series, bins read along each axis, wavelength step in nm.
 TERMS, TAPS, STEP = 37, 3, 5.0
@@ -32,7 +31,6 @@ def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> M
     Raises a DiffractionError if the series is too short for the patch, or the method needs a period
     and the patch has none.
     """
-    check_choice("method", name, tuple(FILES))
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.window_width, coherence=table.coherence,

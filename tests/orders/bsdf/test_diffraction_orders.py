@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, reference
+from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
 from tests.support.directions import polar
 from tests.support.furnace import furnace_in
@@ -51,6 +52,16 @@ def test_a_perfect_mirror_under_a_layer_reflects_all_light(some_variant):
     directions = np.array([polar(theta, 20.0) for theta in (0.0, 60.0, 80.0, 83.0, 85.0, 88.0)])
     mean, error = furnace_in(load(table), directions, 1)
     assert np.all(np.abs(mean - 1.0) < 4.0 * error + 5e-3), mean
+
+
+@pytest.mark.parametrize("reflectance", [0.3, 0.9])
+def test_a_mirror_under_a_layer_reflects_what_both_faces_do(some_variant, reflectance):
+    table = OrderTable.mirror(PERIOD, reflectance, (360.0, 830.0), superstrate=1.5)
+    angles = np.array([0.0, 45.0, 60.0, 75.0, 80.0, 85.0])
+    mean, error = furnace_in(load(table), np.array([polar(theta, 20.0) for theta in angles]), 1)
+    passed = face_transmittance(np.cos(np.radians(angles)), np.float64(1.5))
+    both = 1.0 - passed + passed**2 * reflectance / (1.0 - (1.0 - passed) * reflectance)
+    assert np.all(np.abs(mean - both) < 4.0 * error + 5e-3), mean / both
 
 
 @pytest.mark.parametrize(

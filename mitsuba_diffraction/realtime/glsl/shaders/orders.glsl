@@ -7,6 +7,7 @@ uniform int order_columns;       // tiles in a row of the texture
 uniform float last_band;
 uniform float period;            // µm
 uniform float superstrate;       // index of the clear layer over the grooves
+uniform float kept;              // most that the grooves send back, see optics/coat.py
 uniform float least_c;           // least c of light from outside the layer
 uniform vec2 solved_range;       // shortest and longest wavelength of the table, µm
 uniform vec2 solved_reach;       // ends of the light that it reflects, µm
@@ -15,6 +16,7 @@ uniform vec2 solved_reach;       // ends of the light that it reflects, µm
 vec2 row_incident;               // tangential part of ωi in the patch's frame
 float row_wavelength;            // in vacuum, µm
 float row_face;                  // share of the light that the layer's face reflects
+float row_entering;              // `passage` of the rest
 float row_channel, row_channels;
 int row_tile;
 vec3 row_place;                  // τ, ρ and w
@@ -25,8 +27,11 @@ void begin_orders(vec3 wi, vec2 rotation)
 {
     row_incident = in_patch(wi, rotation);
     row_face = 0.0;
+    row_entering = 1.0;
 #ifdef FACE
-    row_face = 1.0 - face_transmittance(wi.z, superstrate);
+    float through = face_transmittance(wi.z, superstrate);
+    row_face = 1.0 - through;
+    row_entering = passage(through, kept);
 #endif
 }
 
@@ -75,10 +80,8 @@ float efficiency_of(float order)
     float out_x, square;
     order_direction(row_incident.x, row_incident.y, order, row_wavelength / period, out_x, square);
     if (square <= 0.0) return 0.0;
-    float through = face_transmittance(sqrt(square), superstrate), entering = 1.0 - row_face;
-    // no order has more than all light that enters, or leaves (orders/lookup.py)
-    float light = min(entering * through * efficiency_towards(q), min(entering, through));
-    return light + (order == 0.0 ? row_face : 0.0);
+    float leaving = passage(face_transmittance(sqrt(square), superstrate), kept);
+    return row_entering * leaving * efficiency_towards(q) + (order == 0.0 ? row_face : 0.0);
 #else
     return efficiency_towards(q);
 #endif
@@ -91,7 +94,7 @@ vec3 albedo(vec3 w, vec2 rotation)
     vec3 sums;
     for (int n = 0; n < 3; ++n) {
         find_row(2.0 * PI / channel_wavenumbers[n]);
-        sums[n] = mix(efficiency_towards(row_channels), 1.0, row_face);
+        sums[n] = row_entering * efficiency_towards(row_channels) + row_face;
     }
     return min(sums, 1.0);
 }
