@@ -25,8 +25,8 @@ setup: .venv/packages .venv/libraries  ## create .venv with the package, and an 
 extras: .venv/extras  ## install what pictures may need: meshes of glTF and USD, films as MP4, denoising
 	@:
 
-.venv/extras: .venv/packages
-	@.ci/setup extras
+.venv/extras .venv/validation: .venv/packages
+	@.ci/setup $(notdir $@)
 
 demo: setup  ## tabulate a snake scale, render three scenes with it, the snake in two lights
 	@mkdir -p out
@@ -115,7 +115,7 @@ report: setup  ## collect the figures that README claims, with their commands: o
 release: setup  ## check and build a release into out/release; TESTS=1 tests the wheel, too
 	@.ci/release
 
-validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
+validation: setup .venv/validation  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 # KAIST=FOLDER compares a clone of github.com/KAIST-VCLAB/color-brdfs-with-wave-optics too

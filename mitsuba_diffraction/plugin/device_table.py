@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..tables.layout import BinRecord
+from ..tables.powers import as_powers
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
@@ -46,6 +47,8 @@ class DeviceTable:
     """A table's coefficients in the memory of the current variant, and how to look them up."""
 
     def __init__(self, table: DiffractionTable) -> None:
+        if not table.grid.coherent:
+            table = as_powers(table)
         self.expansion, self.grid = table.expansion, table.grid
         self.spacing, self.limited = table.spacing, table.limited
         self.radii, self.q_limit = table.frequency_limit, table.q_limit
@@ -107,25 +110,15 @@ class DeviceTable:
             lengths = [dr.rsqrt(maximum(each, 1e-20)) for each in (others, zeroth)]
             cosine = [both * lengths[0] * lengths[1]]
         else:
-            if self.record.components == 2:
-                nothing = [mi.Float(0.0)]
-                total = self._over_taps(first, across, along, nothing, self._squares, weights)
-                others = total[0] * self._inverse_scale**2
-            else:
-                (terms,) = self._components(self._summed_packets(first, across, along))
-                others = inner(terms, weights) * self._inverse_scale
-                others = maximum(others, 0.0)  # a cut series may dip below zero by its error
-            zeroth, cosine = lobe * self._order_0_power(order_0), []
+            (terms,) = self._components(self._summed_packets(first, across, along))
+            others = inner(terms, weights) * self._inverse_scale
+            others = maximum(others, 0.0)  # a cut series may dip below zero by its error
+            zeroth, cosine = lobe * maximum(order_0[0], 0.0), []
         outside = dr.nan
         if self.limited:
             outside = dr.select(within(qx, qy, (self.q_limit, self.q_limit)), 0.0, dr.nan)
             outside = dr.select(kappa <= expansion.kappa_max * (1 + 1e-6), outside, dr.nan)
         return [dr.select(inside, others, outside), dr.select(inside, zeroth, 0.0), *cosine]
-
-    def _summed_packets(self, first: Index, across: Gaussians, along: Gaussians) -> list[Packet]:
-        """Return the terms of all taps, summed with their weights."""
-        nothing = zero_packets(self.record.numbers)
-        return self._over_taps(first, across, along, nothing, lambda packets, _: packets, [])
 
     def first_bin(self, qx: Float, qy: Float, kappa: Float) -> Index:
         """Index of the first bin that `window_sum` reads (for benchmarks)."""
@@ -136,12 +129,6 @@ class DeviceTable:
         """Numbers of the bin with this index, in packets."""
         return read_packets(self._coefficients, index, self.record.numbers)
 
-    def _order_0_power(self, order_0: list[Float]) -> Float:
-        """Return |a_0|² from the series' values."""
-        if self.record.components == 2:
-            return dr.square(order_0[0]) + dr.square(order_0[1])
-        return maximum(order_0[0], 0.0)
-
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
         """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
         grid = self.grid
@@ -149,31 +136,23 @@ class DeviceTable:
         row, along = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
         return grid.index(interval, row, column), across, along
 
-    def _over_taps(
-        self,
-        first: Index,
-        across: Gaussians,
-        along: Gaussians,
-        nothing: list[Packet],
-        of: Callable[[list[Packet], list[Float]], list[Packet]],
-        inputs: list[Float],
-    ) -> list[Packet]:
-        """Add to `nothing` the taps' Gaussian weights times of(packets, inputs)."""
+    def _summed_packets(self, first: Index, across: Gaussians, along: Gaussians) -> list[Packet]:
+        """Return the terms of all taps, summed with their Gaussian weights."""
 
         def add_row(
-            start: Index, columns: range, weight: Float, inputs: Any, total: list[Packet]
+            start: Index, columns: range, weight: Float, weights_x: Any, total: list[Packet]
         ) -> list[Packet]:
-            weights_x, others = inputs
             row: list[Packet] = []
             for i in columns:
-                values = of(self.read(start + i), others)
+                values = self.read(start + i)
                 if not row:
                     row = [v * weights_x[i] for v in values]
                 else:
                     row = [dr.fma(v, weights_x[i], t) for v, t in zip(values, row, strict=True)]
             return [dr.fma(p, weight, t) for p, t in zip(row, total, strict=True)]
 
-        return self._over_rows(first, along, add_row, (across.all(), inputs), nothing)
+        nothing = zero_packets(self.record.numbers)
+        return self._over_rows(first, along, add_row, across.all(), nothing)
 
     def _over_windows(
         self,
@@ -234,11 +213,6 @@ class DeviceTable:
     def _components(self, packets: list[Packet]) -> list[Sequence[Float]]:
         """The terms of each component, from packets that hold one component after the other."""
         return self.record.split([x for packet in packets for x in packet])
-
-    def _squares(self, packets: list[Packet], weights: list[Float]) -> list[Float]:
-        """|a_j|² of one bin."""
-        real, imaginary = (inner(part, weights) for part in self._components(packets))
-        return [dr.fma(real, real, dr.square(imaginary))]
 
 
 @dataclass

@@ -18,13 +18,12 @@ order_mixture      orders for integrals: strong ones, and a density of all other
 colour             the sum over daylight's spectrum
 fields             checks of single values that are read from files
 TableSource        the table of any source of heights, built once; `providing` (in `source`)
-store              the cache, of whatever packs itself into a record
+store              the cache, of whatever can be packed into a record
 """
 
 from __future__ import annotations
 
 from .build.build import build_table
-from .document import from_record, to_record
 from .exr import load_table, save_table
 from .lookup import brdf, window_sum
 from .source import TableSource
@@ -36,7 +35,5 @@ __all__ = ["DiffractionTable", "TableSource"]
 DiffractionTable.build = staticmethod(build_table)
 DiffractionTable.load = staticmethod(load_table)
 DiffractionTable.save = save_table
-DiffractionTable.to_record = to_record
-DiffractionTable.from_record = staticmethod(from_record)
 DiffractionTable.window_sum = window_sum
 DiffractionTable.brdf = brdf

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,10 +61,25 @@ def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     return np.asarray(np.sum(parts**2, axis=-1))
 
 
+def as_powers(table: DiffractionTable) -> DiffractionTable:
+    """The table whose bins are powers |a_j(κ)|² of an incoherent table, whatever it stores."""
+    if table.expansion.kind == "power":
+        return table
+    new = power_expansion(table)
+    coefficients = fitted(new, lambda kappa: powers_at(table, kappa))
+    order_0 = fitted(
+        new, lambda kappa: order_0_power(table, kappa) - new.order_0_offset(new.interval(kappa))
+    )
+    return replace(
+        table, coefficients=coefficients[:, :, :, None], order_0=order_0[:, None], scale=1.0,
+        expansion=new,
+    )  # fmt: skip
+
+
 def power_series(
     table: DiffractionTable,
 ) -> tuple[NDArray[np.floating], NDArray[np.float64], float, Expansion]:
-    """The powers |a_j(κ)|² of an incoherent table, whatever it stores.
+    """The series of `as_powers`, of a table with all orders.
 
     Returns
     -------
@@ -72,12 +88,6 @@ def power_series(
     scale, expansion
     """
     table.require_whole("a list of powers is made of")
-    old = table.expansion
-    if old.kind == "power":
-        return table.coefficients[:, :, :, 0], table.order_0[:, 0], table.scale, old
-    new = power_expansion(table)
-    coefficients = fitted(new, lambda kappa: powers_at(table, kappa))
-    order_0 = fitted(
-        new, lambda kappa: order_0_power(table, kappa) - new.order_0_offset(new.interval(kappa))
-    )
-    return coefficients, order_0, 1.0, new
+    powers = as_powers(table)
+    coefficients, order_0 = powers.coefficients[:, :, :, 0], powers.order_0[:, 0]
+    return coefficients, order_0, powers.scale, powers.expansion

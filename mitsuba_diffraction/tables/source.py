@@ -22,7 +22,7 @@ from ..progress import Progress, silent
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from .build.build import build_with
 from .build.checks import warnings_of
-from .document import named
+from .document import from_record, named, to_record
 from .store import cached, key_of, loaded_once
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -150,9 +150,7 @@ def cached_table(
     names : of the patches. The file in the cache has none: patches of other names may be equal.
     """
     key = table_key(digest, settings)
-    # the package assigns the methods of `Recorded`
-    table = cached("table", key, _tables, build, DiffractionTable)  # type: ignore[type-var]
-    return named(table, names)
+    return named(cached("table", key, _tables, build, to_record, from_record), names)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

@@ -1,8 +1,8 @@
 """Cache of what takes long to compute, in files named by a digest of their inputs.
 
 A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
-lie in memory. A damaged file, or one under another's name, is rebuilt. What is stored packs itself:
-this module knows no class (`Recorded`).
+lie in memory. A damaged file, or one under another's name, is rebuilt. Whoever stores something
+packs it into a `Record`: this module knows no class.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import platformdirs
@@ -42,7 +42,6 @@ _MAGIC = "mitsuba_diffraction cache"
 _HEAD, _ALIGNMENT = 256, 64
 
 T = TypeVar("T")
-R = TypeVar("R", bound="Recorded")
 _making: dict[tuple[str, str], threading.Lock] = {}
 
 
@@ -72,25 +71,19 @@ class Record:
     arrays: Sequence[NDArray[Any]]
 
 
-class Recorded(Protocol):
-    """Content of the cache: an object that packs itself into a record."""
-
-    def to_record(self) -> Record:
-        """Return the record of this object."""
-
-    @classmethod
-    def from_record(cls, record: Record) -> Self:
-        """Return the object of a record; raises a ValueError for what does not fit."""
-
-
 def key_of(*parts: Any) -> str:
     """Return a key: the SHA-256 of its parts as JSON."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def cached(
-    kind: str, key: str, memory: MutableMapping[str, R], make: Callable[[], R], stored: type[R]
-) -> R:
+    kind: str,
+    key: str,
+    memory: MutableMapping[str, T],
+    make: Callable[[], T],
+    pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:
     """Return the value under a key, from memory or from disk; otherwise make and store it.
 
     Of several threads and processes that want one thing at a time, one makes it and the others
@@ -102,29 +95,32 @@ def cached(
     key : of all that it is made of, see `key_of`.
     memory : where this process keeps it.
     make : makes it.
-    stored : its class.
+    pack, unpack : from it to its record, and back; a ValueError is for what does not fit.
     """
     value = memory.get(key)
     if value is None:
         with _making.setdefault((kind, key), threading.Lock()):
             value = memory.get(key)
             if value is None:
-                value = memory[key] = _from_disk(kind, key, make, stored)
+                value = memory[key] = _from_disk(kind, key, make, pack, unpack)
     return value
 
 
-def _from_disk(kind: str, key: str, make: Callable[[], R], stored: type[R]) -> R:
+def _from_disk(
+    kind: str, key: str, make: Callable[[], T], pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:  # fmt: skip
     folder = cache_folder()
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    value = _found(path, title, stored)
+    value = _found(path, title, unpack)
     if value is None:
         with _locked(path):
-            value = _found(path, title, stored)  # made by whoever was waited for
+            value = _found(path, title, unpack)  # made by whoever was waited for
             if value is None:
                 value = make()
-                _keep(path, title, value.to_record())
+                _keep(path, title, pack(value))
     return value
 
 
@@ -154,10 +150,10 @@ def _locked(path: Path) -> Iterator[None]:
             lock.release()
 
 
-def _found(path: Path, title: str, stored: type[R]) -> R | None:
+def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
-        value = stored.from_record(read_record(path, title))
+        value = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
         return value
     except OSError:

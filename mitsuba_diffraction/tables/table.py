@@ -19,7 +19,6 @@ from ..optics.geometry import sigma_of, wavenumber
 from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid
-from .store import Record
 
 #: Raised whenever the meaning of the coefficients changes; tables of another version are refused.
 FORMAT_VERSION = 6
@@ -65,8 +64,6 @@ class DiffractionTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `exr.save_table`
     window_sum: ClassVar[Callable[..., NDArray[np.float64]]]  #: ⟨|P|²⟩: `lookup.window_sum`
     brdf: ClassVar[Callable[..., NDArray[np.float64]]]  #: the model for R = 1: `lookup.brdf`
-    to_record: ClassVar[Callable[..., Record]]  #: for the cache: `document.to_record`
-    from_record: ClassVar[Callable[[Record], DiffractionTable]]  #: `document.from_record`
 
     @property
     def coherence_width(self) -> float:

@@ -16,8 +16,9 @@ import numpy as np
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.directional import DirectionalTable
+from mitsuba_diffraction.tables.document import from_record, to_record
 from mitsuba_diffraction.tables.energy.conservation import Conservation
-from mitsuba_diffraction.tables.store import VARIABLE, Record, Recorded, cached
+from mitsuba_diffraction.tables.store import VARIABLE, Record, cached
 from tests.fuzz.damage import damaged
 from tests.support.directions import rough_patch
 
@@ -26,10 +27,11 @@ _KEY = "5" * 64
 
 @dataclass(frozen=True)
 class Kind:
-    """What is kept: how it is made, and its class."""
+    """What is kept: how it is made, packed and unpacked."""
 
     make: Callable[[], Any]
-    stored: type[Recorded]
+    pack: Callable[[Any], Record]
+    unpack: Callable[[Record], Any]
 
 
 def _table() -> md.DiffractionTable:
@@ -47,9 +49,9 @@ def _conservation() -> Conservation:
 
 
 KINDS = {
-    "table": Kind(_table, md.DiffractionTable),
-    "colours": Kind(_colours, ColourTable),
-    "energy": Kind(_conservation, Conservation),
+    "table": Kind(_table, to_record, from_record),
+    "colours": Kind(_colours, ColourTable.to_record, ColourTable.from_record),
+    "energy": Kind(_conservation, Conservation.to_record, Conservation.from_record),
 }
 
 
@@ -67,7 +69,7 @@ def originals() -> dict[str, tuple[str, bytes]]:
 
 @functools.cache
 def _expected(name: str) -> Record:
-    return KINDS[name].make().to_record()
+    return KINDS[name].pack(KINDS[name].make())
 
 
 def _get(name: str, folder: str) -> tuple[Record, int]:
@@ -81,7 +83,8 @@ def _get(name: str, folder: str) -> tuple[Record, int]:
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = folder
     try:
-        return cached(name, _KEY, {}, make, kind.stored).to_record(), len(made)
+        kept = cached(name, _KEY, {}, make, kind.pack, kind.unpack)
+        return kind.pack(kept), len(made)
     finally:
         if before is None:
             del os.environ[VARIABLE]

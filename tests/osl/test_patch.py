@@ -19,6 +19,7 @@ from mitsuba_diffraction.osl.patch import (
     BANDS,
     energy_texture,
     interpolated,
+    patch_constants,
     patch_textures,
 )
 from mitsuba_diffraction.plugin.description import Quantity, Surface
@@ -50,6 +51,19 @@ def test_powers_are_those_of_the_table(share):
     exact = powers_at(TABLE, kappa)
     # terms are halves, of 11 digits; factors are off by 0.06²/8 between the ends of a cell
     assert np.abs(interpolated(TEXTURES, kappa) - exact).sum() < 5e-4
+
+
+def test_light_of_a_scan_is_kept_without_orders_of_negative_power():
+    table = md.DiffractionTable.build(SMALL_SCAN, tolerance=0.01)
+    textures = patch_textures(table)
+    constants = patch_constants(table, textures, table.roughness)
+    share, kappa = constants["LIKELIHOOD"] / textures.likelihood, 0.6 * table.expansion.kappa_max
+    powers = powers_at(table, kappa).astype(float)
+    negative = float(-powers[powers < 0.0].sum() / powers.sum())
+    assert negative > 5e-3
+    # one share for all wavelengths
+    kept = interpolated(textures, kappa).sum() * share
+    assert kept == pytest.approx(powers.sum(), rel=0.2 * negative)
 
 
 def test_draws_have_the_probabilities_that_weigh_them():

@@ -33,12 +33,13 @@ def folder(tmp_path, monkeypatch):
 class Stored(tuple):
     """A text and arrays."""
 
-    def to_record(self):
-        return Record({"text": self[0]}, self[1:])
 
-    @classmethod
-    def from_record(cls, record):
-        return cls((record.document["text"], *record.arrays))
+def pack(value):
+    return Record({"text": value[0]}, value[1:])
+
+
+def unpack(record):
+    return Stored((record.document["text"], *record.arrays))
 
 
 def get(made, memory=None, key=KEY):
@@ -48,7 +49,7 @@ def get(made, memory=None, key=KEY):
         made.append(key)
         return Stored(("a text", VALUES, VALUES[0].astype(np.float16)))
 
-    return cached("values", key, {} if memory is None else memory, make, Stored)
+    return cached("values", key, {} if memory is None else memory, make, pack, unpack)
 
 
 def test_a_later_process_reads_the_same_numbers(folder):
@@ -135,13 +136,14 @@ def make():
     return Stored()
 
 class Stored:
-    def to_record(self):
-        return Record(None, [np.arange(5)])
+    pass
 
-    @classmethod
-    def from_record(cls, record):
-        assert record.arrays[0].sum() == 10
-        return cls()
+def pack(value):
+    return Record(None, [np.arange(5)])
+
+def unpack(record):
+    assert record.arrays[0].sum() == 10
+    return Stored()
 
 children = []
 while len(children) < 7:
@@ -150,7 +152,7 @@ while len(children) < 7:
         children.clear()
         break
     children.append(child)
-found = cached("values", "k", {}, make, Stored)
+found = cached("values", "k", {}, make, pack, unpack)
 for child in children:
     assert os.waitpid(child, 0)[1] == 0
 os._exit(0 if isinstance(found, Stored) else 1)

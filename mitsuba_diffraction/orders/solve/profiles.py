@@ -141,7 +141,7 @@ class Profile:
 
 @dataclass(frozen=True, eq=False)
 class UnitCell:
-    """One period of the heights of a crossed grating.
+    """Period of the heights of a crossed grating, in x and y.
 
     Raises a DiffractionError if a period is out of its range.
 

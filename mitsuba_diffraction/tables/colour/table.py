@@ -300,4 +300,5 @@ _colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = 
 def cached_colours(table: DiffractionTable) -> ColourTable:
     """Return the colours of a table, from memory, from disk, or summed and stored."""
     key, memory = key_of(COLOUR_VERSION, table.digest()), _colours.setdefault(table, {})
-    return cached("colours", key, memory, lambda: ColourTable.build(table), ColourTable)
+    both_ways = ColourTable.to_record, ColourTable.from_record
+    return cached("colours", key, memory, lambda: ColourTable.build(table), *both_ways)

@@ -259,4 +259,5 @@ class Energy:
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
         made_of = versions, limits, height_scale, material, self.wavelength_range
         key, memory = key_of(self.table.digest(), made_of), _known.setdefault(self.table, {})
-        return cached("energy", key, memory, make, Conservation)
+        both_ways = Conservation.to_record, Conservation.from_record
+        return cached("energy", key, memory, make, *both_ways)
