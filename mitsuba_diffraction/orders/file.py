@@ -127,8 +127,6 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
     try:
         with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
             version = int(getattr(file, ORDERS_ATTRIBUTE))
-            if version == 1:
-                return _first_version(file)
             if version != FORMAT_VERSION:
                 raise DiffractionError(
                     f"its format version is {version}, this program reads {FORMAT_VERSION}"
@@ -205,67 +203,3 @@ def _bands(file: Any) -> tuple[Band, ...]:
 def _checksum(digest: str, header: str) -> str:
     """Return the checksum of a table's digest and header."""
     return hashlib.sha256(f"{digest}{header}".encode()).hexdigest()
-
-
-# ---------------------------------------------------------------------- version 1
-
-
-def _first_version(file: Any) -> OrderTable:
-    """Return the table of a file of version 1, with efficiencies in steps of 1/30000.
-
-    They are those of light whose E, then B, lies along the grooves; matrices follow where there are
-    any.
-    """
-    if hasattr(file, "crossed") or getattr(file, "components", b"grooves") != b"grooves":
-        raise DiffractionError(
-            "it holds imported efficiencies, or a crossed grating, of a former format, whose "
-            "listed light was not kept"
-        )
-    numbers = {name: variable[:] for name, variable in file.variables.items()}
-    if file.sha256 != _first_checksum(file, numbers).encode():
-        raise ValueError("its checksum is of another one")
-    block = hasattr(file, "block")
-
-    def kind(name: str, k: int) -> NDArray[np.float32] | None:
-        if f"kind_{name}_{k}" not in numbers:
-            return None
-        scale = file.variables[f"kind_{name}_{k}"].scale_factor
-        if (matrices := numbers.get(f"mueller_{name}_{k}")) is not None:
-            values = matrices * scale
-            return values.reshape(*values.shape[:-2], -1).astype(np.float32)
-        along_e, along_b = np.moveaxis(numbers[f"kind_{name}_{k}"] * scale, -1, 0)
-        mean, half = 0.5 * (along_e + along_b), 0.5 * (along_e - along_b)
-        return np.stack([mean] if block else [mean, half], axis=-1).astype(np.float32)
-
-    bands = []
-    for k in sorted({int(name.rpartition("_")[2]) for name in numbers}):
-        a = kind("a", k)
-        if a is None:
-            raise ValueError(f"it lacks kind A of band {k}")
-        bands.append(Band(k, a, kind("b", k)))
-    return OrderTable(
-        (float(file.period), math.inf), (float(file.wavelengths[0]), float(file.wavelengths[1])),
-        CellResponse(tuple(bands), even=block), float(file.superstrate),
-        mapping(json.loads(file.header.decode("utf-8")), "header"),
-        bool(getattr(file, "thin", False)), float(file.block) if block else None,
-    )  # fmt: skip
-
-
-def _first_checksum(file: Any, numbers: dict[str, NDArray[Any]]) -> str:
-    always = (
-        float(file.period), tuple(map(float, file.wavelengths)), float(file.superstrate),
-        file.header.decode("utf-8"),
-    )  # fmt: skip
-    content = hashlib.sha256(repr(always).encode())
-    if getattr(file, "thin", False):
-        content.update(b"thin")
-    if hasattr(file, "block"):
-        content.update(repr(("block", float(file.block))).encode())
-    packed = {}
-    for name, values in numbers.items():
-        first, kind, k = name.split("_")
-        packed[int(k), kind + (" mueller" if first == "mueller" else "")] = values
-    for key in sorted(packed):
-        content.update(repr((key, packed[key].shape)).encode())
-        content.update(np.ascontiguousarray(packed[key], ">i2").data)
-    return content.hexdigest()

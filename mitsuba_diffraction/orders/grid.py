@@ -73,7 +73,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
     if isinstance(response, ListedResponse) and not (coated and table.superstrate != 1.0):
         return _listed(response, elements)
     table = on_cells(table)
-    counts = cells_of(table)
+    counts = cells_of(table, coated=coated)
     if table.block:
         counts = Counts(*(n - 1 for n in table.bands[0].counts))
 
@@ -92,7 +92,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
         values = table.bands[of.band].kind(of.kind).astype(np.float64)
         if values.shape[-1] == MUELLER:
             values = smooth_elements(table, of.band, values)
-        return resampled(table, of.band, values, counts).reshape(-1, values.shape[-1])
+        return resampled(table, of.band, values, counts, coated).reshape(-1, values.shape[-1])
 
     starts, corners = _stacked(table, records)
     matrices, element_starts = None, starts

@@ -73,9 +73,9 @@ def middles(nodes: NDArray[Any]) -> NDArray[Any]:
 def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) -> Rows:
     """Return the unpolarised efficiencies of a kind on a grid with so many cells."""
     table = on_cells(table)
-    grid = _grid(table, of.band, counts)
+    grid = _grid(table, of.band, counts, coated)
     unpolarised = table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64)
-    values = clamped(resampled(table, of.band, unpolarised, counts))
+    values = clamped(resampled(table, of.band, unpolarised, counts, coated))
     if table.superstrate == 1.0 or not coated:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
@@ -104,11 +104,13 @@ def kept(table: OrderTable) -> float:
     return min(most, _TRAPPED)
 
 
-def resampled(table: OrderTable, k: int, values: NDArray[Any], counts: Counts) -> Array:
+def resampled(
+    table: OrderTable, k: int, values: NDArray[Any], counts: Counts, coated: bool
+) -> Array:
     """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
     assert isinstance(table.response, CellResponse)
     matrix = cells.linear if table.response.even else cells.interpolation
-    known, grid = table.response.bands[k].counts, _grid(table, k, counts)
+    known, grid = table.response.bands[k].counts, _grid(table, k, counts, coated)
     along_tau, along_rho = matrix(known.tau, grid.tau), matrix(known.rho, grid.rho)
     summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
     at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
@@ -132,15 +134,18 @@ class _Grid(NamedTuple):
     wavelength: Array
 
 
-def _grid(table: OrderTable, k: int, counts: Counts) -> _Grid:
+def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> _Grid:
     tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
     big_k = (k + cells.sine_squared(rho))[:, None]
-    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w))
+    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated))
 
 
-def wavelength_of(table: OrderTable, big_k: Array, w: Array) -> Array:
-    """Return the wavelength (vacuum, nm) at w of the even grids."""
-    period, least = table.optical_period, least_c(table.superstrate)
+def wavelength_of(table: OrderTable, big_k: Array, w: Array, *, coated: bool = True) -> Array:
+    """Return the wavelength (vacuum, nm) at w of the even grids.
+
+    coated : whether they have the light from outside of the coat alone.
+    """
+    period, least = table.optical_period, least_c(table.superstrate if coated else 1.0)
     return cells.wavelength_of(big_k, w, table.wavelengths, period, least)
 
 
@@ -154,15 +159,19 @@ def leaving_transmittance(squared_sine: Array, index: float) -> Array:
     return np.where(outside < 1.0, face_transmittance(np.maximum(cosine, 1e-9), index), 0.0)
 
 
-def cells_of(table: OrderTable) -> Counts:
-    """Return the numbers of the renderer's cells, which fit into memory."""
-    counts, size = (CELLS, 16) if table.superstrate == 1.0 else (CELLS_UNDER_COAT, 32)
+def cells_of(table: OrderTable, *, coated: bool) -> Counts:
+    """Return the numbers of a look-up's cells, which fit into memory.
+
+    coated : whether a coat is in the efficiencies, which the renderer and shaders read.
+    """
+    coated = coated and table.superstrate != 1.0
+    counts, size = (CELLS_UNDER_COAT, 32) if coated else (CELLS, 16)
     most = (max(along) for along in zip(*(band.counts for band in table.bands), strict=True))
     counts = Counts(*(
         max(count, math.ceil(share * nodes)) if nodes > common else count
         for count, nodes, common, share in zip(counts, most, COMMON, SHARES, strict=True)
     ))  # fmt: skip
-    if table.superstrate == 1.0 and constant(table):
+    if not coated and constant(table):
         counts = Counts(1, 1, 1)
     records = sum(of.ports * (of.ports + 1) for of in kinds_of(table))
     while size * records * math.prod(counts) > MOST_BYTES and max(counts) > 4:

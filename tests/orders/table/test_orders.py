@@ -44,6 +44,19 @@ def test_values_at_nodes_are_the_tables():
         assert found == pytest.approx(expected, abs=2e-3)
 
 
+def test_light_that_a_coat_traps_has_the_efficiencies_at_its_nodes():
+    table, k = thin_grating(superstrate=1.58), 3
+    tau, rho, w = table.response.nodes(k)
+    big_k, optical = k + cells.sine_squared(rho[2]), table.optical_period
+    # the shortest wavelength of this K comes from beyond the critical angle
+    wavelength = cells.wavelength_of(big_k, w[0], table.wavelengths, optical)
+    at = cells.from_cell(k, cells.A, 1, tau[4], rho[2], wavelength, optical)
+    assert abs(at.y) > 1.0 / 1.58
+    for q in range(k + 1):
+        found = table.efficiency(at.x, at.y, at.wavelength, 1 - q)
+        assert found == pytest.approx(table.bands[k].a[4, 2, 0, 1, q, 0], abs=2e-3)
+
+
 def test_orders_sum_to_no_more_than_one_and_are_the_visible_ones():
     x, y, wavelength = light()
     values, steps = orders_of(GRATING, x, y, wavelength)
@@ -89,10 +102,10 @@ def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
         6, cells.A, 3, 0.5, 0.5, wavelength_of(mirror, big_k, 0.75), mirror.optical_period
     )
     face = reflectance(np.sqrt(1.0 - 1.5**2 * (at.x**2 + at.y**2)), 1.5)
-    # geometric series of R ρ
-    expected = 0.8 / (1.0 - 0.8 * face)
-    assert grid.within[2, 2, 3, 3, 3] == pytest.approx(expected, rel=1e-3)
-    assert grid.through[2, 2, 3, 3, 3] == pytest.approx(expected * (1.0 - face), rel=1e-3)
+    # geometric series of R ρ; tables hold what is between both passages of the face
+    expected, passage = 0.8 / (1.0 - 0.8 * face), np.sqrt(1.0 - 0.8 * face)
+    assert grid.within[2, 2, 3, 3, 3] == pytest.approx(expected * passage**2, rel=1e-3)
+    assert grid.through[2, 2, 3, 3, 3] == pytest.approx(expected * (1.0 - face) * passage, rel=1e-3)
 
 
 def test_wavelengths_outside_hold_the_end_values():
