@@ -44,6 +44,9 @@ from .types import (
 
 #: Component of a context that asks for all of them.
 ALL_COMPONENTS = 0xFFFFFFFF
+#: Directions of a lower density are not drawn: scalar variants have densities in double precision,
+#: which are 0 as numbers of a spectrum.
+LEAST_DENSITY = 1e-30
 
 
 class PluginBSDF(mi.BSDF):
@@ -285,12 +288,12 @@ class SurfaceBSDF(PluginBSDF):
             result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
         smooth = dr.select(delta, False, active)
         value, pdf = self.evaluated(ctx, site, result.wo, smooth, "vd")
-        value = value / dr.select(pdf > 0.0, pdf, 1.0)
+        value = value / dr.select(pdf > LEAST_DENSITY, pdf, 1.0)
         if nested is not None:
             beneath = mi.Spectrum(self.beneath(site, result.wo, delta))
             value = dr.select(delta, beneath * weight / dr.select(delta, 1.0 - share, 1.0), value)
             pdf = dr.select(delta, result.pdf * (1.0 - share), pdf)
-        active &= pdf > 0.0
+        active &= pdf > LEAST_DENSITY
         cos_o = mi.Frame3f.cos_theta(result.wo)
         if self.transmits:
             passed = cos_i * cos_o < 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -91,3 +92,15 @@ def test_reciprocity_near_the_horizon(some_variant, theta, parameters):
     back = evaluated(bsdf, wo, wi, 550.0) / wi[:, 2:]
     # a dozen operations in single precision
     assert there == pytest.approx(back, rel=1e-6)
+
+
+def test_a_density_below_single_precision_draws_nothing(monkeypatch):
+    mi.set_variant("scalar_spectral")
+    bsdf = mi.load_dict(md.bsdf_dict(deep(0.0), coherence_width=2.0))
+    # double precision; as a number of a spectrum it is 0
+    monkeypatch.setattr(type(bsdf), "evaluated", lambda *_: (mi.Spectrum(1.0), 1e-60))
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi, si.wavelengths = mi.Vector3f(polar(20)), mi.Spectrum(500.0)
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.4, 0.6))
+    assert sample.pdf == 0.0
+    assert not any(weight)
