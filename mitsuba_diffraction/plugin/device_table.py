@@ -101,8 +101,7 @@ class DeviceTable:
             if windows:
                 total = self._over_windows(first, across, along, weights, windows)
             else:
-                packets = self._summed_packets(first, across, along)
-                total = [inner(part, weights) for part in self._components(packets)]
+                total = self.amplitude(first, across, along, weights)
             centre = [lobe * c for c in order_0]
             rest = [part * self._inverse_scale for part in total]
             others, zeroth = (dr.square(x) + dr.square(y) for x, y in (rest, centre))
@@ -119,6 +118,17 @@ class DeviceTable:
             outside = dr.select(within(qx, qy, (self.q_limit, self.q_limit)), 0.0, dr.nan)
             outside = dr.select(kappa <= expansion.kappa_max * (1 + 1e-6), outside, dr.nan)
         return [dr.select(inside, others, outside), dr.select(inside, zeroth, 0.0), *cosine]
+
+    def amplitude(
+        self, first: Index, across: Gaussians, along: Gaussians, weights: list[Float]
+    ) -> list[Float]:
+        """Return real and imaginary part of the sum of all orders but 0, times the table's scale.
+
+        first : index of the first bin; across, along : weights of the taps along x and y.
+        weights : of the terms of the series.
+        """
+        packets = self._summed_packets(first, across, along)
+        return [inner(part, weights) for part in self._components(packets)]
 
     def first_bin(self, qx: Float, qy: Float, kappa: Float) -> Index:
         """Index of the first bin that `window_sum` reads (for benchmarks)."""

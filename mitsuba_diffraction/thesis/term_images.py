@@ -10,8 +10,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..analysis.timing import quiet_bsdf
-from ..plugin.device_table import DeviceTable
+from ..plugin.device_table import DeviceTable, Gaussians
 from ..plugin.memory import upload
+from ..plugin.types import Float, Index
 from ..tables.table import DiffractionTable
 
 
@@ -27,7 +28,7 @@ class TermImages(DeviceTable):
 
     For every wavelength and every term, the 3 × 3 texels around the frequency are gathered from
     that term's image, weighted by the Gaussian window, and added up. `plugin.device_table` stores
-    all terms of one bin together instead. Only `window_sum` differs.
+    all terms of one bin together instead. Only `amplitude` differs.
     """
 
     def __init__(self, table: DiffractionTable) -> None:
@@ -35,28 +36,26 @@ class TermImages(DeviceTable):
         images = np.moveaxis(table.coefficients[0], -1, 0)  # (terms, ny, nx, re and im)
         self._images = upload(mi.Float, np.ascontiguousarray(images))
 
-    def window_sum(self, qx: Any, qy: Any, kappa: Any, windows: Any = ()) -> Any:
-        """Sum the orders under the window, dimensionless (`tables.lookup.window_sum`)."""
-        grid, expansion = self.grid, self.expansion
-        x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
-        first, across, along = self._place(x, y, mi.UInt32(0))
-        weights = [
+    def amplitude(
+        self, first: Index, across: Gaussians, along: Gaussians, weights: list[Float]
+    ) -> list[Float]:
+        """See `DeviceTable.amplitude`."""
+        grid = self.grid
+        texels = [
             (grid.index(0, row, column), across.at(column) * along.at(row))
             for row in range(grid.taps[1])
             for column in range(grid.taps[0])
         ]
-        lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
-        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa).order_0))
-        scaled = kappa * expansion.half_range
+        x = weights[0]
 
         def add_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
             """Add term n of the series: the state of the loop after it."""
-            weight *= scaled / mi.Float(n)  # xⁿ/n!
+            weight *= x / mi.Float(n)  # xⁿ/n!
             windowed = mi.Complex2f(0.0)
-            for offset, gaussian in weights:
+            for offset, gaussian in texels:
                 windowed += gaussian * dr.gather(mi.Complex2f, self._images, image + offset)
             return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
 
-        state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
-        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, add_term)[3]
-        return dr.squared_norm(total)
+        state = (mi.UInt32(1), first, mi.Float(1.0), mi.Complex2f(0.0))
+        total = dr.while_loop(state, lambda n, *_: n <= self.expansion.terms, add_term)[3]
+        return [total.real, total.imag]

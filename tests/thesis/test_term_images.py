@@ -1,0 +1,37 @@
+"""The thesis' look-up, an image for each term, beside the plugin's."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.analysis.timing import kernel_operations
+from mitsuba_diffraction.thesis.term_images import thesis_bsdf
+from tests.support.directions import polar, rough_patch
+from tests.support.lanes import evaluated, interaction, vectors
+
+
+def test_images_of_terms_have_the_plugin_s_values_by_a_loop_over_terms():
+    mi.set_variant("llvm_ad_spectral")
+    settings = {"coherence_width": 3.0, "coherence": "patch", "basis": "taylor", "tolerance": 0.9}
+    table = md.DiffractionTable.build(
+        rough_patch((32, 32), (0.1, 0.1), 0.08), terms=12, taps=3, **settings
+    )
+    ours, theirs = mi.load_dict(md.bsdf_dict(table)), thesis_bsdf(table)
+    wo = [polar(theta, phi) for theta in (15, 40) for phi in range(0, 360, 45)]
+    expected = evaluated(ours, polar(20), wo, 550.0)
+    # sums of 12 terms in single precision, of which the largest is 10 times the sum
+    assert evaluated(theirs, polar(20), wo, 550.0) == pytest.approx(
+        expected, rel=1e-3, abs=1e-4 * expected.max()
+    )
+
+    si, out = interaction(np.tile(polar(20), (len(wo), 1)), 550.0), vectors(wo)
+    dr.eval(si, out)
+    context = mi.BSDFContext()
+    terms, loop = (
+        kernel_operations(lambda bsdf=bsdf: bsdf.eval(context, si, out)) for bsdf in (ours, theirs)
+    )
+    assert loop < terms
