@@ -206,7 +206,7 @@ def output_of(
 ) -> Path:  # fmt: skip
     """Return the output of -o, or its default name, after the checks of all its files.
 
-    Parameters are those of `output_name` and `check_outputs`.
+    For the parameters see `output_name` and `check_outputs`.
     """
     output = output_name(args.output, default, files)
     check_outputs(files(output), make_folder=make_folder)

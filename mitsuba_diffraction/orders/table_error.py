@@ -1,4 +1,4 @@
-"""Error of a table beside known efficiencies: solved ones of random lights, or those of a list."""
+"""Error of a table, by efficiencies that are solved at random lights or given in a list."""
 
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ from .types import (
 
 #: Component of a context that asks for all of them.
 ALL_COMPONENTS = 0xFFFFFFFF
-#: Directions of a lower density are not drawn: scalar variants have densities in double precision,
-#: which are 0 as numbers of a spectrum.
+#: Directions with a lower density are not drawn. In scalar variants a density has double precision,
+#: and so small a density would be 0 in single precision, which spectra have.
 LEAST_DENSITY = 1e-30
 
 

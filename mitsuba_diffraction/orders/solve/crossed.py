@@ -111,7 +111,7 @@ def _transform(pixels: int, last: int) -> Complex:
 
 
 def check_cell(cell: UnitCell, material: TabulatedIndex, wavelengths: tuple[float, float]) -> None:
-    """Refuse what is not solved, and warn of metals.
+    """Refuse gratings that this solver cannot solve, and warn of metals.
 
     Raises a DiffractionError for perfect conductors, and periods above four wavelengths.
     """
