@@ -22,7 +22,7 @@ LOSING = [kind for kind in KINDS | MORE if kind.startswith(("coat", "film"))]
 ELSEWHERE = [(SOME[n % len(SOME)], kind) for n, kind in enumerate(ALL) if kind != "surface"]
 
 
-@pytest.mark.parametrize("kind", [*MORE, *THROUGH])
+@pytest.mark.parametrize("kind", [kind for kind in MORE if MORE[kind][1] is not None])
 def test_values_are_the_reference_s(some_variant, kind):
     wi, wo, lam = lit(kind, 120)
     bsdf, expected = made(kind), exact(kind, wi, wo, lam)
@@ -40,7 +40,7 @@ def test_reciprocity(some_variant, kind):
     # radiance in the dielectric is n² times as large
     factor = 2.25 if kind == "through a dielectric" else 1.0
     # amplitudes of one place, and of what goes through, cancel in single precision
-    cancels = 2.0 if kind == "surface" or kind in THROUGH else 1.0
+    cancels = 2.0 if kind in ("surface", "one window", *THROUGH) else 1.0
     bound = {"rel": 1e-4 * cancels, "abs": 1e-6 * cancels * back.max()}
     assert factor * there == pytest.approx(back, **bound)
 

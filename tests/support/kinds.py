@@ -45,6 +45,11 @@ MORE: dict[str, Row] = {
         INDICES | {"film_ior": 2.4, "film_k": 0.1, "film_thickness": 150.0},
         SLOPE | {"eta": 1.5, "film": (2.4 + 0.1j, 150.0)},
     ),
+    "one window": ({"material": "none", "coherence": "patch"}, {"coherence": "patch"}),
+    "turned, powers of the phase": (
+        {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8}, None,
+    ),
+    "in its own shade": (METAL | {"shadowing": "vcavity"}, None),
     "dielectric, tangent plane": (INDICES | PLANE, PLANE | {"eta": 1.5}),
     "metal, tangent plane": (METAL | PLANE, METAL | PLANE),
     "coat, tangent plane": (COATED[0] | PLANE, COATED[1] | PLANE),
