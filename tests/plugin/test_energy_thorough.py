@@ -35,11 +35,6 @@ pytestmark = [
 SEEDED = [(name, seed) for seed, name in enumerate(SURFACES)]
 
 
-@pytest.mark.parametrize("name", SURFACES)
-def test_white_furnace_of_the_diffraction_alone(name):
-    assert_at_most_white(bsdf(name))
-
-
 @pytest.mark.parametrize(("name", "seed"), SEEDED)
 def test_white_furnace_of_one_wavelength(name, seed):
     """Mono variants make the scale at the one wavelength they have; gratings of a real metal."""
@@ -68,11 +63,6 @@ def test_white_furnace_in_colours(name):
     assert np.median(mean) > 0.9
 
 
-@pytest.mark.parametrize("name", ["sawtooth", "rough"])
-def test_white_furnace_over_a_white_base(name):
-    assert_at_most_white(white_pair(name))
-
-
 @pytest.mark.parametrize("base", [False, True])
 @pytest.mark.parametrize(("name", "seed"), SEEDED)
 def test_white_furnace_at_random_directions(name, base, seed):
@@ -80,8 +70,7 @@ def test_white_furnace_at_random_directions(name, base, seed):
     assert_at_most_white(surface, seed)
 
 
-@pytest.mark.parametrize("base", [False, True])
-@pytest.mark.parametrize("name", ["sinusoid", "rough"])
+@pytest.mark.parametrize(("name", "base"), [("sinusoid", False), ("rough", True)])
 def test_white_furnace_in_its_own_shade(name, base):
     load = white_pair if base else bsdf
     assert_at_most_white(load(name, shadowing="vcavity"))
@@ -104,9 +93,9 @@ def test_white_furnace_of_the_measured_patch(shared_afm):
     assert_at_most_white(mi.load_dict(md.bsdf_dict(patch, material="none")))
 
 
-@pytest.mark.parametrize("shadowing", ["none", "vcavity"])
 @pytest.mark.parametrize(("name", "seed"), SEEDED)
-def test_reciprocity(name, shadowing, seed):
+def test_reciprocity(name, seed):
+    shadowing = ("none", "vcavity")[seed % 2]
     assert_reciprocal(bsdf(name, shadowing=shadowing, orientation=20.0), seed)
 
 
