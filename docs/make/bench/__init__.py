@@ -9,7 +9,8 @@ contenders   BSDFs to compare, the bare gathers and the thesis' look-up among th
 evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
 orders       `diffraction_orders`: times of the calls, noise of a sample
 survey       a survey of many scans, in one process and on workers
-scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
+scenes       what is rendered; noise beside sampling by the cosine
+snake        the time of whole pictures, each scene in a process of its own
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def sections(
     from .contenders import build_tables
     from .evaluation import measure_colours, measure_eval, measure_sampling
     from .orders import measure_orders
-    from .scenes import measure_efficiency, measure_noise, measure_snake
+    from .scenes import measure_efficiency, measure_noise
+    from .snake import measure_snake
 
     tables = functools.cache(lambda: build_tables(plan, folder, progress, patch))
 
