@@ -18,7 +18,7 @@ COLOURED = [kind for kind in KINDS if kind != "surface"]
 
 
 def check(kind: str, count: int) -> None:
-    """Values, the same by `eval` and `eval_pdf`; samples are as dense and as bright as these say."""
+    """Values, the same by `eval` and `eval_pdf`; samples are as dense and bright as these say."""
     wi, wo, lam = lit(kind, count)
     samples = as_single(np.random.default_rng(2).random((len(wi), 3)))
     bsdf = made(kind)
