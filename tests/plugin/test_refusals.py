@@ -94,6 +94,7 @@ REFUSED = [
     ({"film_ior": 1.4, "film_thickness": 1e4}, "over which light is coherent"),
     ({"film_ior": 0.5, "film_thickness": 100.0}, "film_ior=0.5"),
     (OXIDE | {"film_k": -0.1}, "film_k=-0.1 must be"),
+    (OXIDE | {"film_thickness": BOARD}, "in a diffraction_mix"),
     (OXIDE | {"film_k": 3.0}, "absorbs all light"),
     (OXIDE | {"material": "none"}, "material='none'"),
     (OXIDE | {"coat_ior": 1.5}, "coat_ior"),
