@@ -14,14 +14,9 @@ from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
-from .polarised import nearest_jones, nearest_pure, s_and_p
+from .polarised import IN_PLANE, TurnedAxes, nearest_jones, nearest_pure, s_and_p, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
-
-#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
-_IN_PLANE = 1e-7
-#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
-MIN_ANGLE = 1e-4
 
 AnyLookup = Lookup | ListedLookup
 
@@ -86,10 +81,10 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array
     """
     at = _Light(table, *light, **sides)
     mean, cosine, sine = _linear(at)
-    turned = turned_axes(at.x, at.y)
+    turned = _turned(at)
     difference = cosine * turned.cosine
     if sine is None:
-        if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
+        if np.any((np.abs(turned.sine) > IN_PLANE) & (mean > 0.0)):
             raise DiffractionError(
                 "s and p of light off the plane across the grooves need Mueller matrices; solve "
                 "the profile with polarised=True, or take groove_efficiency: E or B along the "
@@ -112,7 +107,9 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """
     at = _Light(table, *light, **sides)
     mean, difference, _ = _linear(at)
-    turned = np.abs(turned_axes(at.x, at.y).sine) > _IN_PLANE
+    turned = (
+        np.abs(turned_axes(*(np.asarray(part, np.float64) for part in at[1:3])).sine) > IN_PLANE
+    )
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
@@ -122,25 +119,8 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-class TurnedAxes(NamedTuple):
-    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
-
-    cosine: Array
-    sine: Array
-
-
-def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
-    """Return the angle between the axes of incident light by its mirror direction.
-
-    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
-    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
-    """
-    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
-    along, across = x, -y * np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
-    squared = along**2 + across**2
-    level = squared < _IN_PLANE**2
-    cosine = np.where(level, 1.0, along**2 - across**2) / np.where(level, 1.0, squared)
-    return TurnedAxes(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
+def _turned(light: _Light) -> TurnedAxes:
+    return turned_axes(np.asarray(light.x, np.float64), np.asarray(light.y, np.float64))
 
 
 def _linear(light: _Light) -> tuple[Array, Array, Array | None]:

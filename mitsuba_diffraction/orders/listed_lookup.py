@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..optics.arithmetic import Mask, Number, of
-from ..optics.orders import crossed_square
+from ..optics.orders import crossed_square, order_factor
 from .cells import Array
 from .grid import OrderGrid
 from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
-from .polarised import ODD
+from .polarised import ODD, about_s, turned_axes
 from .response import ListedResponse
 from .table import OrderTable
 
@@ -56,6 +56,7 @@ class ListedLookup:
         response = table.response
         assert isinstance(response, ListedResponse)
         self.memory, self._cells, self._scale = memory, grid.cells, grid.scale
+        self._parts, self._material = grid.parts, response.index
         self._axes = [_Axis(nodes) for nodes in response.axes]
         self._in_plane, self._crossed = response.in_plane, table.crossed
         self.sides, self.index = table.sides, table.block or 1.0
@@ -75,7 +76,7 @@ class ListedLookup:
         places = [axis.place(value) for axis, value in zip(self._axes, light, strict=True)]
         cell, weights = corner_weights(places, self._cells, self._scale)
         lit = (wavelength >= self._reach[0]) & (wavelength <= self._reach[1])
-        start = (cell * self.sides + second) * (self.count * self.sides + 1)
+        start = (cell * self.sides + second) * (self.count * self.sides + 1) * self._parts
         return ListedRow(cell, start, second, weights, lit, x, y, wavelength, 0.0 * x)
 
     def _angles(
@@ -123,10 +124,7 @@ class ListedLookup:
         """See `lookup.Lookup.port`."""
         xp = of(row.wavelength)
         m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
-        shift_x, shift_y = (
-            m * row.wavelength * step for m, step in zip((m_x, m_y), self._steps, strict=True)
-        )
-        square = crossed_square(-row.x, -row.y, shift_x, shift_y)
+        square = self._square(row, m_x, m_y)
         if self.index != 1.0:
             square = square + xp.where(below, 0.0, self.index**2 - 1.0)
         leaves = active & (square > 0.0)
@@ -143,13 +141,17 @@ class ListedLookup:
         self, row: ListedRow, order: Any, active: Mask = True, below: Mask | None = None
     ) -> Share:
         """See `lookup.Lookup.share`."""
+        xp = of(row.wavelength)
         port, leaves = self.port(row, order, active, below)
-        efficiency = of(row.wavelength).where(leaves, self.at_port(row, port, 0, leaves), 0.0)
-        return Share(efficiency, efficiency)
+        chance = xp.where(leaves, self.at_port(row, port, self._parts - 1, leaves), 0.0)
+        if self._material is None:
+            return Share(chance, chance)
+        light = self.at_port(row, port, 0, leaves) * self._factor(row, *order)
+        return Share(xp.where(leaves, light, 0.0), chance)
 
     def total(self, row: ListedRow, active: Mask = True) -> Number:
         """See `lookup.Lookup.total`; with orders that do not propagate in this light."""
-        return self.at_port(row, self.ports(row), 0, active) * RAISED
+        return self.at_port(row, self.ports(row), self._parts - 1, active) * RAISED
 
     def elements(
         self, row: ListedRow, order: Any, y: Number, active: Mask = True,
@@ -168,6 +170,9 @@ class ListedLookup:
             place = (node * self.sides + row.second) * ports + port
             record = self.memory.read("elements", place, self.numbers, active)
             totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
+        if self._material is not None:
+            factor = self._factor(row, *order)
+            return about_s([x * factor for x in totals], turned_axes(-row.x, -row.y), -1.0)
         if self._crossed:
             return totals
         sign = xp.where(y < 0.0, -1.0 + 0.0 * y, 1.0 + 0.0 * y)
@@ -176,8 +181,22 @@ class ListedLookup:
 
     def at_port(self, row: ListedRow, port: Index, part: int, active: Mask) -> Number:
         """See `lookup.Lookup.at_port`."""
-        corners = self.memory.read("corners", row.start + port, 8, active & row.lit)
+        record = row.start + port * self._parts + part
+        corners = self.memory.read("corners", record, 8, active & row.lit)
         return weighted(row.weights, corners)
+
+    def _square(self, row: ListedRow, m_x: Number, m_y: Number) -> Number:
+        """Return the squared cosine of an order above."""
+        shift_x, shift_y = (
+            m * row.wavelength * step for m, step in zip((m_x, m_y), self._steps, strict=True)
+        )
+        return crossed_square(-row.x, -row.y, shift_x, shift_y)
+
+    def _factor(self, row: ListedRow, m_x: Number, m_y: Number) -> Number:
+        """Return `optics.orders.order_factor` of an order."""
+        came = 1.0 - row.x * row.x - row.y * row.y
+        zeroth = (m_x == 0.0) & (m_y == 0.0)
+        return order_factor(came, self._square(row, m_x, m_y), zeroth, self._material)
 
 
 class _Axis:

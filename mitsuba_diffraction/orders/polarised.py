@@ -13,11 +13,13 @@ mends it, so that no matrix gains light or polarisation.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.arithmetic import Number, of
 from ..reference.boundary import mueller
 from . import cells
 from .cells import Array
@@ -26,9 +28,48 @@ from .table import OrderTable
 
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
+#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
+IN_PLANE = 1e-7
+#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
+MIN_ANGLE = 1e-4
 _MIN_AMPLITUDE = 1e-12
 #: Sine of the angle from the normal below which a direction has no s of its own.
 _NORMAL = 1e-9
+
+
+class TurnedAxes(NamedTuple):
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
+
+    cosine: Number
+    sine: Number
+
+
+def turned_axes(x: Number, y: Number) -> TurnedAxes:
+    """Return the angle between the axes of incident light by its mirror direction.
+
+    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
+    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
+    """
+    xp = of(x, y)
+    across = -y * xp.sqrt(xp.maximum(1.0 - x * x - y * y, 0.0))
+    square = x * x + across * across
+    level = square < IN_PLANE**2
+    inverse = xp.reciprocal(xp.where(level, 1.0 + 0.0 * square, square))
+    cosine = xp.where(level, 1.0 + 0.0 * square, (x * x - across * across) * inverse)
+    return TurnedAxes(cosine, 2.0 * x * across * inverse)
+
+
+def about_s(elements: Sequence[Number], axes: TurnedAxes, sign: float = 1.0) -> list[Number]:
+    """Return elements of Mueller matrices, row by row, for incident light about s, not e.
+
+    sign : −1 turns back, from s to e.
+    """
+    turned, sine = list(elements), sign * axes.sine
+    for n in range(0, len(turned) - 2, 4):
+        along, oblique = turned[n + 1 : n + 3]
+        turned[n + 1] = axes.cosine * along + sine * oblique
+        turned[n + 2] = axes.cosine * oblique - sine * along
+    return turned
 
 
 def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
