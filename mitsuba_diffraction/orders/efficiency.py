@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, warn
+from ..reference.boundary import mueller as mueller_matrices
 from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
-from .polarised import IN_PLANE, TurnedAxes, nearest_jones, nearest_pure, s_and_p, turned_axes
+from .polarised import IN_PLANE, TurnedAxes, nearest_jones, s_and_p, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
 
@@ -140,7 +141,7 @@ def mueller(table: OrderTable, *light: Any) -> Array:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    return nearest_pure(*_matrices(_Light(table, *light)))
+    return mueller_matrices(_jones(_Light(table, *light)))
 
 
 def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
@@ -154,7 +155,7 @@ def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     Raises a DiffractionError if the table has no Mueller matrices.
     """
     at = _Light(table, *light)
-    of_grooves = nearest_jones(*_matrices(at))
+    of_grooves = _jones(at)
     x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
@@ -170,15 +171,16 @@ def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     return np.asarray(found * phase[..., None, None])
 
 
-def _matrices(light: _Light) -> tuple[Array, Array]:
-    """Return the interpolated Mueller matrices (…, 4, 4) of an order, and its efficiency."""
+def _jones(light: _Light) -> NDArray[np.complex128]:
+    """Return the Jones matrices (…, 2, 2) of an order about e and f; any phase."""
     if not light.table.polarised:
         raise DiffractionError(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    elements = _elements(light)
-    return elements.reshape(*elements.shape[:-1], 4, 4), efficiency(*light[:6])
+    entries = nearest_jones(np.moveaxis(_elements(light), -1, 0))
+    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(*light[:6]))[..., None]
+    return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
 
 class _Placed(NamedTuple):

@@ -82,7 +82,8 @@ def test_a_crossed_grating_has_the_light_of_a_direct_solution_between_its_direct
     field = md.HeightField(0.04 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)), 0.5 / 24)
     how, jobs = Settings(RANGE, tolerance=0.1, resolution=3), Jobs()
     table = md.solve_orders(field, 1.5, step=20.0, settings=how, jobs=jobs)
-    assert 0.0 < table.header["error_mean"] < 0.015
+    # of the weak orders alone
+    assert 0.0 < table.header["error_mean"] < 0.03
     assert table.header["solver_error"] < 0.01
     normal = table.efficiency(0.0, 0.0, 560.0, [1, 0, -1, 0], [0, 1, 0, -1])
     assert normal == pytest.approx(normal[0], rel=1e-3)
