@@ -24,7 +24,7 @@ from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energ
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
-from tests.support.variants import ALL, VARIANTS, obstacle, runs
+from tests.support.variants import SOME, VARIANTS, obstacle, runs
 
 pytest_plugins = ["tests.support.processor_time"]
 
@@ -205,9 +205,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"skipped {count:4d}: {reason}")
 
 
-@pytest.fixture(params=ALL)
+@pytest.fixture(params=SOME)
 def every_variant(request: pytest.FixtureRequest) -> str:
-    """A variant, set."""
+    """A variant of each backend, way of colour and polarisation in turn, set."""
     if not runs(request.param):
         pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
     import mitsuba as mi

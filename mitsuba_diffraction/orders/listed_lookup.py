@@ -55,7 +55,7 @@ class ListedLookup:
     def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         response = table.response
         assert isinstance(response, ListedResponse)
-        self.memory, self._cells, self._scale = memory, grid.cells, grid.scale
+        self.memory, self._cells, self._scale = memory, grid.cells, grid.scale * memory.scale
         self._parts, self._material = grid.parts, response.index
         self._axes = [_Axis(nodes) for nodes in response.axes]
         self._in_plane, self._crossed = response.in_plane, table.crossed

@@ -23,7 +23,7 @@ from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
 from .loops import sum_of
-from .memory import index_between, once_a_table, packet_size, read_packets, upload, zero_packets
+from .memory import Halves, index_between, once_a_table, packet_size, read_packets, upload
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import PlacedWindow
@@ -53,7 +53,6 @@ class DeviceTable:
         self.spacing, self.limited = table.spacing, table.limited
         self.radii, self.q_limit = table.frequency_limit, table.q_limit
         self.record = BinRecord.aligned(*table.coefficients.shape[3:])
-        self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
         # order 0's lobe is that of a window `order_0_ratio` times as large in area
         self._ratio = table.order_0_ratio
@@ -64,8 +63,10 @@ class DeviceTable:
                 f"a table of {table.nbytes / 1e9:.1f} GB is too large to index; raise tolerance "
                 "or use a smaller patch"
             )
-        kind = mi.Float16 if self.half else mi.Float
-        self._coefficients = upload(kind, self.record.pack(table.coefficients))
+        records = self.record.pack(table.coefficients)
+        self.halves = Halves(records) if records.dtype == np.float16 else None
+        if self.halves is None:
+            self._coefficients = upload(mi.Float, records)
         self.series = series_of(table)
         self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
@@ -136,13 +137,16 @@ class DeviceTable:
         return self._place(x, y, self.series.at(kappa).interval)[0]
 
     def read(self, index: Index) -> list[Packet]:
-        """Numbers of the bin with this index, in packets."""
+        """Numbers of the bin with this index, in packets; half floats over `Halves.scale`."""
+        if self.halves is not None:
+            return self.halves.read(index)
         return read_packets(self._coefficients, index, self.record.numbers)
 
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
         """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
         grid = self.grid
-        column, across = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
+        scale = 1.0 if self.halves is None else self.halves.scale
+        column, across = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0], scale)
         row, along = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
         return grid.index(interval, row, column), across, along
 
@@ -161,7 +165,7 @@ class DeviceTable:
                     row = [dr.fma(v, weights_x[i], t) for v, t in zip(values, row, strict=True)]
             return [dr.fma(p, weight, t) for p, t in zip(row, total, strict=True)]
 
-        nothing = zero_packets(self.record.numbers)
+        nothing = [dr.zeros(mi.ArrayXf, dr.shape(packet)) for packet in self.read(mi.UInt32(0))]
         return self._over_rows(first, along, add_row, across.all(), nothing)
 
     def _over_windows(
@@ -234,16 +238,19 @@ class Gaussians:
     offset : Δ, the position from the first tap on, in bins.
     first : bin of the first tap.
     count, exponent : number of taps, and e.
+    scale : factor on all weights.
     """
 
     offset: Float
     first: Float
     count: int
     exponent: float
+    scale: float = 1.0
 
     def at(self, n: Float | int) -> Float:
         """Return the weight of tap n."""
-        return dr.exp2(_log2(self.exponent) * dr.square(self.offset - n))
+        square = dr.square(self.offset - n)
+        return dr.exp2(dr.fma(_log2(self.exponent), square, math.log2(self.scale)))
 
     def all(self) -> list[Float]:
         """Return the weights of all taps."""
@@ -312,12 +319,14 @@ def _sincos(turns: Float) -> tuple[Float, Float]:
     return dr.sincos((turns - dr.round(turns)) * (2.0 * dr.pi))
 
 
-def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index, Gaussians]:
+def _taps(
+    position: Float, last: int, taps: int, exponent: float, scale: float = 1.0
+) -> tuple[Index, Gaussians]:
     """Array index of the first tap at a position in bins, and the weights of all taps."""
     first = dr.floor(position if taps % 2 == 0 else position + 0.5) + first_tap(taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = index_of(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
-    return index, Gaussians(position - first, first, taps, exponent)
+    return index, Gaussians(position - first, first, taps, exponent, scale)
 
 
 def _turned(value: Rotation, angle: Rotation, total: Sequence[Float]) -> Rotation:

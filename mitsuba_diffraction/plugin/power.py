@@ -21,10 +21,6 @@ from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
 from .window_positions import PlacedWindow, WindowPositions
 
-#: Light up to so many times a table's longest wavelength is looked up; longer waves have the values
-#: of this one, shorter ones than the table's are not reflected.
-INFRARED = 4.0
-
 
 class PerWavenumber(NamedTuple):
     """A function of 2π/λ, rad/µm, that returns a number of `values`."""
@@ -51,10 +47,10 @@ class SpectralPower:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
-        # To rounding. The table holds the low frequencies of infrared light, too
+        # to rounding
         shortest, longest = table.wavelength_range
         self._served = float(wavenumber(shortest)) * (1.0 + 1e-5)
-        self._bounds = shortest * (1.0 - 2e-5), longest * INFRARED
+        self._bounds = shortest * (1.0 - 2e-5), longest
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -135,7 +131,11 @@ class SpectralPower:
         )
 
     def bounded(self, si: Interaction) -> Interaction:
-        """Return the interaction with known wavelengths; light of shorter ones has no power."""
+        """Return the interaction with wavelengths within the table's.
+
+        Longer waves have all values of the longest one, energy too; shorter ones have no power, as
+        the table lacks their frequencies.
+        """
         if not mi.is_spectral:
             return si
         known = mi.SurfaceInteraction3f(si)

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..plugin.description import Surface
-from ..plugin.power import INFRARED
 from ..plugin.sources import SHORTEST_WAVELENGTH
 from ..tables.source import TableRequest, providing
 from ..tables.table import DiffractionTable
@@ -106,8 +105,8 @@ def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -
 def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]]) -> None:
     """Warn of each surface whose table lacks wavelengths that a camera records.
 
-    Light below a table's wavelengths is black; far above a table of heights it has the values of
-    the longest wavelength that is looked up. Colours need no warning: tables that miss visible
+    Light below a table's wavelengths is black; above a table of heights it has the values of the
+    longest wavelength. Colours need no warning: tables that miss visible
     light are refused or named when they load.
 
     sensors : cameras of the scene.
@@ -142,11 +141,10 @@ def _lacking(solved: bool, served: tuple[float, float], first: float, last: floa
             f"records {first:.4g} to {last:.4g} nm; make the table with a wider range of "
             "wavelengths"
         )
-    most = high * INFRARED
-    ends_early = last > most + _MARGIN
+    ends_early = last > high + _MARGIN
     faults = [f"is black below {low:.4g} nm, where its table begins"] if begins_late else []
     if ends_early:
-        faults.append(f"has the values of {most:.4g} nm at all longer wavelengths")
+        faults.append(f"has the values of {high:.4g} nm at all longer wavelengths")
     if not faults:
         return ""
     wider = f"{first if begins_late else low:.4g}, {last if ends_early else high:.4g}"

@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 from .expansion import Expansion
 
+#: Smaller half floats, which are subnormal, are stored as 0: kernels read them as 0, NumPy is slow.
+LEAST_HALF = 2.0**-14
+
 
 @dataclass(frozen=True)
 class Grid:

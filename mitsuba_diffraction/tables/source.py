@@ -23,6 +23,7 @@ from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from .build.build import build_with
 from .build.checks import warnings_of
 from .document import from_record, named, to_record
+from .layout import LEAST_HALF
 from .store import cached, key_of, loaded_once
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -136,7 +137,7 @@ def providing(provider: TableProvider) -> Iterator[None]:
 
 def table_key(digest: str, settings: TableSettings) -> str:
     """Return the key of the table of heights with this digest, built with these settings."""
-    return key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING)
+    return key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING, LEAST_HALF)
 
 
 def cached_table(

@@ -117,63 +117,6 @@ def test_materials_reflect_less(run, heights):
     assert greens[0] > greens[1]
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (["--theta", "90"], "theta=90 must be at least 0 and below 90"),
-        (["--phi", "1e9"], "phi=1e+09 must be from -360 to 360"),
-        (["--step", "500"], "step=500 nm does not fit"),
-        (["--wavelength-range", "700:400"], "700 to 400 nm"),
-        (["--wavelength-range", "300:400"], "table's shortest wavelength, 360 nm"),
-        (["--resolution", "99999"], "resolution=99999 must be"),
-        (["--samples", "0"], "samples=0 must be"),
-        (["--coherence-width", "-1"], "coherence_width='-1'"),
-        (["-o", "missing/a.exr"], "cannot write 'missing/a.exr'"),
-        (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
-        (["--material", "Unobtainium"], "Unobtainium"),
-        (["--fill", "hope"], "fill"),
-    ],
-)
-def test_what_does_not_fit_is_one_line(run, heights, here, options, text):
-    line = run("brdf-map", heights, *QUICK, *options).failed_in_one_line()
-    assert text in line
-    assert os.listdir(here) == []
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (["--wavelength", "500"], "--wavelength: not allowed with argument --step"),
-        (["-o", "a.png", "--spectral"], "--spectral: bands need an EXR"),
-        (["-o", "a.jpg"], "expected a name ending in .exr or .png"),
-        (["--material", "Al", "--int-ior", "1.5"], "--int-ior: not allowed with"),
-        (["--illuminant", "A"], "--illuminant: invalid choice: 'A'"),
-    ],
-)
-def test_contradictions_are_usage_errors(run, heights, here, options, text):
-    ran = run("brdf-map", heights, *QUICK, *options)
-    assert ran.code == 2
-    assert text in ran.err
-    assert os.listdir(here) == []
-
-
-def test_the_source_is_not_overwritten(run, heights):
-    assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
-    line = run("brdf-map", "table.exr", "-o", "table.exr").failed_in_one_line()
-    assert "would overwrite" in line
-
-
-def test_a_table_of_lengths_in_air_is_refused_in_water(run, heights):
-    assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
-    line = run("brdf-map", "table.exr", "--ext-ior", "water").failed_in_one_line()
-    assert "table.exr" in line
-    assert "--ext-ior" in line
-
-
-def test_a_missing_source_is_named(run):
-    assert "nothing.png" in run("brdf-map", "nothing.png").failed_in_one_line()
-
-
 def test_a_preset_stands_in_for_the_source(run, heights, here):
     ran = run(
         "brdf-map", "--preset", "dvd", "--resolution", "32", "--step", "47", "--json", "a.json"

@@ -103,36 +103,9 @@ def test_a_given_period_is_compared_with(run, heights):
     assert "given     3000 nm, the ridge is within 0." in ran.out
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (["--theta", "95"], "theta=95 must be"),
-        (["--method", "pq", "--tolerance", "0"], "tolerance=0"),
-        (["--coherence-width", "1e300"], "coherence_width='1e300'"),
-        (["--step", "900"], "step=900 nm does not fit"),
-        (["--angles", "20:10"], "angles=20:10 degrees are none"),
-        (["--angle-step", "0"], "angle-step=0 does not fit"),
-        (["--period", "0"], "period=0.0 must be"),
-        (["--order", "0"], "order=0 is"),
-        (["--order", "-1"], "too few"),
-        (["--material", "kerratin"], "did you mean keratin"),
-        (["--material", "keratin", "--method", "flss"], "method=flss"),
-        (["-o", "missing/a.png"], "cannot write"),
-    ],
-)
-def test_what_does_not_fit_is_one_line(run, heights, here, options, text):
-    assert text in run("evaluate", heights, *EXACT, *QUICK, *options).failed_in_one_line()
-    assert os.listdir(here) == []
-
-
 def test_a_patch_without_period_is_refused_by_methods_that_need_one(run, tmp_path):
     noise = np.random.default_rng(1).normal(0.0, 0.02, (64, 64))
     np.save(tmp_path / "noise.npy", noise)
     line = run("evaluate", tmp_path / "noise.npy", *QUICK, "--method", "nmm").failed_in_one_line()
     assert "needs a period" in line
     assert "confidence" in line
-
-
-def test_a_table_is_refused(run, heights):
-    assert run("precompute", heights, *QUICK[:4], "-o", "t.exr").code == 0
-    assert "is a table; this needs the heights" in run("evaluate", "t.exr").failed_in_one_line()

@@ -39,28 +39,6 @@ def test_shader_and_all_that_it_reads_are_written(
     assert json.loads(report.read_text(encoding="utf-8"))["error"]["mean"] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["missing.nc"], 1, "missing.nc"),
-        (["{source}", "-o", "{source}"], 1, "it is a file"),
-        (["{source}", "-o", "{source}/in"], 1, "cannot write"),
-        (["{source}", "--name", "1st"], 1, "name="),
-        (["{source}", "--material", "Al", "--int-ior", "1.5"], 2, "not allowed with"),
-    ],
-)
-def test_wrong_input_is_one_line_and_leaves_nothing(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str], options: list[str], code: int, words: str,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    assert main(["export-osl", *(o.format(source=source) for o in options)]) == code
-    said = capsys.readouterr().err.strip().splitlines()
-    assert words in said[-1]
-    assert "Traceback" not in "".join(said)
-    assert list(tmp_path.iterdir()) == [source]
-
-
 def test_an_addon_holds_the_folders_that_are_named(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
 ) -> None:

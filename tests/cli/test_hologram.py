@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from mitsuba_diffraction.scene.parameters import check_parameters, files_of
 from tests.support.logos import drawn, write_board
@@ -35,16 +34,3 @@ def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
     assert ran.code == 0, ran.err
     assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
     assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()
-
-
-def test_bad_input_is_one_line(run, logo):
-    Image.new("RGB", (9, 9), "red").save("red.png")
-    assert "no colour beside its ground" in run("hologram", "red.png").failed_in_one_line()
-    assert "'none.png' does not exist" in run("hologram", "none.png").failed_in_one_line()
-    Path("flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
-    line = run("hologram", logo, "--mesh", "flat.obj").failed_in_one_line()
-    assert "flat" in line
-    write_board(Path("bare.obj"), with_uv=False)
-    line = run("hologram", logo, "--mesh", "bare.obj").failed_in_one_line()
-    assert "no texture coordinates" in line
-    assert sorted(os.listdir()) == ["bare.obj", "flat.obj", "logo.png", "red.png"]

@@ -152,73 +152,6 @@ def test_progress_is_shown_where_asked_for(run, heights, here, monkeypatch):
     assert run("precompute", heights, *QUICK).err == ""
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["--coherence", "nonsense"],
-        ["--basis", "fourier"],
-        ["--terms", "0"],
-        ["--terms", "many"],
-        ["--tolerance", "small"],
-        ["--wavelength-range", "400"],
-        ["-o", "table.png"],
-        ["--levels", "plane"],
-    ],
-)
-def test_unusable_options_are_usage_errors(run, heights, here, arguments):
-    ran = run("precompute", heights, *QUICK, *arguments)
-    assert ran.code == 2
-    assert arguments[-1] in ran.err or "2 arguments" in ran.err
-    assert os.listdir(here) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--pixel-size", "0"], "'0'"),
-        (["--pixel-size=-0.1"], "'-0.1'"),
-        (["--pixel-size", "nan"], "'nan'"),
-        (["--max-height", "0.3", "--height-unit", "nm"], "without max_height"),
-        (["--level", "tilt"], "'tilt'"),
-        (["--tolerance=-1"], "tolerance"),
-        (["--tolerance", "nan"], "tolerance"),
-        (["--coherence-width", "0"], "coherence_width"),
-        (["--coherence-width", "inf"], "coherence_width"),
-        (["--wavelength-range", "700:400"], "wavelength"),
-        (["--basis", "taylor", "--tolerance", "1e-12"], "tolerance"),
-        (["--channel", "Height"], "channel"),
-    ],
-)
-def test_values_that_do_not_fit_are_one_line(run, heights, here, arguments, said):
-    ran = run("precompute", heights, *QUICK, *arguments)
-    assert said in ran.failed_in_one_line()
-    assert os.listdir(here) == []
-
-
-def test_an_image_without_its_lengths_is_one_line(run, here):
-    from PIL import Image
-
-    Image.fromarray(np.arange(256, dtype=np.uint8).reshape(16, 16)).save("a.png")
-    line = run("precompute", "a.png", "--pixel-size", "0.1").failed_in_one_line()
-    assert "max_height=0.375" in line
-    assert "--pixel-size" not in line
-    line = run("precompute", "a.png", "--max-height", "0.1").failed_in_one_line()
-    assert "pixel_size" in line
-
-
-@pytest.mark.parametrize("content", [None, b"", b"\x93NUMPY\x01\x00", b"no heights at all"])
-def test_files_that_hold_no_heights_are_one_line(run, here, content):
-    if content is not None:
-        (here / "a.npy").write_bytes(content)
-    line = run("precompute", "a.npy", *QUICK, "-o", "b.exr").failed_in_one_line()
-    assert "'a.npy'" in line
-    assert "b.exr" not in os.listdir(here)
-
-
-def test_a_folder_is_no_source(run, here):
-    assert "is a folder" in run("precompute", here).failed_in_one_line()
-
-
 def test_the_source_is_never_overwritten(run, heights, here):
     import OpenEXR
 
@@ -233,28 +166,6 @@ def test_the_source_is_never_overwritten(run, heights, here):
     assert (here / "heights-2.exr").exists()
 
 
-@pytest.mark.parametrize("output", ["nowhere/table.exr", "/proc/table.exr", "folder.exr"])
-def test_an_output_that_cannot_be_written_is_refused_before_the_work(
-    run, heights, here, output, monkeypatch
-):
-    (here / "folder.exr").mkdir()
-    monkeypatch.setattr(DiffractionTable, "build", lambda *_, **__: pytest.fail("built"))
-    assert (
-        f"cannot write '{output}'"
-        in run("precompute", heights, *QUICK, "-o", output).failed_in_one_line()
-    )
-
-
-def test_one_output_for_several_recipes_is_a_usage_error(run, recipe, here):
-    assert run("precompute", recipe, recipe, "-o", "a.exr").code == 2
-
-
-def test_recipes_and_files_do_not_mix(run, recipe, heights, here):
-    ran = run("precompute", recipe, heights)
-    assert ran.code == 2
-    assert "cannot be mixed" in ran.err
-
-
 def test_several_files_make_one_table_of_their_mean_power(run, heights, here):
     other = heights.with_name("other.npy")
     np.save(other, 0.5 * np.load(heights))
@@ -263,12 +174,6 @@ def test_several_files_make_one_table_of_their_mean_power(run, heights, here):
     assert "between patches" in ran.out
     patches = DiffractionTable.load("mean.exr").source["patches"]
     assert [patch["name"] for patch in patches] == ["grating.npy", "other.npy"]
-
-
-def test_several_files_need_the_name_of_their_table(run, heights, here):
-    ran = run("precompute", heights, heights, *QUICK)
-    assert ran.code == 2
-    assert "--output" in ran.err
 
 
 @posix

@@ -61,37 +61,6 @@ def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     assert (read("folder-errors.csv")["light30_detector30"] > 0.0).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--detector", "89.5"], "89.5"),
-        (["--light", "90"], "90"),
-        (["--acceptance", "0"], "acceptance"),
-        (["--light-azimuth", "1000"], "1000"),
-        (["--material", "Al", "--wavelength-range", "800:900"], "885.6 nm"),
-        (["--material", "kerratin"], "keratin"),
-        (["--pigment", "none.csv"], "none.csv"),
-        (["--material", "gold", "--pigment", "0.2"], "gold"),
-        (["--crops", "400"], "crops=400"),
-    ],
-)
-def test_impossible_geometries_are_one_line(run, scans, here, arguments, named):
-    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *arguments)
-    assert ran.code == 1
-    (line,) = [text for text in ran.err.splitlines() if "error" in text]
-    assert named in line
-    assert sorted(os.listdir(here)) == ["scans"]
-
-
-def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here):
-    (here / "empty").mkdir()
-    for source in (here / "empty", here / "none*.npy"):
-        ran = run("spectrum", source)
-        assert ran.code == 1
-        (line,) = ran.err.splitlines()
-        assert str(source) in line
-
-
 def test_a_broken_scan_of_a_group_is_said_and_left_out(run, scans, here):
     (scans / "scan2.npy").write_bytes(b"\x93NUMPY, cut short")
     ran = run("spectrum", "--group", f"some={scans}", *PIXEL, *QUICK, "-o", "some.csv")
@@ -138,22 +107,6 @@ def test_crops_of_a_scan_have_errors_and_auto_turns_the_lamp(run, scans, here):
     ran = run("spectrum", "wide.npy", *PIXEL, *QUICK, "--crops", "2", "-o", "c.csv")
     assert ran.code == 0, ran.err
     assert "c-errors.csv" in os.listdir(here)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["--group", "a=none*.npy"], "group a: no file matches"),
-        (["--group", "a"], "NAME=PATTERN"),
-        ([], "give files"),
-        (["scans", "--detector", "5:1:1"], "5:1:1"),
-        (["scans", "--azimuth", "north"], "north"),
-    ],
-)
-def test_groups_and_ranges_that_are_none_are_one_line(run, scans, arguments, named):
-    ran = run("spectrum", *arguments)
-    assert ran.code != 0
-    assert named in ran.err.splitlines()[-1]
 
 
 def test_notes_on_many_scans_are_one_scan_s_and_a_number(run, scans, here):

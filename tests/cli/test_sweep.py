@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -66,45 +65,3 @@ def test_one_wavelength_by_a_method(run, heights):
     )
     assert ran.code == 0, ran.err
     assert "550 nm" in ran.out
-
-
-@pytest.mark.parametrize(
-    ("command", "options", "text"),
-    [
-        ("brdf-map", ["--method", "flss", "--material", "Al"], "--material: not allowed with"),
-        ("brdf-map", ["--method", "flss", "--spectral"], "--spectral: not allowed with"),
-        ("brdf-map", ["--method", "flss", "--illuminant", "E"], "under --illuminant D65 only"),
-        ("brdf-map", ["--method", "flss", "--int-ior", "1.5"], "only for --relative"),
-        ("brdf-map", ["--relative"], "--relative: only with argument --method"),
-        ("brdf-map", ["--method", "ray"], "--method: invalid choice"),
-    ],
-)
-def test_contradictions_are_usage_errors(run, heights, here, command, options, text):
-    ran = run(command, heights, *QUICK, *options)
-    assert ran.code == 2
-    assert text in ran.err
-    assert os.listdir(here) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (["sweep", "terms", "--coherence-width", "1e300"], "coherence_width"),
-        (["sweep", "terms", "--values", "a"], "--values: expected numbers, got 'a'"),
-        (["sweep", "terms", "--method", "nmm"], "needs method 'flss'"),
-        (["sweep", "light-angle", "--values", "95"], "theta=95 must be"),
-        (["brdf-map", "--method", "rainbow", "--relative"], "no relative reflectance"),
-        (["brdf-map", "--method", "flss", "--relative", "--int-ior", "glass"], "takes a number"),
-    ],
-)
-def test_what_does_not_fit_is_one_line(run, heights, here, arguments, text):
-    command = arguments[: 2 if arguments[0] == "sweep" else 1]
-    rest = arguments[len(command) :]
-    assert text in run(*command, heights, *QUICK, *rest).failed_in_one_line()
-    assert os.listdir(here) == []
-
-
-def test_a_patch_without_a_period_is_refused_with_the_confidence(run, tmp_path):
-    np.save(tmp_path / "n.npy", np.random.default_rng(1).normal(0.0, 0.02, (64, 64)))
-    ran = run("brdf-map", tmp_path / "n.npy", *QUICK, "--method", "rainbow")
-    assert "needs a period" in ran.failed_in_one_line()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 
 import mitsuba as mi
 import numpy as np
@@ -163,23 +162,3 @@ def test_triangles_too_coarse_for_a_field_are_said(run, here):
     assert "warning: the field breaks" in ran.err
     assert "use a finer mesh, or choose another guide" in ran.err
     assert not json.loads(run("info", "field.ply", "--json").out)["usable"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["none.obj", "-o", "a.ply"], "'none.obj' does not exist"),
-        (["bare.obj", "-o", "no/a.ply"], "cannot write 'no/a.ply'"),
-    ],
-)
-def test_files_that_do_not_fit_are_one_line(run, bare, arguments, said):
-    assert said in run("tangents", *arguments).failed_in_one_line()
-    assert os.listdir() == ["bare.obj"]
-
-
-@pytest.mark.parametrize(
-    "options",
-    [[], ["-o", "a.obj"], ["-o", "a.ply", "--along", "w"], ["-o", "a.ply", "--rotate", "x"]],
-)
-def test_unusable_options_are_usage_errors(run, bare, options):
-    assert run("tangents", bare, *options).code == 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -53,17 +52,3 @@ def test_luminance_and_alpha_are_shown(run, light):
     assert mode == "LA"
     expected = shown(np.repeat(2 * light[..., :1], 3, axis=-1))[..., 0]  # alpha is premultiplied
     assert np.abs(picture[..., 0] - 255 * expected).max() < 1.01
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [("none.exr", "none.exr"), ("words.exr", "cannot read"), ("a.txt", "not an EXR"),
-     ("depth.exr", "holds no colours"), (".", "is a folder"), ("/", "is a folder")],
-)  # fmt: skip
-def test_other_files_are_refused_in_one_line(run, light, name, said):
-    for file in ("words.exr", "a.txt"):
-        Path(file).write_text("words", encoding="utf-8")
-    write("depth.exr", height=np.ascontiguousarray(light[..., 0]))
-    line = run("tonemap", name).failed_in_one_line()
-    assert said in line
-    assert not [file for file in os.listdir() if file.endswith(".png")]

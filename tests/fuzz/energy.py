@@ -21,11 +21,9 @@ from tests.support.lanes import interaction, lanes, spectra, vectors
 _DIRECTIONS, _VALUES = 3, 256
 #: Samples of a direction, and of those that may send on too much.
 _SAMPLES = 1 << 13, 1 << 17
-#: Angle (degrees) beyond which half of the directions are; shares by which R + T may exceed 1, in
-#: light that scales of energy are tabulated for (nm) and beyond, where the scale is that of the
-#: last one (docs/energy.md); and the standard errors of its mean that are added.
-_GRAZING, _EXCESS, _ERRORS = 85.0, (0.005, 0.07), 5.0
-_TABULATED = 360.0, 830.0
+#: Angle (degrees) beyond which half of the directions are; share by which R + T may exceed 1, and
+#: the standard errors of its mean that are added.
+_GRAZING, _EXCESS, _ERRORS = 85.0, 0.005, 5.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
 #: Variants by their share. RGB variants have colours outside the gamut, which are negative, or
@@ -143,9 +141,7 @@ def check(rng: np.random.Generator) -> None:
         wi[:, 2] *= rng.choice([-1.0, 1.0], _DIRECTIONS)
     uv, wavelengths = rng.random((_DIRECTIONS, 2)), rng.uniform(0.0, 1500.0, (_DIRECTIONS, 4))
     where = f"{asked}: from {theta}°, on the side {np.sign(wi[:, 2])}, at {wavelengths} nm"
-    low, high = _TABULATED
-    beyond = mi.is_spectral & ((wavelengths < low) | (wavelengths > high)).T
-    most = _albedo_beneath(asked) * (1.0 + np.where(beyond, *_EXCESS[::-1]))
+    most = _albedo_beneath(asked) * (1.0 + _EXCESS)
 
     def light(count: int) -> Any:
         directions, spectrum = (np.repeat(part, count, axis=0) for part in (wi, wavelengths))

@@ -4,35 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import Array, as_single, polar
 from tests.support.lanes import evaluated, interaction, refusal
-from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
-from tests.support.variants import ALL, evaluate, runs
+from tests.support.layered import FLAT, PATCH, WIDTH, load, pairs
 
 pytestmark = pytest.mark.thorough
-
-COATED = {
-    "metal": ({"eta": 0.9, "k": 6.0, "coat_ior": 1.58}, {"eta": 0.9, "k": 6.0, "coat": 1.58}),
-    "dielectric": (
-        {"int_ior": 1.7, "ext_ior": 1.0, "coat_ior": 1.4},
-        {"eta": 1.7, "coat": 1.4},
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", COATED)
-@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-def test_values_are_the_reference_s(some_variant, kind, model):
-    assert_values_are_the_reference_s(model, *COATED[kind])
 
 
 @pytest.mark.parametrize("parameters", [{"eta": 0.9, "k": 6.0}, {"int_ior": 1.6, "ext_ior": 1.0}])
@@ -69,40 +51,6 @@ def test_a_coated_mirror_s_specular_light_is_that_of_both_faces(some_variant):
             assert found[0] == pytest.approx(face + bulk, rel=1e-3)
 
 
-def test_reciprocity(some_variant):
-    wi, wo, lam = pairs()
-    bsdf = load(**COATED["metal"][0])
-    there = evaluated(bsdf, wi, wo, lam) / wo[:, 2:]
-    back = evaluated(bsdf, wo, wi, lam) / wi[:, 2:]
-    assert there == pytest.approx(back, rel=1e-4, abs=1e-6 * there.max())
-
-
-@pytest.mark.parametrize("kind", COATED)
-@pytest.mark.parametrize("theta", [0.0, 45.0, 75.0])
-def test_it_reflects_no_more_than_it_gets_and_samples_what_it_says(some_variant, kind, theta):
-    count = 1 << 15
-    bsdf = load(**COATED[kind][0])
-    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
-    rng = mi.PCG32(count)
-    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    sample, weight = bsdf.sample(mi.BSDFContext(), si, one, two)
-    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, sample.wo)
-    uniform = mi.warp.square_to_cosine_hemisphere(two)
-    elsewhere = bsdf.eval(mi.BSDFContext(), si, uniform)
-    dr.eval(sample, weight, value, pdf, uniform, elsewhere)  # one kernel instead of five
-    weights: Array = np.array(weight, float)[0]
-    # not pytest.approx, which takes half a second for so many numbers
-    assert_allclose(sample.pdf, pdf, rtol=1e-4)
-    assert_allclose(weights * np.array(pdf), np.array(value, float)[0], rtol=5e-4, atol=5e-7)
-    error = weights.std() / np.sqrt(count)
-    assert weights.mean() < 1.0 + 3 * error
-    share = np.array(elsewhere, float)[0] / np.maximum(
-        np.array(mi.Frame3f.cos_theta(uniform)) / np.pi, 1e-6
-    )
-    spread = np.hypot(error, share.std() / np.sqrt(count))
-    assert abs(weights.mean() - share.mean()) < 4 * spread  # 1 in 16 000
-
-
 @pytest.mark.parametrize("theta", [0.0, 45.0])
 def test_over_white_it_returns_what_both_mirrors_let_through(some_variant, theta):
     count = 1 << 14
@@ -125,39 +73,6 @@ def transmittance(cosine: Any, coat: float, index: float) -> Any:
     inside = np.sqrt(1 - (1 - cosine**2) / coat**2)
     face, structure = reflectance(cosine, coat), reflectance(inside, index)
     return (1 - face) * (1 - structure) / (1 - face * structure)
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_variants_evaluate_what_they_sample(name):
-    if not runs(name):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
-    wi, wo, _ = pairs(16)
-    lam = np.full((len(wi), 4), 600.0)
-    bsdf = load(wavelength=600.0, **COATED["metal"][0])
-    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, np.full((len(wi), 3), 0.5), lam)
-    assert np.all(np.isfinite(value))
-    assert again == pytest.approx(value, rel=1e-5)
-    assert pdf_again == pytest.approx(pdf, rel=1e-5)
-    if not mi.is_rgb:
-        exact = reference.brdf(
-            PATCH, wi, wo, 600.0, coherence_width=WIDTH, model="small_slope", **COATED["metal"][1]
-        )
-        exact = exact * wo[:, 2]
-        assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "line"),
-    [
-        ({"coat_ior": 0.9}, "coat_ior=0.9"),
-        ({"coat_ior": float("nan")}, "coat_ior=nan"),
-        ({"coat_ior": 1.2, "ext_ior": 1.33}, "below the index of the medium above"),
-        ({"coat_ior": 1.5, "material": "none"}, "material='none'"),
-    ],
-)
-def test_what_is_no_coat_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
 
 
 def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):

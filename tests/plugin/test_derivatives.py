@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from tests.support.directions import Array, uniform_directions
-from tests.support.lanes import interaction, lanes, spectra, vectors
+from tests.support.lanes import interaction, spectra, vectors
 
 # a steep grating bends light further than the model likes; that is not the point here
 pytestmark = [
@@ -137,49 +137,6 @@ def scene(
 
 
 RENDERED = ("height_scale", "orientation", "eta", "nested.reflectance.value")
-
-
-@pytest.mark.parametrize(
-    ("name", "broad"),
-    [("llvm_ad_spectral", False), ("llvm_ad_rgb", True), ("cuda_ad_spectral", False)],
-)  # fmt: skip
-def test_derivatives_of_pictures_are_those_of_differences(name, broad):
-    backend = dr.JitBackend.CUDA if name.startswith("cuda") else dr.JitBackend.LLVM
-    if not dr.has_backend(backend):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
-    loaded = scene(load(int_ior=1.5, pigment=PIGMENT), broad)
-    parameters = mi.traverse(loaded)
-    at = {"height_scale": 0.9, "orientation": 20.0, "eta": 1.5, "nested.reflectance.value": 0.4}
-    steps = {
-        "height_scale": 0.01,
-        "orientation": 1.0,
-        "eta": 0.01,
-        "nested.reflectance.value": 0.02,
-    }
-    keys = {k: f"plate.bsdf.{k}" for k in at}
-    # a sum in which every pixel has a weight of its own: what moves within the picture counts
-    weights = mi.TensorXf(lanes(np.random.default_rng(3).random(36)), (6, 6, 1))
-
-    def weighted(values: dict[str, float], differentiable: bool = False) -> Any:
-        for key, value in values.items():
-            parameters[keys[key]] = type(parameters[keys[key]])(value)
-            if differentiable:
-                dr.enable_grad(parameters[keys[key]])
-        parameters.update()
-        image = mi.render(loaded, parameters, spp=1 << 13, seed=1)
-        return dr.sum(image * weights, axis=None)
-
-    dr.backward(weighted(at, differentiable=True))
-    derivatives = {k: float(np.array(dr.grad(parameters[keys[k]])).ravel()[0]) for k in at}
-    for key, step in steps.items():
-        ends = [
-            float(np.array(weighted(at | {key: at[key] + s})).ravel()[0]) for s in (step, -step)
-        ]
-        difference = (ends[0] - ends[1]) / (2.0 * step)
-        # the derivative is taken with random numbers of its own: places in the pixels, wavelengths,
-        # points of a broad lamp
-        assert derivatives[key] == pytest.approx(difference, rel=0.05), key
 
 
 def test_changing_a_parameter_compiles_no_kernel(variant):

@@ -5,43 +5,25 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
-from tests.support.lanes import evaluated, interaction, refusal
-from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
-from tests.support.variants import evaluate, runs
+from tests.support.lanes import evaluated, interaction
+from tests.support.layered import FLAT, PATCH, load, pairs
+from tests.support.variants import evaluate
 
 pytestmark = pytest.mark.thorough
 
-Array = NDArray[Any]
 OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 METAL = {"eta": 0.9, "k": 6.0}
 GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
-FILMED = {
-    "metal": (METAL | OXIDE, {"eta": 0.9, "k": 6.0, "film": (1.77, 250.0)}),
-    "dielectric": (
-        GLASS | {"film_ior": 2.4, "film_k": 0.1, "film_thickness": 150.0},
-        {"eta": 1.56, "film": (2.4 + 0.1j, 150.0)},
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", FILMED)
-@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-def test_values_are_the_reference_s(some_variant, kind, model):
-    assert_values_are_the_reference_s(model, *FILMED[kind])
 
 
 def test_a_height_scale_is_as_heights(some_variant):
@@ -82,31 +64,6 @@ def test_where_the_model_does_not_follow_the_fringes_it_says_so(
     assert any("film_thickness=700 nm on a metal" in str(one.message) for one in heard) == warned
 
 
-def test_reciprocity(some_variant):
-    wi, wo, lam = pairs()
-    bsdf = load(**FILMED["dielectric"][0])
-    there = evaluated(bsdf, wi, wo, lam) / wo[:, 2:]
-    back = evaluated(bsdf, wo, wi, lam) / wi[:, 2:]
-    assert there == pytest.approx(back, rel=1e-4, abs=1e-6 * there.max())
-
-
-@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_mono", "llvm_ad_spectral_polarized"])
-def test_variants_agree_with_the_reference(name):
-    if not runs(name):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
-    wi, wo, _ = pairs(16)
-    lam = np.full((len(wi), 4), 600.0)
-    bsdf = load(wavelength=600.0, **FILMED["metal"][0])
-    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, np.full((len(wi), 3), 0.5), lam)
-    assert again == pytest.approx(value, rel=1e-5)
-    assert pdf_again == pytest.approx(pdf, rel=1e-5)
-    exact = wo[:, 2] * reference.brdf(
-        PATCH, wi, wo, 600.0, coherence_width=WIDTH, model="small_slope", **FILMED["metal"][1]
-    )
-    assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
-
-
 def film_colour(thickness: float) -> Any:
     """Linear sRGB of a flat film of index 1.45 on metal at 30°, summed over all wavelengths."""
     lam = np.arange(380.0, 781.0)
@@ -133,23 +90,6 @@ def test_in_rgb_a_mirror_has_the_film_s_colour():
         for p in (METAL | {"film_ior": 1.45, "film_thickness": 300.0}, {"material": "none"})
     )
     assert filmed / mirror == pytest.approx(film_colour(300.0), abs=5e-3)
-
-
-@pytest.mark.parametrize("theta", [0.0, 60.0])
-def test_it_samples_what_it_says_and_reflects_no_more_than_it_gets(some_variant, theta):
-    count = 1 << 14
-    bsdf = load(**FILMED["metal"][0])
-    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
-    rng = mi.PCG32(count)
-    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    sample, weight = bsdf.sample(mi.BSDFContext(), si, one, two)
-    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, sample.wo)
-    dr.eval(sample, weight, value, pdf)  # one kernel instead of four
-    weights = np.array(weight, float)[0]
-    # not pytest.approx, which takes half a second for so many numbers
-    assert_allclose(sample.pdf, pdf, rtol=1e-4)
-    assert_allclose(weights * np.array(pdf), np.array(value, float)[0], rtol=5e-4, atol=5e-7)
-    assert weights.mean() < 1.0 + 3 * weights.std() / np.sqrt(count)
 
 
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")  # of its slope
@@ -189,25 +129,6 @@ def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
     expected = 1 - there + there * back.mean()
     # a lobe loses a little below the horizon
     assert weights.mean() == pytest.approx(expected, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "line"),
-    [
-        ({"film_ior": 1.4}, "film_ior alone is not a film"),
-        ({"film_k": 0.1}, "film_k alone is not a film"),
-        ({"film_ior": 1.4, "film_thickness": -5.0}, "film_thickness=-5 nm must be at least 0"),
-        ({"film_ior": 1.4, "film_thickness": 1e4}, "over which light is coherent"),
-        ({"film_ior": 0.5, "film_thickness": 100.0}, "film_ior=0.5"),
-        ({**OXIDE, "film_k": -0.1}, "film_k=-0.1 must be"),
-        ({**OXIDE, "film_k": 3.0}, "absorbs all light"),
-        ({**OXIDE, "material": "none"}, "material='none'"),
-        ({**OXIDE, "coat_ior": 1.5}, "coat_ior"),
-        ({**OXIDE, "film_k": 0.1, "nested": {"type": "diffuse"}}, "film_k"),
-    ],
-)
-def test_what_is_no_film_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
 
 
 @pytest.mark.parametrize("changed", [{"film_thickness": -1.0}, {"film_thickness": 2e4}])

@@ -107,19 +107,18 @@ RANGES = {
     "infrared": {(850.0, 1500.0): True},
     "both and blue": {(200.0, 350.0): False, (400.0, 500.0): True, (850.0, 1500.0): True},
     "visible": {(360.0, 500.0): True, (500.0, 830.0): True},
-    "heat": {(3000.0, 5000.0): True},
     "all": {(200.0, 350.0): False, (3000.0, 5000.0): True},
 }
-DARK, HEAT = (
+DARK, INFRARED = (
     "is black below 360 nm, where its table begins",
-    "has the values of 3320 nm at all longer",
+    "has the values of 830 nm at all longer",
 )
 #: What the warning says of each, and its remedy; of the others there is none.
 WARNED = {
     "ultraviolet": ([DARK], "(200, 830)"),
-    "both and blue": ([DARK], "(200, 830)"),
-    "heat": ([HEAT], "(360, 5000)"),
-    "all": ([DARK, HEAT], "(200, 5000)"),
+    "infrared": ([INFRARED], "(360, 1500)"),
+    "both and blue": ([DARK, INFRARED], "(200, 1500)"),
+    "all": ([DARK, INFRARED], "(200, 5000)"),
 }
 
 
@@ -154,7 +153,7 @@ def test_bands_that_the_table_lacks_have_a_warning_for_each_surface(scene, varia
     first, last = min(a for a, _ in spans), max(b for _, b in spans)
     for number, line in enumerate(lines, start=1):
         assert line.startswith(f"shape {number} (a rectangle without id) {faults[0]}")
-        assert [fault in line for fault in (DARK, HEAT)] == [f in faults for f in (DARK, HEAT)]
+        assert [f in line for f in (DARK, INFRARED)] == [f in faults for f in (DARK, INFRARED)]
         assert f"records {first:g} to {last:g} nm; make the table with wavel" in line
         assert f"wavelength_range={remedy} (the command" in line
     picture = np.array(mi.render(loaded, spp=16)).reshape(16, len(spans))

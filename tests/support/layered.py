@@ -6,12 +6,9 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single, rough_patch, uniform_directions
-from tests.support.lanes import evaluated
 
 PATCH = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
 WIDTH = 3.0
@@ -37,22 +34,3 @@ FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
 def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
     raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
     return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
-
-
-def assert_values_are_the_reference_s(
-    model: str,
-    ours: dict[str, Any],
-    theirs: dict[str, Any],
-) -> None:
-    """The plugin with some parameters against the reference with its own."""
-    wi, wo, lam = pairs(50)
-    found = evaluated(load(model=model, **ours), wi, wo, lam)
-    exact = np.stack(
-        [
-            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
-            for one in lam.T
-        ],
-        axis=1,
-    ) * wo[:, 2:]  # fmt: skip
-    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
-    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())

@@ -25,6 +25,16 @@ def obstacle(variant: str) -> str | None:
 #: All that this package supports and this Mitsuba has.
 ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
 
+#: Of each backend, way of colour and polarisation some: for what is tried with many surfaces.
+SOME = [
+    name
+    for name in (
+        "scalar_spectral_polarized", "llvm_ad_mono", "llvm_ad_rgb", "scalar_rgb",
+        "llvm_ad_mono_polarized", "cuda_ad_spectral",
+    )
+    if name in ALL
+]  # fmt: skip
+
 
 def runs(name: str) -> bool:
     """Whether the machine runs a variant."""

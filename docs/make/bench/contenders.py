@@ -125,9 +125,12 @@ def is_slow(name: str) -> bool:
 def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]:
     """All packets that `eval` reads for these queries, added up: the floor beneath any look-up.
 
-    Where they are is found out beforehand.
+    Half floats are added up as words, without unpacking. Where they are is found out beforehand.
     """
     device = device_table(table)
+    packets, nothing = device.read, mi.Float(0.0)
+    if device.halves is not None:
+        packets, nothing = device.halves.words, mi.Int32(0)
     si, total = queries.si, queries.si.wi + queries.wo
     firsts = []
     for n in range(len(si.wavelengths)):
@@ -138,12 +141,12 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
     def body(n: Any, firsts: list[Any], total: Any) -> tuple[Any, list[Any], Any]:
         for row, columns in enumerate(table.grid.tapped()):
             for column in columns:
-                for packet in device.read(firsts[0] + table.grid.index(0, row, column)):
+                for packet in packets(firsts[0] + table.grid.index(0, row, column)):
                     total += dr.sum(packet, axis=0)
         return n + 1, [*firsts[1:], firsts[0]], total
 
     def call() -> Any:
-        state = (mi.UInt32(0), firsts, mi.Float(0.0))
+        state = (mi.UInt32(0), firsts, nothing)
         return dr.while_loop(state, lambda n, *_: n < len(firsts), body)[2]
 
     return call

@@ -10,8 +10,8 @@ import mitsuba as mi
 import numpy as np
 
 from ...plugin.loops import sum_of
-from ...plugin.memory import once_a_table, read, read_record, upload
-from ...plugin.types import Buffer, Float, Index, Mask
+from ...plugin.memory import Halves, once_a_table, read, upload
+from ...plugin.types import Float, Index, Mask
 from ..efficiency import AnyLookup, lookup_in
 from ..grid import OrderGrid
 from ..lookup import RAISED, Lookup
@@ -25,19 +25,21 @@ class Device:
     """A grid in the current variant's memory; a `lookup.Memory`."""
 
     def __init__(self, grid: OrderGrid) -> None:
-        self._buffers: dict[str, Buffer] = {}
-        for name, values in grid._asdict().items():
-            if isinstance(values, np.ndarray):
-                kind = mi.UInt32 if values.dtype == np.uint32 else mi.Float16
-                self._buffers[name] = upload(kind, values)
+        arrays = {k: v for k, v in grid._asdict().items() if isinstance(v, np.ndarray)}
+        self._starts = {k: upload(mi.UInt32, v) for k, v in arrays.items() if v.ndim == 1}
+        # corners hold a record of 8 for each of their parts
+        shapes = {k: v.reshape(-1, 8) if k == "corners" else v for k, v in arrays.items()}
+        self._records = {k: Halves(v) for k, v in shapes.items() if v.ndim == 2}
+        self.scale = self._records["corners"].scale
 
     def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Float]:
         """See `Memory.read`."""
-        return [mi.Float(x) for x in read_record(self._buffers[name], index, numbers, active)]
+        packets = self._records[name].read(index, active)
+        return [mi.Float(x) for packet in packets for x in packet][:numbers]
 
     def start(self, name: str, kind: Index) -> Index:
         """See `Memory.start`."""
-        return read(mi.UInt32, self._buffers[name], kind)
+        return read(mi.UInt32, self._starts[name], kind)
 
     @staticmethod
     def sum(count: Index, add: Callable[..., Float], inputs: Any, zero: Float) -> Float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
-from ..layout import Grid
+from ..layout import LEAST_HALF, Grid
 from .powers import PatchSpectra, alternate
 from .spectrum import GLOSSY_RADIUS
 
@@ -141,7 +141,6 @@ def _height_power(half_range: float, n: int, heights: NDArray[Any]) -> NDArray[A
     return (heights / half_range) ** n if half_range > 0.0 else np.zeros_like(heights)
 
 
-_SUBNORMAL, _ROUNDS = np.float32(2.0**-14), np.float32(0.75)
 _HALF_PEAK = 2.0**14  # largest stored half float: far from its overflow, the rest far from its zero
 
 
@@ -158,8 +157,6 @@ def half_precision(coefficients: NDArray[np.float32]) -> tuple[NDArray[np.float1
     for interval in range(len(coefficients)):
         for row, half in zip(coefficients[interval], halves[interval], strict=True):
             row *= np.float32(scale)
-            # The smallest half floats are multiples of 2⁻²⁴, and so is what this leaves of small
-            # numbers; NumPy is twenty times slower where its conversion has to round them.
-            np.subtract(row + _ROUNDS, _ROUNDS, out=row, where=np.abs(row) < _SUBNORMAL)
+            row[np.abs(row) < LEAST_HALF] = 0.0
             half[...] = row
     return halves, scale

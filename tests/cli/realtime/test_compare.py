@@ -98,18 +98,6 @@ def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(
     assert not Path("plate_compare").exists()
 
 
-def test_a_file_in_the_folders_place_is_refused_before_any_work(run, scene):
-    Path("taken").write_text("")
-    assert (
-        "it is a file; name a folder" in run("compare", scene, "-o", "taken").failed_in_one_line()
-    )
-
-
-def test_an_unwritable_folder_is_refused_before_any_work(run, scene):
-    line = run("compare", scene, "-o", "/proc/none/here").failed_in_one_line()
-    assert "cannot write" in line
-
-
 @pytest.fixture
 def gl_works():
     from mitsuba_diffraction import DiffractionError

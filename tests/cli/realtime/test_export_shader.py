@@ -44,25 +44,3 @@ def test_a_shader_is_written_with_all_that_it_reads(
         assert np.isfinite(pixels).all()
     assert json.loads(report.read_text(encoding="utf-8"))["bytes"]["code"] == len(code.encode())
     assert {file.name for file in out.iterdir()} >= {"diffraction.js", "example.html"}
-
-
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["missing.toml"], 1, "missing.toml"),
-        (["{source}", "-o", "{source}"], 1, "cannot write"),
-        (["{source}", "--material", "Al", "--int-ior", "1.5"], 2, "not allowed with"),
-        (["{source}", "--method", "flss"], 2, "invalid choice"),
-        (["{source}", "--mode", "scalar_rgb"], 1, "llvm_ad_rgb"),
-    ],
-)
-def test_what_does_not_fit_is_one_line_and_leaves_nothing(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str], options: list[str], code: int, words: str,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    assert main(["export-shader", *(o.format(source=source) for o in options)]) == code
-    said = capsys.readouterr().err.strip().splitlines()
-    assert words in said[-1]
-    assert "Traceback" not in "".join(said)
-    assert list(tmp_path.iterdir()) == [source]

@@ -202,45 +202,6 @@ def test_a_preview_is_half_as_wide_and_quick(render):
     assert "3 samples" in render("--preview", "-s", "3", "-o", "a.png").out
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--frames", "2"], "say what changes, with --animate or --turn"),
-        (["--frames", "0", *LIGHT], "expected a whole number from 1"),
-        ([*LIGHT], "belong to --frames"),
-        (["--fps", "3"], "belong to --frames"),
-        (["--frames", "2", "--animate", "light=1"], "expected KEY=FROM:TO"),
-        (["--frames", "2", "--animate", "light=a:b"], "expected numbers"),
-        (["--frames", "2", "--animate", "light=1,2:3"], "as many before as after"),
-        (["--frames", "2", "--animate", "light=nan:1"], "expected numbers"),
-        (["--frames", "2", *LIGHT, "-D", "light=1"], "leave -D light=1 out"),
-        (["--frames", "2", *LIGHT, "--turn", "light"], "'light' is set more than once"),
-        (["--frames", "2", *LIGHT, "-o", "a.avi"], "a film ending in .webp or .gif or .mp4"),
-    ],
-)
-def test_unusable_options_are_usage_errors(render, options, said):
-    ran = render(*options)
-    assert ran.code == 2
-    assert ran.err.startswith("mitsuba-diffraction render: error: ")
-    assert said in ran.err
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--turn", "text"], "the turn of text begins at 'word', which is not an angle"),
-        (["--animate", "lihgt=0:1"], "did you mean light?"),
-        (["--turn", "light", "-o", "no/where"], None),
-    ],
-)
-def test_parameters_that_do_not_fit_are_one_line(render, options, said):
-    ran = render("--frames", "2", *options)
-    if said is None:
-        assert ran.code == 0  # folders are made
-    else:
-        assert said in ran.failed_in_one_line()
-
-
 @pytest.mark.parametrize("option", ["--turn", "-D"])
 def test_what_the_scene_does_not_use_is_said_and_leaves_no_folder(render, scene, option):
     scene.write_text(SCENE.replace('"word"/>', '"word"/><default name="idle" value="3"/>'))

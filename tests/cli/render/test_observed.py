@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import OpenEXR
-import pytest
 from PIL import Image
 
 from tests.support.room import SCENE
@@ -27,22 +24,3 @@ def test_the_exr_has_a_channel_for_each_receptor_and_the_png_a_legend(run, scene
     assert 0.0 < short < long
     with Image.open("a.png") as picture:
         assert picture.width > 400
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "named"),
-    [
-        (["--observer", "dragon"], 1, "avian_uv"),
-        (["--observer", "dog", "--denoise"], 2, "one picture in one process"),
-        (["--observer", "dog", "-o", "a.png"], 2, "writes an EXR"),
-        (["--observer", "dog", "-m", "llvm_ad_rgb"], 1, "spectral"),
-        (["--observer", "avian"], 1, "did you mean avian_v or avian_uv?)"),
-        (["--observer", "dog", "--illuminant", "leafs"], 1, "did you mean leaves?)"),
-        (["--illuminant", "leaves"], 2, "--observer; name one"),
-    ],
-)
-def test_eyes_that_cannot_be_rendered_are_one_line(run, scene, arguments, code, named):
-    ran = run("render", scene, *arguments)
-    assert ran.code == code
-    assert named in ran.err
-    assert os.listdir() == ["room.xml"]

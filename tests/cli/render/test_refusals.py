@@ -33,22 +33,6 @@ def test_scenes_that_do_not_load_are_one_line(run, scene, old, new, said):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["-D", "ssp=3"], "did you mean spp?"),
-        (["-D", "parallel=3"], "no parameter 'parallel'"),
-        (["-D", "spp=many"], "could not parse"),
-        (["-m", "cuda_rgb"], "there is no variant 'cuda_rgb'; there are scalar_rgb"),
-        (["-o", "nowhere/a.exr"], "cannot write 'nowhere/a.exr'"),
-        (["-o", "/proc/a.png"], "cannot write '/proc/a.png'"),
-    ],
-)
-def test_arguments_that_do_not_fit_are_one_line(run, scene, arguments, said):
-    assert said in run("render", scene, *QUICK, *arguments).failed_in_one_line()
-    assert os.listdir() == ["room.xml"]
-
-
-@pytest.mark.parametrize(
     ("name", "content", "said"),
     [
         ("a.obj", "# of a modeller\nv 0 0 0\n", "tangents a.obj -o mesh.ply' first"),
@@ -70,30 +54,6 @@ def test_files_that_are_no_scene_are_one_line(run, scene, content):
     else:
         scene.write_text(content)
     assert "room.xml" in run("render", scene, *QUICK).failed_in_one_line()
-
-
-def test_a_folder_is_no_scene(run, scene):
-    assert "is a folder" in run("render", scene.parent, *QUICK).failed_in_one_line()
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["-D", "spp"],
-        ["-D", "=3"],
-        ["-D", "spp=1", "-D", "spp=2"],
-        ["-s", "0"],
-        ["-s", "few"],
-        ["--seed", "-1"],
-        ["--exposure", "nan"],
-        ["-o", "a.jpg"],
-        ["-o", "folder"],
-    ],
-)
-def test_unusable_options_are_usage_errors(run, scene, arguments):
-    ran = run("render", scene, *QUICK, *arguments)
-    assert ran.code == 2
-    assert ran.err.startswith("mitsuba-diffraction render: error: ")
 
 
 def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatch):

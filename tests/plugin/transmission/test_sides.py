@@ -11,41 +11,15 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
-from tests.support.directions import as_single, rough_patch
-from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
-from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.directions import rough_patch
+from tests.support.lanes import evaluated, interaction, spectra, vectors
+from tests.support.layered import PATCH, load, pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
-from tests.support.variants import evaluate, runs
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("fine")]
-
-
-@pytest.mark.parametrize("kind", SIDES)
-@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-def test_values_are_the_reference_s_in_both_directions(some_variant, kind, model):
-    wi, wo, lam = (a[:120] for a in pairs())
-    wo, bsdf = as_single(wo * BELOW), both(model=model, **SIDES[kind])
-    exact = np.stack(
-        [
-            reference.btdf(
-                PATCH, wi, wo, one,
-                coherence_width=WIDTH, model=model, eta=1.5, thin=kind == "sheet",
-            )
-            for one in lam.T
-        ],
-        axis=1,
-    )  # fmt: skip
-    # radiance in the dielectric is n² times as large
-    denser = 2.25 if kind == "dielectric" else 1.0
-    for there, back, factor in ((wi, wo, 1.0), (wo, wi, denser)):
-        found = evaluated(bsdf, there, back, lam)
-        expected = factor * exact * np.abs(back[:, 2:])
-        # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
-        assert found == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())
 
 
 @pytest.mark.parametrize("kind", SIDES)
@@ -65,20 +39,6 @@ def test_above_it_reflects_what_it_does_alone_and_below_as_from_within(some_vari
         coated = {"eta": 1.0, "k": 0.0, "coat_ior": 1.5}
         expected = evaluated(load(turned, **coated), wi, wo, lam)
         assert from_below == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max())
-
-
-@pytest.mark.parametrize("kind", SIDES)
-def test_reciprocity(some_variant, kind):
-    wi, wo, lam = pairs()
-    bsdf = both(**SIDES[kind])
-    for first, second, factor in (
-        (wi, wo * BELOW, 2.25 if kind == "dielectric" else 1.0),
-        (wi, wo, 1.0),
-        (wi * BELOW, wo * BELOW, 1.0),
-    ):
-        there = evaluated(bsdf, first, second, lam) / np.abs(second[:, 2:])
-        back = evaluated(bsdf, second, first, lam) / np.abs(first[:, 2:])
-        assert factor * there == pytest.approx(back, rel=2e-4, abs=2e-6 * back.max())
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -149,29 +109,6 @@ def test_of_a_component_alone_there_is_that_share_of_the_whole(some_variant, kin
         assert np.all(spectra(bsdf.eval(other, si, vectors(outgoing))) == 0.0)
 
 
-@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_mono", "llvm_ad_rgb"])
-@pytest.mark.parametrize("kind", SIDES)
-def test_variants_evaluate_what_they_sample(name, kind):
-    if not runs(name):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
-    wi, wo, _ = pairs(12)
-    lam = np.full((len(wi), 4), 600.0)
-    samples = np.random.default_rng(2).random((len(wi), 3))
-    bsdf = both(wavelength=600.0, **SIDES[kind])
-    wo = as_single(wo * BELOW)
-    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, as_single(samples), lam)
-    assert np.all(np.isfinite(value))
-    assert again == pytest.approx(value, rel=1e-5)
-    assert pdf_again == pytest.approx(pdf, rel=1e-5)
-    if not mi.is_rgb:
-        exact = -wo[:, 2] * reference.btdf(
-            PATCH, wi, wo, 600.0,
-            coherence_width=WIDTH, model="small_slope", eta=1.5, thin=kind == "sheet",
-        )  # fmt: skip
-        assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
-
-
 @pytest.mark.parametrize(
     ("kind", "name", "at", "step"),
     [("dielectric", "eta", 1.5, 1e-3), ("sheet", "height_scale", 0.9, 2e-3)],
@@ -194,33 +131,6 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
     dr.forward(parameters[name])
     derivative, differences = spectra(dr.grad(value)), (high - low) / (2 * step)
     assert np.abs(derivative - differences).sum() < 1e-2 * np.abs(differences).sum()
-
-
-@pytest.mark.parametrize(
-    ("parameters", "named"),
-    [
-        ({"material": "Al"}, ["material", "'diffraction'"]),
-        ({"int_ior": 1.0, "ext_ior": 1.5}, ["eta=0.666667", "1.01", "int_ior", "ext_ior"]),
-        ({"int_ior": 1.005, "ext_ior": 1.0}, ["eta=1.005", "1.01", "int_ior", "ext_ior"]),
-        ({"pigment": {"type": "diffuse"}}, ["nested", "light that goes through"]),
-        ({"coat_ior": 1.4}, ["coat_ior", "'diffraction'"]),
-        ({"film_ior": 1.4, "film_thickness": 100.0}, ["film_", "'diffraction'"]),
-        ({"shadowing": "vcavity"}, ["shadowing", "'diffraction'"]),
-        ({"coherence": "surface"}, ["coherence='surface'", "light that goes through"]),
-        ({"thin": 1.0}, ["thin=1.0", "true or false"]),
-        ({"transmission": True}, ["transmission", "diffraction_dielectric"]),
-    ],
-)
-def test_what_a_dielectric_does_not_support_is_named_in_one_line(some_variant, parameters, named):
-    line = refusal(lambda: load(plugin="diffraction_dielectric", **parameters))
-    assert all(name in line for name in named), line
-
-
-@pytest.mark.parametrize("parameters", [{"transmission": True}, {"thin": True}])
-def test_a_reflecting_surface_names_the_plugin_that_lets_light_through(some_variant, parameters):
-    line = refusal(lambda: load(**parameters))
-    assert "'diffraction_dielectric'" in line
-    assert next(iter(parameters)) in line
 
 
 def test_a_dictionary_names_an_unknown_plugin():

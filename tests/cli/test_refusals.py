@@ -1,0 +1,320 @@
+"""What commands refuse: one line that says what and where, an exit code, and nothing written.
+
+A refusal is one row: the words after the command's own, and what the line says.
+"""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from tests.support import room
+from tests.support.logos import write_board
+from tests.support.plate import plate_file
+
+_SMALL = "--pixel-size 0.08 --coherence-width 6"
+_MAP = f"brdf-map grating.npy {_SMALL} --resolution 32 --step 47"
+_SPECTRUM = f"spectrum grating.npy {_SMALL} --wavelength-range 400:700 --step 50"
+_SWEEP = f"grating.npy {_SMALL} --resolution 32 --step 47"
+_PRECOMPUTE = f"precompute grating.npy {_SMALL}"
+_RENDER = "render room.xml -m scalar_rgb"
+_FRAMES = f"{_RENDER} --frames 2"
+_LIGHT = "--animate spp=1:2"
+_EVALUATE = (
+    "evaluate grating.npy --pixel-size 0.08 --coherence-width 12 --step 40 --angle-step 0.5 "
+    "--positions 2 --periodic exact"
+)
+
+#: What is wrong with what is named: exit code 1.
+REFUSED = {
+    _MAP: {
+        "--theta 90": "theta=90 must be at least 0 and below 90",
+        "--phi 1e9": "phi=1e+09 must be from -360 to 360",
+        "--step 500": "step=500 nm does not fit",
+        "--wavelength-range 700:400": "700 to 400 nm",
+        "--wavelength-range 300:400": "table's shortest wavelength, 360 nm",
+        "--resolution 99999": "resolution=99999 must be",
+        "--samples 0": "samples=0 must be",
+        "--coherence-width -1": "coherence_width='-1'",
+        "-o missing/a.exr": "cannot write 'missing/a.exr'",
+        "-m scalar_rgb": "variant 'scalar_rgb'",
+        "--material Unobtainium": "Unobtainium",
+        "--fill hope": "fill",
+        "--method rainbow --relative": "no relative reflectance",
+        "--method flss --relative --int-ior glass": "takes a number",
+    },
+    "brdf-map": {
+        "t.exr -o t.exr": "would overwrite",
+        "t.exr --ext-ior water": "t.exr",
+        "nothing.png": "nothing.png",
+        "--preset dvdd": "did you mean dvd",
+        "noise.npy --pixel-size 0.08 --method rainbow": "needs a period",
+    },
+    _SPECTRUM: {
+        "--detector 89.5": "89.5",
+        "--light 90": "90",
+        "--acceptance 0": "acceptance",
+        "--light-azimuth 1000": "1000",
+        "--material Al --wavelength-range 800:900": "885.6 nm",
+        "--material kerratin": "keratin",
+        "--pigment none.csv": "none.csv",
+        "--material gold --pigment 0.2": "gold",
+        "--crops 400": "crops=400",
+        "--observer dragon": "dragon",
+    },
+    "spectrum": {"empty": "empty", "none*.npy": "none*.npy", "--group a=none*.npy": "no file"},
+    _EVALUATE: {
+        "--theta 95": "theta=95 must be",
+        "--method pq --tolerance 0": "tolerance=0",
+        "--coherence-width 1e300": "coherence_width='1e300'",
+        "--step 900": "step=900 nm does not fit",
+        "--angles 20:10": "angles=20:10 degrees are none",
+        "--angle-step 0": "angle-step=0 does not fit",
+        "--period 0": "period=0.0 must be",
+        "--order 0": "order=0 is",
+        "--material kerratin": "did you mean keratin",
+        "--material keratin --method flss": "method=flss",
+        "-o missing/a.png": "cannot write",
+    },
+    "evaluate": {"t.exr": "is a table; this needs the heights"},
+    f"sweep terms {_SWEEP}": {
+        "--coherence-width 1e300": "coherence_width",
+        "--values a": "--values: expected numbers, got 'a'",
+        "--method nmm": "needs method 'flss'",
+    },
+    f"sweep light-angle {_SWEEP}": {"--values 95": "theta=95 must be"},
+    _PRECOMPUTE: {
+        "--pixel-size 0": "'0'",
+        "--pixel-size=-0.1": "'-0.1'",
+        "--pixel-size nan": "'nan'",
+        "--max-height 0.3 --height-unit nm": "without max_height",
+        "--level tilt": "'tilt'",
+        "--tolerance=-1": "tolerance",
+        "--tolerance nan": "tolerance",
+        "--coherence-width 0": "coherence_width",
+        "--coherence-width inf": "coherence_width",
+        "--wavelength-range 700:400": "wavelength",
+        "--basis taylor --tolerance 1e-12": "tolerance",
+        "--channel Height": "channel",
+        "--crop 7": "crop to 7 x 7 µm is larger than the patch",
+        "-o nowhere/table.exr": "cannot write 'nowhere/table.exr'",
+        "-o /proc/table.exr": "cannot write '/proc/table.exr'",
+        "-o folder.exr": "cannot write 'folder.exr'",
+        "--pixel-size 80": "is the pixel size of 80 µm in nm? Then divide it by 1000",
+    },
+    "precompute": {
+        "scale.png --pixel-size 0.1": "max_height=0.375",
+        "scale.png --max-height 0.1": "pixel_size",
+        "none.npy": "'none.npy'",
+        "empty.npy": "'empty.npy'",
+        "cut.npy": "'cut.npy'",
+        "words.npy": "'words.npy'",
+        "empty": "is a folder",
+    },
+    "tangents": {
+        "none.obj -o a.ply": "'none.obj' does not exist",
+        "mesh.ply -o no/a.ply": "cannot write 'no/a.ply'",
+    },
+    "tonemap": {
+        "none.exr": "none.exr",
+        "words.exr": "cannot read",
+        "words.npy": "not an EXR",
+        "depth.exr": "holds no colours",
+        ".": "is a folder",
+        "/": "is a folder",
+    },
+    "hologram": {
+        "red.png": "no colour beside its ground",
+        "none.png": "'none.png' does not exist",
+        "logo.png --mesh flat.obj": "flat",
+        "logo.png --mesh bare.obj": "no texture coordinates",
+    },
+    "export-osl": {
+        "missing.nc": "missing.nc",
+        "orders.nc -o orders.nc": "it is a file",
+        "orders.nc -o orders.nc/in": "cannot write",
+        "--addon a.zip --with empty": "export-osl",
+    },
+    "export-shader": {
+        "missing.toml": "missing.toml",
+        "grating.toml -o grating.toml": "cannot write",
+        "grating.toml --mode scalar_rgb": "llvm_ad_rgb",
+    },
+    "export-viewer": {
+        "plate.xml -o missing/a.html": "cannot write",
+        "plate.xml -o folder.html": "it is a folder",
+        "plate.xml -o a.html -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
+        "plate.xml -o a.html -m llvm_ad_mono": "set llvm_ad_rgb or llvm_ad_spectral",
+        "dull.xml -o a.html": "diffracts",
+    },
+    "compare": {
+        "plate.xml -o compared -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
+        "plate.xml -o words.npy": "it is a file; name a folder",
+        "plate.xml -o /proc/none/here": "cannot write",
+    },
+    _RENDER: {
+        "-D ssp=3": "did you mean spp?",
+        "-D parallel=3": "no parameter 'parallel'",
+        "-D spp=many": "could not parse",
+        "-m cuda_rgb": "there is no variant 'cuda_rgb'; there are scalar_rgb",
+        "-o nowhere/a.exr": "cannot write 'nowhere/a.exr'",
+        "-o /proc/a.png": "cannot write '/proc/a.png'",
+        "--observer dragon": "avian_uv",
+        "--observer dog -m llvm_ad_rgb": "spectral",
+        "--observer avian": "did you mean avian_v or avian_uv?)",
+        "--observer dog --illuminant leafs -m scalar_spectral": "did you mean leaves?)",
+    },
+    _FRAMES: {
+        "--turn format": "the turn of format begins at 'rgb', which is not an angle",
+        "--animate ssp=0:1": "did you mean spp?",
+    },
+    "render": {"none.xml": "none.xml", "empty": "is a folder"},
+}
+
+#: What is wrong with the words: exit code 2, and the line begins with the command's name.
+USAGE = {
+    _MAP: {
+        "--wavelength 500": "--wavelength: not allowed with argument --step",
+        "-o a.png --spectral": "--spectral: bands need an EXR",
+        "-o a.jpg": "expected a name ending in .exr or .png",
+        "--material Al --int-ior 1.5": "--int-ior: not allowed with",
+        "--illuminant A": "--illuminant: invalid choice: 'A'",
+        "--preset dvd": "SOURCE or --preset",
+        "--method flss --material Al": "--material: not allowed with",
+        "--method flss --spectral": "--spectral: not allowed with",
+        "--method flss --illuminant E": "under --illuminant D65 only",
+        "--method flss --int-ior 1.5": "only for --relative",
+        "--relative": "--relative: only with argument --method",
+        "--method ray": "--method: invalid choice",
+    },
+    "spectrum": {
+        "--group a": "NAME=PATTERN",
+        "": "give files",
+        "grating.npy --detector 5:1:1": "5:1:1",
+        "grating.npy --azimuth north": "north",
+    },
+    _PRECOMPUTE: {
+        "--coherence nonsense": "nonsense",
+        "--basis fourier": "fourier",
+        "--terms 0": "0",
+        "--terms many": "many",
+        "--tolerance small": "small",
+        "--wavelength-range 400": "400",
+        "-o table.png": "table.png",
+        "--levels plane": "--levels",
+    },
+    "precompute": {
+        "recipe.toml recipe.toml -o a.exr": "--output",
+        "recipe.toml grating.npy": "cannot be mixed",
+        "grating.npy grating.npy": "--output",
+    },
+    "tangents mesh.ply": {
+        "": "-o",
+        "-o a.obj": ".ply",
+        "-o a.ply --along w": "'w'",
+        "-o a.ply --rotate x": "'x'",
+    },
+    "export-osl": {
+        "orders.nc --material Al --int-ior 1.5": "not allowed with",
+        "orders.nc --addon a.zip": "--addon",
+    },
+    "export-shader": {
+        "grating.toml --material Al --int-ior 1.5": "not allowed with",
+        "grating.toml --method flss": "invalid choice",
+    },
+    "export-viewer plate.xml": {"-o page.pdf": ".html"},
+    _RENDER: {
+        "-D spp": "-D",
+        "-D =3": "-D",
+        "-D spp=1 -D spp=2": "spp",
+        "-s 0": "-s",
+        "-s few": "-s",
+        "--seed -1": "--seed",
+        "--exposure nan": "--exposure",
+        "-o a.jpg": "a.jpg",
+        "-o folder": "folder",
+        "--observer dog --denoise": "one picture in one process",
+        "--observer dog -o a.png": "writes an EXR",
+        "--illuminant leaves": "--observer; name one",
+        "--frames 2": "say what changes, with --animate or --turn",
+        _LIGHT: "belong to --frames",
+        "--fps 3": "belong to --frames",
+        f"--frames 0 {_LIGHT}": "expected a whole number from 1",
+    },
+    _FRAMES: {
+        "--animate spp=1": "expected KEY=FROM:TO",
+        "--animate spp=a:b": "expected numbers",
+        "--animate spp=1,2:3": "as many before as after",
+        "--animate spp=nan:1": "expected numbers",
+        f"{_LIGHT} -D spp=1": "leave -D spp=1 out",
+        f"{_LIGHT} --turn spp": "'spp' is set more than once",
+        f"{_LIGHT} -o a.avi": "a film ending in .webp or .gif or .mp4",
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small inputs of every kind, and what is wrong with some."""
+    folder = tmp_path_factory.mktemp("refusals")
+    for file in original.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    plate_file(folder)
+    texts = {
+        "room.xml": room.SCENE,
+        "dull.xml": room.SCENE,
+        "flat.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+        **{f"words.{suffix}": "words" for suffix in ("exr", "npy")},
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    write_board(folder / "bare.obj", with_uv=False)
+    for name in ("empty", "folder.exr", "folder.html"):
+        (folder / name).mkdir()
+    (folder / "empty.npy").touch()
+    (folder / "cut.npy").write_bytes(b"\x93NUMPY\x01\x00")
+    x = np.arange(75) * 0.08
+    np.save(folder / "grating.npy", np.tile(0.02 * np.sin(2 * np.pi * x / 3.0), (75, 1)))
+    np.save(folder / "noise.npy", np.random.default_rng(1).normal(0.0, 0.02, (64, 64)))
+    Image.new("RGB", (9, 9), "red").save(folder / "red.png")
+    OpenEXR.File({}, {"height": np.zeros((4, 4), np.float32)}).write(str(folder / "depth.exr"))
+    return folder
+
+
+def rows(table: dict[str, dict[str, str]]) -> list[object]:
+    """A case of each row."""
+    return [
+        pytest.param(f"{command} {words}", said, id=f"{command.split()[0]} {words}")
+        for command, refusals in table.items()
+        for words, said in refusals.items()
+    ]
+
+
+def contents() -> set[str]:
+    """Names of all in the current folder."""
+    return {str(path) for path in Path().rglob("*")}
+
+
+@pytest.mark.parametrize(("line", "said"), rows(REFUSED))
+def test_what_does_not_fit_is_one_line(run, folder, monkeypatch, some_variant, line, said):
+    monkeypatch.chdir(folder)
+    before = contents()
+    assert said in run(*shlex.split(line)).failed_in_one_line()
+    assert contents() == before
+
+
+@pytest.mark.parametrize(("line", "said"), rows(USAGE))
+def test_wrong_usage_is_one_line_with_the_name_of_the_command(run, folder, monkeypatch, line, said):
+    monkeypatch.chdir(folder)
+    before = contents()
+    ran = run(*shlex.split(line))
+    assert (ran.code, ran.out) == (2, "")
+    (last,) = ran.err.splitlines()
+    assert last.startswith(f"mitsuba-diffraction {line.split()[0]}: error: ")
+    assert said in last
+    assert contents() == before
