@@ -19,8 +19,6 @@ from .polarised import IN_PLANE, TurnedAxes, nearest_jones, s_and_p, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
 
-AnyLookup = Lookup | ListedLookup
-
 
 class _Light(NamedTuple):
     """Light and the order that is looked up, as the parameters of `efficiency`."""
@@ -178,7 +176,7 @@ def _jones(light: _Light) -> NDArray[np.complex128]:
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    entries = nearest_jones(np.moveaxis(_elements(light), -1, 0))
+    entries = nearest_jones(list(np.moveaxis(_elements(light), -1, 0)))
     scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(*light[:6]))[..., None]
     return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
@@ -186,7 +184,7 @@ def _jones(light: _Light) -> NDArray[np.complex128]:
 class _Placed(NamedTuple):
     """Light in a look-up, all flat, and the shape of the answer."""
 
-    lookup: AnyLookup
+    lookup: Lookup
     row: Any
     order: Any
     active: NDArray[np.bool_]
@@ -232,7 +230,7 @@ def _placed(light: _Light) -> _Placed:
 def lookup_in(
     table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
     chances: bool = False,
-) -> AnyLookup:  # fmt: skip
+) -> Lookup:  # fmt: skip
     """Return the look-up of a table, with its grid in a memory.
 
     coated, elements, chances : as for `grid.grid_of`.
@@ -247,10 +245,10 @@ def lookup_in(
     return Lookup(table, grid, held, coated=coated)
 
 
-_lookups: weakref.WeakKeyDictionary[OrderTable, AnyLookup] = weakref.WeakKeyDictionary()
+_lookups: weakref.WeakKeyDictionary[OrderTable, Lookup] = weakref.WeakKeyDictionary()
 
 
-def lookup_of(table: OrderTable) -> AnyLookup:
+def lookup_of(table: OrderTable) -> Lookup:
     """Return the look-up of the grating alone, without its coat, in NumPy's memory."""
     if table not in _lookups:
         _lookups[table] = lookup_in(table, Arrays, coated=False, elements=True)

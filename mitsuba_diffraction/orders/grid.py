@@ -138,7 +138,7 @@ def _without_anomalies(table: OrderTable, response: ListedResponse) -> Array:
     left = crossed_square(x, y, *shifts)
     came, zeroth = 1.0 - x * x - y * y + 0.0 * left, ~response.orders.any(axis=1)
     scale = order_factor(came, left, zeroth, response.index)
-    values, axes = np.moveaxis(response.values.astype(np.float64), -1, 0), turned_axes(x, y)
+    values, axes = list(np.moveaxis(response.values, -1, 0).astype(np.float64)), turned_axes(x, y)
     axes = TurnedAxes(*(part[:, :, :, None] for part in axes))
     known = (left > _LEAST_SQUARE)[:, :, :, None]
     turned = np.stack(about_s(values, axes), axis=-1)

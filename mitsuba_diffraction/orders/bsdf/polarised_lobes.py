@@ -22,7 +22,6 @@ from ...plugin.arithmetic import maximum, minimum
 from ...plugin.boundary import mueller, turn, turned
 from ...plugin.directions import Pair
 from ...plugin.types import Context, Float, Mask, Spectrum, Vector3f
-from ..efficiency import AnyLookup
 from ..lookup import Lookup
 from ..polarised import nearest_jones
 from .lobes import Lit, SpectralLobes
@@ -43,11 +42,11 @@ class Wave(NamedTuple):
     share: Float
 
 
-def _wave(lookup: AnyLookup, row: Any, order: Any, y: Float, active: Mask) -> Wave:
+def _wave(lookup: Lookup, row: Any, order: Any, y: Float, active: Mask) -> Wave:
     """Return the light of an order; y : direction cosine of the light along the grooves."""
     elements = lookup.elements(row, order, y, active)
     share = mi.Float(1.0)
-    if isinstance(lookup, Lookup) and lookup.coated:
+    if lookup.coated:
         within = lookup.repeated(row, order, active & row.lit)
         share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
     return Wave(nearest_jones(elements), share)

@@ -18,7 +18,7 @@ from ...errors import DiffractionError
 from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
 from ..polarised import ODD, mueller_of
-from ..response import LINEAR, MUELLER, orders_between
+from ..response import LINEAR, MUELLER, ListedResponse, orders_between
 from ..table import OrderTable, check_outline
 from .accuracy import measured_error, powers, warn_of_error
 from .crossed import folded
@@ -122,6 +122,7 @@ def solve_directions(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip
     if lights.is_all:
+        assert isinstance(made.response, ListedResponse)
         made = replace(made, response=replace(made.response, index=_clear_index(grating)))
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
