@@ -1,4 +1,4 @@
-"""The commands that docs and notebooks show run, in their order, on small patches and pictures.
+"""The commands that README, docs and notebooks show run, in order, on small patches and pictures.
 
 What is not run here: the gallery's, whose scenes test_scenes_thorough.py renders; `make`, `pip` and
 `apt`, which set up what runs these tests; `view`, which opens a window; `tradeoff`, `compare`,
@@ -27,8 +27,6 @@ def tree(tmp_path_factory):
     return small_tree(tmp_path_factory.mktemp("clone"))
 
 
-@pytest.mark.parametrize(
-    "page", [p for p in PAGES if p not in ("README.md", "docs/gallery.md") and commands(p)]
-)
+@pytest.mark.parametrize("page", [p for p in PAGES if p != "docs/gallery.md" and commands(p)])
 def test_the_commands_of_a_page_run(page, tree, monkeypatch):
     run_page(page, tree, monkeypatch)

@@ -9,6 +9,8 @@ import pytest
 
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 ROOMS = ("heights", "optics", "tables", "reference")
 WITHOUT = """
 import importlib, pkgutil, sys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -63,9 +64,15 @@ def test_circles_are_found():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [{"b", "c"}]
 
 
+@functools.cache
+def parsed(file: Path) -> ast.Module:
+    """The syntax tree of a file."""
+    return ast.parse(file.read_text("utf-8"))
+
+
 def imported(file: Path) -> Iterator[str]:
     """Modules of the tests that a file imports."""
-    for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+    for node in ast.walk(parsed(file)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.startswith("tests."))
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -88,7 +95,7 @@ def test_tests_import_helpers_and_never_one_another():
 
 def test_a_tier_is_that_of_a_whole_file():
     for file in TESTS:
-        tree = ast.parse(file.read_text("utf-8"))
+        tree = parsed(file)
         marks = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
         at_top = [
             ast.unparse(node.value)

@@ -38,7 +38,7 @@ import mitsuba_diffraction as md
 mi.set_variant("scalar_rgb")
 patch = md.HeightField(0.2 * np.random.default_rng(0).random((32, 32)), 0.08, name="steep")
 for _ in range(3):
-    mi.load_dict(md.bsdf_dict(patch, coherence_width=2.0))
+    mi.load_dict(md.bsdf_dict(patch, coherence_width=2.0, energy_conserving=False))
 np.array([1e308]) * 10
 """
 

@@ -20,6 +20,8 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.plugin.presets import presets
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 backend = pytest.importorskip("hatchling.builders.wheel", reason="the build backend is missing")
 
 

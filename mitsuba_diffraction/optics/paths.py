@@ -19,7 +19,7 @@ import numpy as np
 from . import boundary, through
 from .blend import Real
 from .boundary import Direction, Heights, Jones
-from .coat import beneath_reflectance, crossing, refracted, transmittances, transmitted
+from .coat import beneath_reflectance, crossing, refracted, transmitted
 from .fresnel import Filmed, reflectance
 from .mirror import correction_within, horizon_correction, mirror_cosine, outside_square
 from .stack import Stacked
@@ -235,12 +235,9 @@ class Returned(Path):
         return np.hypot(*(inside.normal(cosine) - cosine for cosine in (cos_i, cos_o)))
 
     def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
-        """Return G: T² R/(1 − R²) of either direction, the mean of both polarisations."""
-        shares = []
-        for cosine in (cos_i, cos_o):
-            passed = transmittances(np.asarray(cosine), self.sheet)
-            shares.append(0.5 * sum(t * (1.0 - t) / (2.0 - t) for t in passed))
-        return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)
+        """Return G, the geometric mean of both directions' `through.returned`."""
+        came, left = (through.returned(np.asarray(cosine), self.sheet) for cosine in (cos_i, cos_o))
+        return np.sqrt(came * left) + 0.0 * np.asarray(cos_turn)
 
     def _flat(self, cosine: Real) -> Real:
         return self.common(cosine, cosine, 0.0)

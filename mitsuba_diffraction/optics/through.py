@@ -146,6 +146,15 @@ def flat_transmittances(cosine: Number, n: Number, thin: bool) -> Powers:
     return s * reciprocal(2.0 - s), p * reciprocal(2.0 - p)
 
 
+def returned(cosine: Number, n: Number) -> Number:
+    """Return T² R/(1 − R²) of the flat side of a sheet, the mean of both polarisations.
+
+    This share passes the structure, is mirrored to and fro, and goes back through the structure.
+    """
+    s, p = (t * (1.0 - t) * of(t).reciprocal(2.0 - t) for t in transmittances(cosine, n))
+    return 0.5 * (s + p)
+
+
 def out_of_sheet(jones: Jones, n: Number, above: Number, below: Number) -> Jones:
     """Return the matrix of light that leaves a thin sheet through its flat other side.
 

@@ -62,8 +62,13 @@ import mitsuba as mi
 from ..optics import through
 from ..optics.boundary import Geometry, Jones, geometry, power
 from ..optics.coat import Powers as TransmittedPowers
-from ..optics.coat import transmittances
-from ..optics.through import flat_transmittances, order_0, out_of_sheet, outside_square
+from ..optics.through import (
+    flat_transmittances,
+    order_0,
+    out_of_sheet,
+    outside_square,
+    returned,
+)
 from . import parameters as read
 from .arithmetic import plain
 from .base import asked_sides
@@ -231,8 +236,8 @@ class DiffractionDielectric(DiffractingSurface):
         deep = [dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine for cosine in ends]
         point = TablePoint(pair.uv, dr.sqrt(dr.fma(deep[0], deep[0], dr.square(deep[1]))))
         power = self.power.power(point, site.scale, site.si)
-        both = dr.safe_sqrt(_returned(ends[0], n) * _returned(ends[1], n))
-        flat = self._of_mirror(site, pair, lambda cosine: _returned(cosine, n))
+        both = dr.safe_sqrt(returned(ends[0], n) * returned(ends[1], n))
+        flat = self._of_mirror(site, pair, lambda cosine: returned(cosine, n))
         level = self.area_factor * pair.frame.area * pair.cos_o
         others = mi.depolarizer(power.others * (level * both))
         zeroth = mi.depolarizer(power.zeroth * (level * mi.UnpolarizedSpectrum(flat)))
@@ -352,11 +357,6 @@ class DiffractionDielectric(DiffractingSurface):
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
         return {**super().shown(), "thin": "true" if self.thin else "false"}
-
-
-def _returned(cosine: Float, n: Float) -> Float:
-    """Return T² R/(1 − R²) of the flat side of a sheet, the mean of both polarisations."""
-    return 0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in transmittances(cosine, n))
 
 
 mi.register_bsdf("diffraction_dielectric", DiffractionDielectric)

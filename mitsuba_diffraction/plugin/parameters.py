@@ -42,6 +42,11 @@ TABLE = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: Layers, pigment and medium that "none" leaves out, so that a scene can have a parameter for them.
 OPTIONAL = ("coat_ior", "film_ior", "layers", "ext_ior", "pigment")
+# End of the message on a film whose thickness is a texture
+_UNEVEN_FILM = (
+    "; for an uneven film, weight surfaces with films of several thicknesses by textures "
+    "in a diffraction_mix"
+)
 #: µm a unit; beyond, single precision holds positions on the surface to no better than 1 µm.
 MOST_UV_SCALE = 1e7
 #: nm, of mono variants.
@@ -287,7 +292,7 @@ def layered(props: Properties, material: Material, table: DiffractionTable) -> M
     if isinstance(material, Perfect):
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")
     film = Dielectric(read_index(props, "film_ior"), _above(props), "film_eta")
-    k, thickness = number(props, "film_k", 0.0), number(props, "film_thickness", 0.0)
+    k, thickness = number(props, "film_k", 0.0), number(props, "film_thickness", 0.0, _UNEVEN_FILM)
     filmed = UnderFilm(material, film, k, thickness, wavelength, table.wavelength_range[0])
     for refused in (*(parameter.refusal() for parameter in filmed.changeable), filmed.refusal()):
         if refused:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import mitsuba as mi
+
 from ..errors import DiffractionError, check_choice
 from .types import BSDF, Properties
 
@@ -23,15 +25,16 @@ def flag(props: Properties, name: str, default: bool) -> bool:
     return value
 
 
-def number(props: Properties, name: str, default: float) -> float:
-    """Read a finite number."""
+def number(props: Properties, name: str, default: float, advice: str = "") -> float:
+    """Read a finite number; `advice` ends the message on a texture or word instead."""
     if name not in props:
         return default
     value = props.get(name)
     try:
         parsed = float(value)
     except (TypeError, ValueError):
-        raise DiffractionError(f"{name}={value!r} must be a number") from None
+        shown = class_of(value) if isinstance(value, mi.Object) else repr(value)
+        raise DiffractionError(f"{name}={shown} must be a number{advice}") from None
     if not math.isfinite(parsed):
         raise DiffractionError(f"{name}={value} must be a finite number")
     return parsed

@@ -198,7 +198,8 @@ def _node_of(state: Any, name: str) -> int:
         listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
         raise DiffractionError(
             f"{MATERIAL}{name}: no BSDF or shape of the scene has this id; there are "
-            f"{listed or 'none: add id attributes to the scene'}"
+            f"{listed or 'none: add id attributes to the scene'}. A mesh file is one shape; for "
+            "one of its materials, save the triangles of each as a file and give it a shape"
         )
     return int(known[name])
 

@@ -6,7 +6,6 @@ against `flss`, both compiled by Dr.Jit.
 
 from __future__ import annotations
 
-import functools
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -155,7 +154,7 @@ def _setups(
 ) -> list[tuple[Method, LightDirection, float]]:  # fmt: skip
     """Return method, light and step (nm) of each value; tables are shared where it allows that."""
     step = float(settings.get("step", 5.0))
-    settings = {"build": functools.cache(DiffractionTable.build), "progress": progress} | settings
+    settings = {"progress": progress} | settings
 
     def build(**changes: Any) -> Method:
         """Build the method with the settings and these changes."""

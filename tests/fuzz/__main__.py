@@ -45,7 +45,7 @@ _SHARES = {
     "commands": 0.1, "surfaces": 0.1, "light": 0.1, "updates": 0.05, "orders": 0.1, "energy": 0.1,
 }  # fmt: skip
 #: Cases of each kind that take about a second together.
-ROUND = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
+ROUND = {"tables": 30, "documents": 50, "heights": 20, "texts": 30, "commands": 10, "surfaces": 2}
 ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine. Scales of energy of a thick

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
+from tests.support.directions import rough_patch
 
 DEFAULT = {"int_ior": 1.5, "energy_conserving": True}
 CASES = {
     "one wavelength, 45°": Case(ROUGH, 45.0, (400.0,), SMALL),
-    "dispersed, 0°": Case(ROUGH, 0.0, DISPERSED, SMALL),
+    "lobes far apart, order 1": Case(
+        rough_patch((60, 60), (0.13, 0.13), 0.12),
+        20.0,
+        (550.0,),
+        {"coherence_width": 60.0},
+        (2.0 * math.pi / 7.8, 0.0),
+    ),
     "dielectric, dispersed, 60°": Case(ROUGH, 60.0, DISPERSED, SMALL | DEFAULT),
 }
 

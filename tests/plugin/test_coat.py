@@ -75,19 +75,6 @@ def transmittance(cosine: Any, coat: float, index: float) -> Any:
     return (1 - face) * (1 - structure) / (1 - face * structure)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "line"),
-    [
-        ({"coat_ior": 0.9}, "coat_ior=0.9"),
-        ({"coat_ior": float("nan")}, "coat_ior=nan"),
-        ({"coat_ior": 1.2, "ext_ior": 1.33}, "below the index of the medium above"),
-        ({"coat_ior": 1.5, "material": "none"}, "material='none'"),
-    ],
-)
-def test_what_is_no_coat_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
-
-
 def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):
     file = tmp_path / "table.exr"
     md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(file)

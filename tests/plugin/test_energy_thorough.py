@@ -12,10 +12,12 @@ from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.plugin.directions import Site
 from tests.support.directions import polar
 from tests.support.furnace import (
+    COMBINATIONS,
     DIELECTRIC,
     SURFACES,
     assert_at_most_white,
     bsdf,
+    check_combination,
     furnace,
     furnace_in,
     random_directions,
@@ -189,3 +191,8 @@ def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarsely):
     si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
     value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(polar(70.0, 190.0))))
     assert np.all(np.isfinite(value))
+
+
+@pytest.mark.parametrize(("field", "parameters"), COMBINATIONS)
+def test_combinations_send_on_no_more_than_they_get(field, parameters):
+    check_combination(field, parameters)

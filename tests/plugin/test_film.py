@@ -15,7 +15,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
-from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.lanes import evaluated, interaction
 from tests.support.layered import FLAT, PATCH, load, pairs
 from tests.support.variants import evaluate
 
@@ -129,25 +129,6 @@ def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
     expected = 1 - there + there * back.mean()
     # a lobe loses a little below the horizon
     assert weights.mean() == pytest.approx(expected, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "line"),
-    [
-        ({"film_ior": 1.4}, "film_ior alone is not a film"),
-        ({"film_k": 0.1}, "film_k alone is not a film"),
-        ({"film_ior": 1.4, "film_thickness": -5.0}, "film_thickness=-5 nm must be at least 0"),
-        ({"film_ior": 1.4, "film_thickness": 1e4}, "over which light is coherent"),
-        ({"film_ior": 0.5, "film_thickness": 100.0}, "film_ior=0.5"),
-        ({**OXIDE, "film_k": -0.1}, "film_k=-0.1 must be"),
-        ({**OXIDE, "film_k": 3.0}, "absorbs all light"),
-        ({**OXIDE, "material": "none"}, "material='none'"),
-        ({**OXIDE, "coat_ior": 1.5}, "coat_ior"),
-        ({**OXIDE, "film_k": 0.1, "nested": {"type": "diffuse"}}, "film_k"),
-    ],
-)
-def test_what_is_no_film_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
 
 
 @pytest.mark.parametrize("changed", [{"film_thickness": -1.0}, {"film_thickness": 2e4}])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -13,7 +11,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.elements import check_attributes
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
-from tests.support.lanes import refusal, vectors
+from tests.support.lanes import vectors
 
 pytestmark = pytest.mark.thorough
 
@@ -94,25 +92,6 @@ def test_derivatives_with_respect_to_factors_are_those_of_differences(mono):
     found = total(step)
     dr.forward_from(step)
     assert dr.grad(found)[0] == pytest.approx(difference, rel=1e-2)  # its curvature and rounding
-
-
-@pytest.mark.parametrize(
-    ("parameters", "said"),
-    [
-        ({"height_scale": partial(bitmap, -FACTORS)}, "largest factor, -0, must be above 0"),
-        ({"height_scale": partial(bitmap, FACTORS * np.nan)}, "largest factor, nan, must be"),
-        ({"height_scale": partial(bitmap, FACTORS - 1.0)}, "numbers go from -1 to 0.25"),
-        ({"height_scale": partial(bitmap, 2e3 * FACTORS)}, "must be"),
-        ({"height_scale": bitmap, "height_scale_max": 1.0}, "must be between 0 and 1"),
-        ({"height_scale": partial(bitmap, raw=False)}, "the bitmap is not raw"),
-        ({"height_scale": {"type": "checkerboard"}}, "needs height_scale_max"),
-        ({"height_scale": {"type": "mesh_attribute", "name": "vertex_worn"}}, "height_scale_max"),
-        ({"height_scale": 1.2, "height_scale_max": 2.0}, "for a height_scale that is a texture"),
-    ],
-)
-def test_factors_that_mean_nothing_are_refused(mono, parameters, said):
-    made = {k: v() if callable(v) else v for k, v in parameters.items()}
-    assert said in refusal(lambda: load(**made))
 
 
 def test_a_mesh_attribute_is_read(mono):

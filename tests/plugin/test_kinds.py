@@ -18,19 +18,23 @@ COLOURED = [kind for kind in KINDS if kind != "surface"]
 
 
 def check(kind: str, count: int) -> None:
-    """Values, the same by `eval` and `eval_pdf`; samples' directions and weights are finite."""
+    """Values, the same by `eval` and `eval_pdf`; samples are as dense and bright as these say."""
     wi, wo, lam = lit(kind, count)
     samples = as_single(np.random.default_rng(2).random((len(wi), 3)))
-    value, pdf, again, pdf_again, drawn, density, weight = evaluate(
-        made(kind), wi, wo, samples, lam
-    )
+    bsdf = made(kind)
+    value, pdf, again, pdf_again, drawn, density, weight = evaluate(bsdf, wi, wo, samples, lam)
     assert np.all(np.isfinite(value))
     assert np.any(value > 0.0)
     assert again == pytest.approx(value, rel=1e-5)
     assert pdf_again == pytest.approx(pdf, rel=1e-5)
     assert np.all(np.isfinite(weight))
     assert np.all(np.isfinite(density))
-    assert np.linalg.norm(drawn[density > 0.0], axis=1) == pytest.approx(1.0, abs=1e-5)
+    valid = density > 0.0
+    assert np.linalg.norm(drawn[valid], axis=1) == pytest.approx(1.0, abs=1e-5)
+    there, dense, *_ = evaluate(bsdf, wi, np.where(valid[:, None], drawn, wo), samples, lam)
+    assert density[valid] == pytest.approx(dense[valid], rel=1e-3)
+    product = (weight * density[:, None])[valid]
+    assert product == pytest.approx(there[valid], rel=2e-3, abs=1e-5 * np.abs(there).max())
     if mi.is_spectral and (expected := exact(kind, wi, wo, lam)) is not None:
         # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
         assert value == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -194,32 +192,6 @@ def test_numbers_change_up_to_the_largest_loaded(mono):
     parameters["lateral_scale"] = 1.4
     with pytest.raises(DiffractionError, match=r"at most 1\.3, the table.s range"):
         parameters.update()
-
-
-@pytest.mark.parametrize(
-    ("parameters", "said"),
-    [
-        ({"lateral_scale": 0.0}, "lateral_scale=0 must be at least 0.01"),
-        ({"lateral_scale": -1.0}, "lateral_scale=-1 must be at least 0.01"),
-        ({"lateral_scale": float("nan")}, "lateral_scale=nan must be a finite number"),
-        ({"lateral_scale": 200.0}, "at most 100"),
-        ({"lateral_scale": partial(bitmap, FACTORS - 0.6)}, "numbers go from 0 to 0.7"),
-        ({"lateral_scale": partial(bitmap, -FACTORS)}, "largest factor, -0.6, must be at least"),
-        ({"lateral_scale": partial(bitmap, FACTORS * np.nan)}, "largest factor, nan, must be"),
-        ({"lateral_scale": partial(bitmap, raw=False)}, "the bitmap is not raw"),
-        ({"lateral_scale": {"type": "checkerboard"}}, "needs lateral_scale_max"),
-        (
-            {"lateral_scale": {"type": "checkerboard", "color0": 0.0}, "lateral_scale_max": 1.0},
-            "the texture's numbers go from 0",
-        ),
-        ({"lateral_scale": 1.2, "lateral_scale_max": 1.1}, "must be at least lateral_scale, 1.2"),
-        ({"lateral_scale_max": 1.1}, "give both, or none"),
-        ({"height_scale": 1.2, "height_scale_max": 2.0}, "for a height_scale that is a texture"),
-    ],
-)
-def test_factors_that_mean_nothing_are_refused(mono, parameters, said):
-    values = {k: v() if callable(v) else v for k, v in parameters.items()}
-    assert said in refusal(lambda: load(**values))
 
 
 def test_tables_serve_no_larger_factors_than_1(mono, tmp_path):

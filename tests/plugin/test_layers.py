@@ -18,7 +18,6 @@ pytestmark = [
 ]
 
 RAW = {"energy_conserving": False, "coherence_width": 8.0, "tolerance": 2e-3}
-GREY = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
 
 
 def patch(turned: bool = False) -> md.HeightField:
@@ -63,19 +62,6 @@ def test_vcavity_is_its_formula_and_none_is_the_default():
     others = np.hypot(*(wi + wo)[:, :2].T) > 0.3
     plain, shadowed, factor = plain[:, others], shadowed[:, others], factor[others]
     assert shadowed == pytest.approx(plain * factor, rel=1e-4, abs=1e-6 * float(plain.max()))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "text"),
-    [
-        ({"shadowing": "smith"}, "none, vcavity"),
-        ({"orientation": "north"}, "must be a number"),
-        ({"orientation": GREY}, "cos, sin"),
-    ],
-)
-def test_bad_parameters_are_named(parameters, text):
-    with pytest.raises((md.DiffractionError, RuntimeError), match=text):
-        plugin(**parameters)
 
 
 def directions_texture(cos: float, sin: float) -> dict:

@@ -12,7 +12,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
-from tests.support.lanes import evaluated, refusal
+from tests.support.lanes import evaluated
 from tests.support.layered import PATCH, WIDTH, pairs
 from tests.support.variants import SOME, evaluate, runs
 
@@ -107,24 +107,6 @@ def test_derivatives_are_difference_quotients(some_variant, key):
 )
 def test_the_default_model_is_that_of_the_material(some_variant, parameters, model):
     assert f"model = {model}" in str(load(**parameters))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "line"),
-    [
-        ({"model": "smallslope"}, "choose one of small_slope, kirchhoff"),
-        ({"model": "small_slope", "material": "none"}, "material='none'"),
-        ({"eta": 0.0, "k": 3.0}, "eta=0"),
-        ({"eta": -1.0, "k": 3.0}, "eta=-1"),
-        ({"eta": 1.0, "k": -3.0}, "k=-3"),
-        ({"eta": float("nan"), "k": 3.0}, "eta=nan"),
-        ({"int_ior": 0.0}, "int_ior=0"),
-        ({"int_ior": float("nan")}, "int_ior=nan"),
-        ({"ext_ior": -1.5}, "ext_ior=-1.5"),
-    ],
-)
-def test_what_is_no_index_or_model_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
 
 
 def test_the_wavelengths_of_rgb_are_the_means_of_its_channels():

@@ -203,64 +203,6 @@ def test_a_path_makes_a_dictionary_too(some_variant, png):
 # ------------------------------------------------------------------------ refusals
 
 
-REFUSED = [
-    ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: filename, data, pixel_size"),
-    ({"coherence_widht": 60.0}, "unknown parameter 'coherence_widht'; did you mean coherence_wi"),
-    ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
-    (
-        {"basis": "fourier"},
-        "basis='fourier' must be one of svd, chebyshev, taylor, auto",
-    ),
-    ({"coherence_width": 0.0}, "coherence_width=0 must be a positive number of µm"),
-    ({"coherence_width": -3.0}, "coherence_width=-3 must be a positive number of µm"),
-    ({"coherence_width": "wide"}, "coherence_width='wide' must be a positive number"),
-    ({"tolerance": 0.0}, "tolerance=0 must be between 1e-6"),
-    ({"tolerance": 2.0}, "tolerance=2 must be between 1e-6"),
-    ({"tolerance": "fine"}, "tolerance='fine' must be between"),
-    ({"terms": 0}, "terms=0 must be a whole number from 1 to 400"),
-    ({"terms": 8.5}, "terms=8.5 must be a whole number"),
-    ({"terms": "eight"}, "terms='eight' must be a whole number"),
-    ({"basis": "taylor", "terms": 3}, "terms=3 of basis='taylor' leave an error of"),
-    ({"height_scale": 0.0}, "height_scale=0 must be above 0 and at most 1000"),
-    ({"height_scale": -1.0}, "height_scale=-1 must be above 0"),
-    ({"height_scale": float("nan")}, "height_scale=nan must be a finite number"),
-    ({"height_scale": float("inf")}, "height_scale=inf must be a finite number"),
-    ({"orientation": float("nan")}, "orientation=nan must be a finite number"),
-    ({"orientation": "left"}, "orientation='left' must be a number"),
-    ({"energy_conserving": "maybe"}, "energy_conserving='maybe' must be true or false"),
-    ({"int_ior": 0.5}, "int_ior=0.5 must be a refractive index of at least 1, or a name"),
-    ({"int_ior": float("nan")}, "int_ior=nan must be a refractive index of at least 1"),
-    ({"int_ior": "custard"}, "int_ior='custard'"),
-    ({"material": "Unobtainium"}, "material='Unobtainium' is unknown"),
-    ({"material": "1.5x"}, "material='1.5x': an index is n + ik"),
-    ({"material": 0.0}, "material=0.0: an index is n + ik"),
-    ({"material": "kerratin"}, "did you mean keratin?"),
-    ({"int_ior": "melanin"}, "int_ior='melanin' absorbs light"),
-    ({"material": "Al", "coat_ior": 1.4, "ext_ior": 1.33}, "leave ext_ior out"),
-    ({"pigment": "custard"}, "pigment='custard' is not a colour"),
-    ({"pigment": "0.2,1.5,0"}, "pigment='0.2,1.5,0' is not a colour"),
-    ({"pigment": "nothing.csv"}, "nothing.csv"),
-    ({"pigment": "red", "material": "gold"}, "pigment cannot be combined with a conductor"),
-    ({"pigment": "red", "material": "1.5+0.1i"}, "pigment cannot be combined with a conductor"),
-    ({"material": "Alu"}, "did you mean Al or Au?"),
-    ({"material": "au"}, "did you mean Au"),
-    ({"material": "Al", "int_ior": 1.5}, "material makes a conductor and int_ior a dielectric"),
-    ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both define the conductor"),
-    ({"eta": 1.0}, "eta alone is not a conductor; give both eta and k"),
-    ({"k": 1.0}, "k alone is not a conductor; give both eta and k"),
-    ({"max_height": 0.3}, "max_height is for files; the heights in data"),
-    ({"pixel_size": 0.0}, "pixel_size: expected one length or a pair (dx, dy) in µm"),
-    ({"pixel_size": "0.1, -0.1"}, "pixel_size: expected one length or a pair"),
-    ({"pixel_size": float("nan")}, "pixel_size: expected one length or a pair"),
-    ({"filename": "a.exr"}, "give exactly one of filename, data; got filename and data"),
-]
-
-
-@pytest.mark.parametrize(("parameters", "message"), REFUSED, ids=[str(p) for p, _ in REFUSED])
-def test_parameters_that_do_not_fit_are_one_clear_line(some_variant, parameters, message):
-    assert message in refusal(lambda: load(**parameters))
-
-
 def test_a_source_is_needed(some_variant):
     text = refusal(loads())
     assert text == "give exactly one of filename, data; got none"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -181,23 +179,6 @@ def test_derivatives_with_respect_to_heights_are_those_of_differences(mono):
     dr.forward_from(scale)
     # the rounding and curvature of a difference over 4 %
     assert dr.grad(found)[0] == pytest.approx(difference, rel=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "said"),
-    [
-        ({"coherence": "surface"}, "takes one of uv_scale, .* got none"),
-        (ON_SURFACE | {"world_scale": 1.0}, "got uv_scale and world_scale"),
-        (ON_SURFACE | {"uv_scale": -1.0}, "uv_scale=-1.0 must be one number or two"),
-        (ON_SURFACE | {"uv_scale": "1, 2, 3"}, "must be one number or two"),
-        (ON_SURFACE | {"uv_scale": 1e9}, "at most 1e\\+07"),
-        ({"coherence": "surface", "world_scale": "10, 20"}, "must be one number of µm"),
-        (ON_SURFACE | {"tiling": "hexagons"}, "choose one of periodic, random"),
-        ({"coherence": "place"}, "choose one of ensemble, patch, surface"),
-    ],
-)
-def test_what_says_nothing_of_places_is_refused(some_variant, parameters, said):
-    assert re.search(said, refusal(lambda: load(**parameters)))
 
 
 def test_variants_without_wavelengths_refuse_places():

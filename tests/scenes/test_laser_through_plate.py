@@ -7,6 +7,8 @@ import pytest
 
 from tests.support.scenes import SCENES
 
+pytestmark = pytest.mark.thorough
+
 PERIOD, WAVELENGTH = 1.0, 0.532  # µm
 WALL, HEIGHT = 22.0, 9.0
 

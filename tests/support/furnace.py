@@ -103,3 +103,55 @@ def steep_sinusoid() -> md.HeightField:
     x = np.arange(66) * 0.0915
     heights = 0.166 * np.sin(2 * np.pi * x / (66 * 0.0915 / 2))
     return md.HeightField(np.tile(heights, (22, 1)).copy(), (0.0915, 0.0656), periodic=True)
+
+
+def noise(slope):
+    """4.8 µm of isotropic noise of an RMS slope."""
+    rng, pixel = np.random.default_rng(4), 0.1
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(48, pixel), np.fft.fftfreq(48, pixel)))
+    spectrum = np.fft.fft2(rng.standard_normal((48, 48))) * np.exp(-((frequency / 0.9) ** 2))
+    heights = np.fft.ifft2(spectrum).real
+    steps = (np.roll(heights, -1, 1) - heights, np.roll(heights, -1, 0) - heights)
+    rms = np.sqrt(sum((step**2).mean() for step in steps)) / pixel
+    return md.HeightField(heights * (slope / rms), pixel, periodic=True)
+
+
+def shallow():
+    """1.6 µm period, 60 nm deep."""
+    wave = 0.03 * np.cos(2 * np.pi * np.arange(64) / 64)
+    return md.HeightField(np.tile(wave, (8, 1)), (0.025, 0.05), periodic=True)
+
+
+_FLAT = md.HeightField(np.zeros((8, 8)), 0.5, periodic=True)
+_SHEET = {"plugin": "diffraction_dielectric", "thin": True, "ext_ior": 1.0, "coherence_width": 5.0}
+_METAL = {"material": "Al", "coherence_width": 4.8}
+
+#: Fields and parameters that once made light.
+COMBINATIONS = [
+    (noise(0.5), _METAL | {"lateral_scale": 0.5}),
+    (noise(1.33), _METAL | {"lateral_scale": 0.5}),
+    (_FLAT, _SHEET | {"int_ior": 1.5, "coherence": "patch", "lateral_scale": 0.5}),
+    (_FLAT, _SHEET | {"int_ior": 1.02, "coherence": "patch"}),
+    (_FLAT, {"material": "Al", "film_ior": 1.206, "film_thickness": 1638.0,
+            "coherence_width": 3.0, "wavelength": 573.0}),
+    (_FLAT, {"material": "none", "coherence": "patch", "coherence_width": 0.5}),
+    (_FLAT, {"material": "none", "coherence": "patch", "coherence_width": 10.0,
+            "lateral_scale": 0.1}),
+    (_FLAT, _SHEET | {"thin": False, "int_ior": 1.5, "model": "kirchhoff",
+                    "coherence_width": 1.2, "lateral_scale": 0.34, "wavelength": 624.0}),
+    (shallow(), {"material": "Al", "coat_ior": 1.58, "coherence_width": 12.8}),
+    (shallow(), {"material": "none", "coherence_width": 12.8}),
+    (noise(0.55), _METAL | {"coat_ior": 1.01}),
+]  # fmt: skip
+
+
+def check_combination(field: md.HeightField, parameters: dict) -> None:
+    """At no angle more light is sent on than is received, at one wavelength."""
+    mi.set_variant("llvm_ad_mono")
+    surface = mi.load_dict(md.bsdf_dict(field, **parameters))
+    angles = (30.0, 60.0, 75.0, 84.0, 87.4, 89.5, 89.8, 89.9)
+    directions = np.array([polar(theta, 30.0) for theta in angles])
+    mean, error = furnace_in(surface, directions, 1)
+    assert np.isfinite(mean).all()
+    most = np.where(np.array(angles) < 85.0, 1.01, 1.05)
+    assert np.all(mean <= most + 4.0 * error), mean

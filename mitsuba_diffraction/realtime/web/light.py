@@ -99,7 +99,8 @@ def packed_surroundings(
         return None, {}
     parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
     if bounces:
-        parts |= packed.bounces
+        # path-traced means of few paths have noise of more than the ninth digit
+        parts |= converted(packed.bounces, {"bounces": _eight_digits})
     # rounding adds no bias: shaders divide by the rounded densities
     digits: dict[str, Any] = {"lobe_places": np.float16, "lobe_densities": shortened}
     lobes = [converted(part, digits) for part in packed.lobes]
@@ -108,6 +109,7 @@ def packed_surroundings(
         shared = ("library.glsl", "surroundings.glsl")
         background = plain_source("background.frag", shared, packed.around.definitions, "web")
     return {
+        "bounces": bounces,
         "parts": packed_parts(parts, sections),
         "lobes": [packed_parts(part, sections) for part in lobes],
         "emitting": [
@@ -117,6 +119,11 @@ def packed_surroundings(
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
     }, {name: text for part in (parts, *lobes) for name, text in part.definitions.items()}
+
+
+def _eight_digits(values: NDArray[Any]) -> NDArray[np.float16]:
+    """Round half floats, which have eleven binary digits, to eight."""
+    return shortened(values).astype(np.float16)
 
 
 def _coarser(obstacles: NDArray[Any]) -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from ...plugin.conductors import tabulated_index
 from ..glsl.packing import pack_conductor
 from ..glsl.shader_materials import Diffracting
 from ..glsl.texels import Packed, Texture, as_half
-from .sections import Sections, as_columns, packed_array, packed_parts
+from .sections import Sections, packed_parts
 
 #: Names as authors write them, by the tables' names; of two spellings the first.
 NAMES = {name: name for name in TISSUES} | {
@@ -48,9 +48,6 @@ def packed_materials(coats: Sequence[float], sections: Sections) -> list[dict[st
             packed = pack_conductor(wavelengths, index.real / coat, index.imag / coat)
             (texture,) = packed.textures
             half = Texture(texture.name, as_half(texture.data.astype(np.float32)))
-            # numbers that differ little from one texel to the next
-            bits = as_columns(half.data, half.data.shape[2]).view(np.uint16)
-            section = {half.name: packed_array(bits, differences=True)}
-            parts.append(packed_parts(Packed((half,), packed.uniforms), sections, section))
+            parts.append(packed_parts(Packed((half,), packed.uniforms), sections))
         entries.append({"name": name, "absorbs": absorbs, "parts": parts})
     return entries

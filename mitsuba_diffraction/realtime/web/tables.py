@@ -27,7 +27,7 @@ from .sections import Section, as_columns, converted, packed_array
 #: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
 DIGITS = 9
 #: Smallest rounding step relative to a table's largest number: more digits are not visible.
-FLOOR = 2.0**-19
+FLOOR = 2.0**-17
 
 _FEWER = 4  # numbers of digits that are tried for tables that are too large for a page
 
@@ -56,22 +56,17 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
     `exact` does not support coherent tables.
     """
     orders = surface.described.orders
-    packed, loss, width = (
+    packed, loss = (
         _modelled(method, surface.described.patch, digits)
         if orders is None
         else _solved(method, orders, surface.described.sigma, digits)
     )
-    sections = {}
-    for texture in packed.textures:  # rows are series, or texels: whichever takes fewer bytes
-        widths = width, texture.data.shape[2]
-        layouts = [packed_array(as_columns(texture.data, columns)) for columns in widths]
-        sections[texture.name] = min(layouts, key=lambda layout: len(layout.data))
+    sections = {x.name: packed_array(x.data.reshape(-1, x.data.shape[2])) for x in packed.textures}
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
 
 
-#: Table in fewer digits: textures, uniforms and definitions; ΔE2000 (n,) from the exact table; and
-#: numbers in a row of large textures.
-Rounded = tuple[Packed, NDArray[np.float64], int]
+#: Table in fewer digits: textures, uniforms and definitions; ΔE2000 (n,) from the exact table.
+Rounded = tuple[Packed, NDArray[np.float64]]
 
 
 def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
@@ -81,18 +76,14 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
         # rounded twice, so that the upper halves of floats, which the shader reads, are exact
         coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
         fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
-        # a word has two numbers
-        width = fewer.coefficients.shape[-1] // 2
-        return pack_colours(fewer), colour_difference(colours, fewer), width
+        return pack_colours(fewer), colour_difference(colours, fewer)
     series, order_0, scale, expansion = power_series(table)
     powers = replace(
         table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
         expansion=expansion,
     )  # fmt: skip
     less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
-    packed = pack_powers(less)
-    width = 4 * int(packed.definitions["TEXELS"])
-    return packed, power_colour_difference(powers, less), width
+    return pack_powers(less), power_colour_difference(powers, less)
 
 
 def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounded:
@@ -105,7 +96,7 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
         return rounded(as_columns(data, width), digits, FLOOR).reshape(data.shape)
 
     less = converted(packed, {"efficiencies": fewer})
-    return less, _solved_loss(table, counts, digits), width
+    return less, _solved_loss(table, counts, digits)
 
 
 def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.float64]:

@@ -68,16 +68,6 @@ class PathGain:
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 
-    def order_0(
-        self, cos_i: Real, cos_o: Real, turn: Real | float, sigma_0: float
-    ) -> tuple[Real, Real]:
-        """Return G of order 0, and the share that a flat face over the structure adds.
-
-        turn : azimuths between both directions, rad.
-        sigma_0 : of the lobe's window, µm.
-        """
-        return self.path.mirrored(cos_i, cos_o, np.cos(turn), self.wavenumber, sigma_0)
-
     @cached_property
     def _table(self) -> Real:
         """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS); finer of a thick film."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -123,6 +124,7 @@ class Transport:
         self.came, self.left = path.came.number, path.left.number
         above = float(wavenumber(wavelength))
         self._gain = PathGain(path, orders.roughness, above, orders.height_scale)
+        self._mirrored = partial(path.mirrored, k=above, sigma_0=orders.sigma_0)
         self._k = above * path.left.index  # where the light goes to
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
@@ -168,8 +170,7 @@ class Transport:
         squared = ((nodes.x + sine) ** 2 + nodes.y**2) / self._width_0**2
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
-        cos_in, cos_out = (np.broadcast_to(each, power.shape) for each in (cos_i, nodes.cosine))
-        gain, face = self._gain.order_0(cos_in, cos_out, nodes.azimuth, self._orders.sigma_0)
+        gain, face = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
         return np.asarray(lobe * (gain * power + face), np.float64)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
@@ -194,8 +195,7 @@ class Transport:
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
         power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
-        cos_in = np.broadcast_to(cos_i, cos_o.shape)
-        gain, face = self._gain.order_0(cos_in, cos_o, np.pi, self._orders.sigma_0)
+        gain, face = self._mirrored(cos_i, cos_o, -1.0)
         parts *= gain * power + face
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(np.asarray(parts, np.float32)).matrix.toarray()
@@ -207,8 +207,7 @@ class Transport:
         gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
         densities = [(mixture.density, gain)]
         if mixture.beats is not None:
-            start, end = (np.broadcast_to(each, gain.shape) for each in (cos_i, nodes.cosine))
-            zeroth, _ = self._gain.order_0(start, end, nodes.azimuth, self._orders.sigma_0)
+            zeroth, _ = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
         position = np.minimum(
             self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001

@@ -16,17 +16,16 @@ from ...errors import check_choice
 from ...heights.coherence import resolved_width
 from ...heights.field import HeightField
 from ...optics.geometry import wavenumber
-from ...progress import Progress
+from ...progress import Progress, silent
+from ...settings import TableSettings
 from ...tables.build.checks import TAPS_SHARE
 from ...tables.build.spectrum import GLOSSY_RADIUS
+from ...tables.source import TableSource
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated
 from .periods import check_period, required_periods
-
-#: Function that builds a table of a patch, like `DiffractionTable.build`.
-Build = Callable[..., DiffractionTable]
 
 #: Number of bins that "pq-sinc" reads along each axis.
 SINC_TAPS = 8
@@ -83,7 +82,6 @@ def make_all(
     heights: HeightField,
     *,
     progress: Progress | None = None,
-    build: Build | None = None,
     **settings: Any,
 ) -> dict[str, Method]:
     """Build methods by name, for one patch, with shared tables.
@@ -96,7 +94,6 @@ def make_all(
     names : names of `NAMES`.
     heights : the patch, which tiles the plane.
     progress : called as progress(done, total, text) while tables are built.
-    build : function to call instead of `DiffractionTable.build`, for instance with a cache.
     settings : fields of `MethodSettings`.
     """
     for name in names:
@@ -108,10 +105,11 @@ def make_all(
     def table(**changes: Any) -> DiffractionTable:
         arguments = {
             "coherence_width": width, "tolerance": common.tolerance, "height_scale_max": 1.0,
-            "wavelength_range": tuple(common.wavelength_range), "progress": progress,
-            **changes,
+            "wavelength_range": tuple(common.wavelength_range), **changes,
         }  # fmt: skip
-        return (build or DiffractionTable.build)(heights, **arguments)
+        return TableSource.of(heights).table(
+            TableSettings(**arguments), progress=progress or silent
+        )
 
     return {name: _MAKERS[name](_Patch(heights, width, common, table), name) for name in names}
 
@@ -122,7 +120,7 @@ class _Patch(NamedTuple):
     heights: HeightField
     width: float
     settings: MethodSettings
-    table: Build
+    table: Callable[..., DiffractionTable]  # with the settings of the methods, but for some
 
 
 def _full(patch: _Patch, name: str) -> FullSpectrum:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...realtime.glsl.packing import area_factor
 from ...realtime.glsl.texels import Packed, as_half, listed, texels
-from ...settings import TableSettings
-from ...tables.build.build import build_with
-from ...tables.source import cached_table
 from ...tables.table import DiffractionTable
 from ..methods import FullSpectrum, OrdersOnly, Repeated, make
 from ..methods.method import SPECULAR_WAVELENGTH, Method
@@ -34,17 +29,8 @@ def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> M
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.window_width, coherence=table.coherence,
-        terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_cached_build, **settings,
+        terms=TERMS, tolerance=TOLERANCE, step=STEP, **settings,
     )  # fmt: skip
-
-
-def _cached_build(heights: HeightField, **arguments: Any) -> DiffractionTable:
-    """Build a table like `DiffractionTable.build`, or read it from the cache."""
-    progress = arguments.pop("progress", None)
-    settings = TableSettings(**arguments)
-    return cached_table(
-        heights.digest(), settings, lambda: build_with(heights, settings, progress), [heights.name]
-    )
 
 
 def pack_method(method: Method) -> Packed:

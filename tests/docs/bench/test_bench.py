@@ -29,6 +29,7 @@ TINY = Plan(
     spp=2,
     reference_spp=2,
     map_resolution=8,
+    frame=(12, 8),
 )
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -53,28 +54,12 @@ def measured(tiny, tmp_path_factory):
     return file, printed.getvalue()
 
 
-def refused(capsys, *arguments: object) -> str:
-    """The only line on stderr of a run that fails before it measures."""
-    assert main([str(a) for a in arguments]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    return line
-
-
 def test_everything_is_measured_and_written(measured):
     file, printed = measured
     parts = (
-        "build",
-        "eval",
-        "sample",
-        "eval_pdf",
-        "pdf",
-        "snake",
-        "noise",
-        "efficiency",
-        "colours",
-    )
+        "build", "eval", "sample", "eval_pdf", "pdf", "snake", "noise", "efficiency", "colours",
+        "frames",
+    )  # fmt: skip
     for part in ("processor", "gathers", *(f"{part}:" for part in parts)):
         assert part in printed
     data = json.loads(file.read_text(encoding="utf-8"))
@@ -99,29 +84,12 @@ def test_a_part_alone_is_compared_number_by_number(measured, capsys):
     assert "eval" not in out.split("now /")[0]
 
 
-def test_a_file_of_another_kind_is_refused_before_measuring(tmp_path, capsys):
-    file = tmp_path / "bench.json"
-    file.write_text("{}", encoding="utf-8")
-    assert str(file) in refused(capsys, "--quick", "--only", "build", "--against", file)
-
-
 def test_a_measured_patch_replaces_the_default(tmp_path, capsys):
     file = tmp_path / "mine.npy"
     np.save(file, rough_patch((40, 48), (0.1, 0.1), 0.2).heights)
     arguments = ["--measured", str(file), "--pixel-size", "0.1", "--quick", "--only", "noise"]
     assert main(arguments) == 0
     assert "75°" in capsys.readouterr().out
-
-
-def test_missing_scenes_are_named(tmp_path, capsys):
-    line = refused(capsys, "--quick", "--only", "snake", "--scenes", tmp_path)
-    assert str(tmp_path) in line
-    assert "--scenes" in line
-
-
-def test_an_unwritable_file_is_refused_before_measuring(tmp_path, capsys):
-    file = tmp_path / "missing" / "bench.json"
-    assert str(file) in refused(capsys, "--quick", "--json", file)
 
 
 def test_a_missed_goal_is_said():

@@ -34,14 +34,6 @@ def test_the_page_is_made_by_one_command(tmp_path, capsys):
         assert min(image.size) > 300
 
 
-def test_a_page_without_markers_is_one_line(tmp_path, capsys):
-    page = tmp_path / "a.md"
-    page.write_text("nothing", encoding="utf-8")
-    with pytest.raises(DiffractionError, match="expected '<!-- begin x -->'"):
-        pages.update(page, {"x": "y"})
-    assert page.read_text(encoding="utf-8") == "nothing"
-
-
 def test_a_part_is_replaced_and_all_else_stays():
     text = "a\n<!-- begin t -->\nold\n<!-- end t -->\nb\n"
     new = pages.replaced(text, "t", "new\n")

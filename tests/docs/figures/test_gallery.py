@@ -64,15 +64,6 @@ def test_pictures_are_there_and_small(picture):
         assert min(image.size) >= 150
 
 
-def test_a_command_is_broken_between_options():
-    command = "render scenes/snake.xml " + " ".join(f"-D name_{n}=value" for n in range(12))
-    lines = gallery.as_typed(command).split(" \\\n")
-    assert len(lines) > 1
-    assert max(map(len, lines)) <= 106
-    assert all(line.startswith("    -D ") for line in lines[1:])
-    assert " ".join(" ".join(lines).split()) == f".venv/bin/mitsuba-diffraction {command}"
-
-
 @pytest.fixture
 def stand_in(tmp_path):
     """A folder with a scene, and a picture of it."""
@@ -92,14 +83,6 @@ def test_a_picture_is_made_by_its_commands(stand_in, capsys):
         assert image.size == (24, 16)
         assert np.asarray(image).mean() == pytest.approx(124, abs=2)  # 0.2 in sRGB bytes
     assert capsys.readouterr().out == ""
-
-
-def test_a_film_is_copied(stand_in):
-    folder, picture = stand_in
-    command = "render scenes/room.xml -m scalar_rgb -s 1 --frames 2 --animate light=0:1"
-    gallery.make(picture(f"{command} -o out/room.webp"), folder / "room.webp", folder)
-    with Image.open(folder / "room.webp") as film:
-        assert film.n_frames == 2
 
 
 def test_a_command_that_fails_is_named(stand_in):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -55,13 +53,6 @@ def test_snakes_are_rendered_in_two_lights_each(scenes, tmp_path):
             assert image.size == (24, 16)
 
 
-def test_missing_scenes_are_one_line(tmp_path, capsys):
-    assert pictures.main(["-o", str(tmp_path / "out"), "--only", "snakes", "--scenes", "no"]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("snakes: error: 'no/snake.xml' does not exist")
-    assert os.listdir(tmp_path / "out") == []
-
-
 def test_only_what_is_asked_for_is_made_in_order(tmp_path, monkeypatch, capsys):
     made = []
     figures = {name: lambda _, name=name: made.append(name) for name in pictures.FIGURES}
@@ -72,16 +63,6 @@ def test_only_what_is_asked_for_is_made_in_order(tmp_path, monkeypatch, capsys):
     made.clear()
     assert pictures.main(["-o", str(tmp_path), "--only", "maps"]) == 0
     assert made == ["maps"]
-
-
-@pytest.mark.parametrize("name", ["patches", "maps"])
-def test_a_bad_patch_is_one_line_and_ends_it(tmp_path, capsys, name):
-    missing = str(tmp_path / "none.png")
-    assert pictures.main(["-o", str(tmp_path), "--only", name, "--measured", missing]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"{name}: error: ")
-    assert "none.png" in line
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.usefixtures("variant")

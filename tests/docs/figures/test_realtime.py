@@ -61,11 +61,3 @@ def test_a_larger_picture_takes_the_sheets_place(compared, page, tmp_path):
     assert realtime.main([str(compared), "--sheet", str(larger), "-o", str(page)]) == 0
     with Image.open(page.parent / realtime.SHEET) as image:
         assert image.size == (1600, 800)
-
-
-@pytest.mark.parametrize("missing", ["compare.json", "fast.png"])
-def test_what_compare_did_not_write_is_refused_in_one_line(compared, page, capsys, missing):
-    (compared / missing).unlink()
-    assert realtime.main([str(compared), "-o", str(page)]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-    assert "stale" in page.read_text("utf-8")

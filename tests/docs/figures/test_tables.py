@@ -6,8 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from docs.make.figures import tables
 
 
@@ -117,25 +115,3 @@ def test_energy_has_rows_of_all_files(tmp_path):
     assert glass.endswith("| 100 % | – | – |")
     assert metal.endswith("| 96 % | 0.963–0.996 | 98 % |")
     assert others == [line.replace("energy0", "energy1") for line in (glass, metal)]
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [(name, content) for name in ("speed", "plan", "energy") for content in ("{", "[]", "{}")]
-    + [("speed", '{"machine": {}, "sections": []}'), ("plan", '{"tables": []}')],
-)
-def test_another_file_is_refused_in_one_line(tmp_path, capsys, name, content):
-    file, target = tmp_path / "other.json", page(tmp_path, name)
-    file.write_text(content, "utf-8")
-    assert tables.main([name, str(file), "-o", str(target)]) == 1
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert {"speed": "make bench", "plan": "make plan", "energy": "make energy"}[name] in said
-    assert "stale" in target.read_text("utf-8")
-
-
-def test_a_page_without_markers_is_refused(tmp_path, capsys):
-    file, target = tmp_path / "plan.json", page(tmp_path, "other")
-    file.write_text(json.dumps(plan()), "utf-8")
-    assert tables.main(["plan", str(file), "-o", str(target)]) == 1
-    assert "has none of the markers" in capsys.readouterr().err

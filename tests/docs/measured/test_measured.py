@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from docs.make.measured import cases, predict
-from docs.make.measured.__main__ import main
 from docs.make.measured.grooves import Groove, heights_of
 
 pytest.importorskip("gratinglab")
@@ -53,8 +52,3 @@ def test_the_model_is_near_solved_orders_through_gentle_grooves():
 
 def test_roughness_takes_light_out_of_the_orders():
     assert Groove(5.0, roughness=20.0).specular(500.0, 2.0) == pytest.approx(0.777, abs=1e-3)
-
-
-def test_a_folder_that_is_no_clone_is_refused_in_one_line(tmp_path, capsys):
-    assert main(["-o", str(tmp_path), "--kaist", str(tmp_path)]) == 1
-    assert "clone https://github.com/KAIST" in capsys.readouterr().err

@@ -36,22 +36,6 @@ def test_a_page_is_written_alone(tmp_path):
     assert [path.name for path in tmp_path.rglob("*.md")] == ["solutions.md"]
 
 
-def test_a_folder_that_cannot_be_written_is_an_error_in_one_line(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    assert main(["report", "--quick", "-o", str(tmp_path / "file" / "docs")]) == 1
-    error = capsys.readouterr().err
-    assert "error: cannot write" in error
-    assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("arguments", [[], ["solve", "gold"], ["solve", "keratin", "-j", "0"]])
-def test_wrong_usage_is_2(arguments, capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(arguments)
-    assert exit_.value.code == 2
-    assert "usage:" in capsys.readouterr().err
-
-
 def test_numbers_have_the_digits_that_they_deserve():
     values = [percent(x) for x in (0.12345, 0.012345, 0.0998, 1e-6, 0.0, -0.05, float("nan"))]
     assert values == ["12 %", "1.2 %", "10 %", "< 0.01 %", "0 %", "−5 %", "–"]

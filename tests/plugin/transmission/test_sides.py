@@ -15,7 +15,7 @@ from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import rough_patch
-from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
+from tests.support.lanes import evaluated, interaction, spectra, vectors
 from tests.support.layered import PATCH, load, pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
 
@@ -131,33 +131,6 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
     dr.forward(parameters[name])
     derivative, differences = spectra(dr.grad(value)), (high - low) / (2 * step)
     assert np.abs(derivative - differences).sum() < 1e-2 * np.abs(differences).sum()
-
-
-@pytest.mark.parametrize(
-    ("parameters", "named"),
-    [
-        ({"material": "Al"}, ["material", "'diffraction'"]),
-        ({"int_ior": 1.0, "ext_ior": 1.5}, ["eta=0.666667", "1.01", "int_ior", "ext_ior"]),
-        ({"int_ior": 1.005, "ext_ior": 1.0}, ["eta=1.005", "1.01", "int_ior", "ext_ior"]),
-        ({"pigment": {"type": "diffuse"}}, ["nested", "light that goes through"]),
-        ({"coat_ior": 1.4}, ["coat_ior", "'diffraction'"]),
-        ({"film_ior": 1.4, "film_thickness": 100.0}, ["film_", "'diffraction'"]),
-        ({"shadowing": "vcavity"}, ["shadowing", "'diffraction'"]),
-        ({"coherence": "surface"}, ["coherence='surface'", "light that goes through"]),
-        ({"thin": 1.0}, ["thin=1.0", "true or false"]),
-        ({"transmission": True}, ["transmission", "diffraction_dielectric"]),
-    ],
-)
-def test_what_a_dielectric_does_not_support_is_named_in_one_line(some_variant, parameters, named):
-    line = refusal(lambda: load(plugin="diffraction_dielectric", **parameters))
-    assert all(name in line for name in named), line
-
-
-@pytest.mark.parametrize("parameters", [{"transmission": True}, {"thin": True}])
-def test_a_reflecting_surface_names_the_plugin_that_lets_light_through(some_variant, parameters):
-    line = refusal(lambda: load(**parameters))
-    assert "'diffraction_dielectric'" in line
-    assert next(iter(parameters)) in line
 
 
 def test_a_dictionary_names_an_unknown_plugin():

@@ -306,7 +306,7 @@ def test_the_documents_tables_are_built_once(
     def build(*_: object, **__: object) -> DiffractionTable:
         raise AssertionError("built again")
 
-    monkeypatch.setattr("mitsuba_diffraction.thesis.shaders.pack.build_with", build)
+    monkeypatch.setattr("mitsuba_diffraction.tables.source.build_with", build)
     del first
     gc.collect()
     assert in_memory() is None  # as in the next process

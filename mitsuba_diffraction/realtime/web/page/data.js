@@ -13,21 +13,22 @@ async function inflated(bytes) {
 }
 
 const ARRAYS = { Uint8Array, Int16Array, Uint16Array, Uint32Array, Float32Array };
+const BLOCK = 1024; // rows at a time, which processors cache
 
-// Decode byte planes to rows, and differences to numbers.
-function restored(planes, layout) {
-  const { rows, columns, differences } = layout;
-  const array = new ARRAYS[layout.kind](rows * columns);
-  const size = array.BYTES_PER_ELEMENT;
-  const bytes = new Uint8Array(array.buffer);
-  const width = columns * size;
-  for (let plane = 0; plane < width; ++plane) {
-    let from = plane * rows;
-    for (let to = plane; to < bytes.length; to += width) bytes[to] = planes[from++];
+// Decode planes of bytes to rows, and differences of bits to bits.
+function restored(planes, { kind, numbers, columns, differences }) {
+  const size = ARRAYS[kind].BYTES_PER_ELEMENT, width = columns * size, rows = planes.length / width;
+  const bytes = new Uint8Array(planes.length);
+  for (let first = 0; first < rows; first += BLOCK)
+    for (let plane = 0; plane < width; ++plane) {
+      const last = plane * rows + Math.min(first + BLOCK, rows);
+      for (let from = plane * rows + first, to = first * width + plane; from < last; to += width) bytes[to] = planes[from++];
+    }
+  if (differences) {
+    const bits = new { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[size](bytes.buffer);
+    for (let i = columns; i < bits.length; ++i) bits[i] += bits[i - columns]; // wraps around
   }
-  if (differences)
-    for (let i = columns; i < array.length; ++i) array[i] += array[i - columns]; // wraps around
-  return array;
+  return new ARRAYS[kind](bytes.buffer, 0, numbers);
 }
 
 class Data {
@@ -46,7 +47,7 @@ class Data {
   }
 
   async text(number) {
-    return new TextDecoder().decode(await inflated(this.part(number)));
+    return new TextDecoder().decode(await this.array(number));
   }
 
   async picture(number) {

@@ -13,25 +13,29 @@ void main() {
   fragment = vec4(1.0, 1.0, 1.0, covers) * texelFetch(sample_, at, 0) + (first ? vec4(0.0) : texelFetch(sums, at, 0));
 }`;
 
-function compiled(gl, kind, source) {
-  const shader = gl.createShader(kind);
-  gl.shaderSource(shader, source);
-  gl.compileShader(shader);
-  if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost())
-    throw new Error(`The graphics driver refuses a shader: ${gl.getShaderInfoLog(shader)}`);
-  return shader;
-}
-
+// Program that the driver compiles beside the page's scripts, which only `finish` waits for.
 class Program {
   constructor(gl, vertex, fragment) {
     this.gl = gl;
     this.program = gl.createProgram();
-    gl.attachShader(this.program, compiled(gl, gl.VERTEX_SHADER, vertex));
-    gl.attachShader(this.program, compiled(gl, gl.FRAGMENT_SHADER, fragment));
+    this.shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([kind, source]) => {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(this.program, shader);
+      return shader;
+    });
     Object.keys(ATTRIBUTES).forEach((name, n) => gl.bindAttribLocation(this.program, n, name));
     gl.linkProgram(this.program);
-    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost())
-      throw new Error(`The graphics driver refuses a program: ${gl.getProgramInfoLog(this.program)}`);
+  }
+
+  finish() {
+    if (this.uniforms) return;
+    const { gl } = this;
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const words = this.shaders.map((shader) => gl.getShaderInfoLog(shader)).join("") || gl.getProgramInfoLog(this.program);
+      throw new Error(`The graphics driver refuses a shader: ${words}`);
+    }
     this.uniforms = {};
     const count = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS);
     for (let n = 0; n < count; ++n) {
@@ -42,6 +46,7 @@ class Program {
   }
 
   use() {
+    this.finish();
     this.gl.useProgram(this.program);
     this.unit = 0;
   }
@@ -162,32 +167,38 @@ const RESPONSES = 4; // rows, one per light
 const PIXEL = { floats: new Float32Array(4), bytes: new Uint8Array(4) };
 
 class Drawing {
-  static async load(gl, header, data, progress) {
-    const drawing = new Drawing();
-    Object.assign(drawing, { gl, header, data, programs: {}, tables: {}, materials: {} });
-    drawing.surfaces = [];
-    for (const surface of header.surfaces) {
-      await progress(`Unpacking ${surface.name}`);
-      drawing.surfaces.push({
-        ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
-      });
-    }
-    drawing.sources = JSON.parse(await data.text(header.programs));
-    const { light } = header;
-    drawing.daylight = await data.array(light.daylight);
-    drawing.spectra = light.spectra === null ? null : await data.array(light.spectra);
-    drawing.responses = texels(gl, gl.RGBA32F, drawing.daylight.length / 4, RESPONSES);
-    const whole = header.shown.vertex;
-    drawing.add = new Program(gl, whole, ADD);
-    drawing.shown = new Program(gl, whole, header.shown.fragment);
-    drawing.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
-    drawing.empty = gl.createVertexArray();
-    drawing.around = header.around && (await Surroundings.load(gl, header, data));
-    return drawing;
+  constructor(gl, header, data) {
+    Object.assign(this, { gl, header, data, programs: {}, tables: {}, materials: {} });
   }
 
-  // Load a method's tables and compile its programs; lit: `viewer.lit`; material: number of a
+  // Load all but tables, while the driver compiles; arguments: those of `compiled`.
+  async load(method, lit, material) {
+    const { gl, header, data } = this, { light } = header;
+    this.sources = JSON.parse(await data.text(header.programs));
+    this.compiled(method, lit, material);
+    const whole = header.shown.vertex;
+    this.add = new Program(gl, whole, ADD);
+    this.shown = new Program(gl, whole, header.shown.fragment);
+    this.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
+    this.surfaces = [];
+    for (const surface of header.surfaces)
+      this.surfaces.push({
+        ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
+      });
+    this.daylight = await data.array(light.daylight);
+    this.spectra = light.spectra === null ? null : await data.array(light.spectra);
+    this.responses = texels(gl, gl.RGBA32F, this.daylight.length / 4, RESPONSES);
+    this.empty = gl.createVertexArray();
+    this.around = header.around && (await Surroundings.load(gl, header, data));
+  }
+
+  // Programs of all surfaces, one for each of some definitions of the light; material: number of a
   // material that surfaces are given, or null.
+  compiled(method, lit, material) {
+    return this.header.surfaces.flatMap((surface) => Object.values(lit).map((light) => this.program(surface, method, light, "surface", material)));
+  }
+
+  // Load a method's tables and wait for programs.
   async prepare(method, lit, progress, material = null) {
     const loaded = (parts) => Promise.all(parts.map((part) => Part.load(this.gl, this.data, part)));
     if (!this.tables[method]) {
@@ -197,7 +208,7 @@ class Drawing {
     if (material !== null && !this.materials[material])
       this.materials[material] = await loaded(this.header.materials[material].parts);
     await progress("Preparing");
-    for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light, "surface", material);
+    for (const program of this.compiled(method, lit, material)) program.finish();
   }
 
   // Program of a surface, compiled once for each source, definitions of the light and main function.

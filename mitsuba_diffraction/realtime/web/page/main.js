@@ -55,6 +55,25 @@ function context(canvas, header) {
   return gl;
 }
 
+// Load what the first picture takes, which is small and has few lights.
+async function load(viewer) {
+  const { drawing, drawn, material } = viewer, lit = { glance: viewer.lit.glance };
+  await drawing.load(drawn, lit, material);
+  await drawing.prepare(drawn, lit, busy, material);
+}
+
+// Draw the first picture, and prepare all others.
+async function open(viewer) {
+  viewer.lost = false;
+  viewer.fit();
+  viewer.glance();
+  element("message").hidden = element("busy").hidden = true;
+  state("ready");
+  await new Promise(requestAnimationFrame); // lets the browser show it
+  viewer.wake();
+  await viewer.drawing.prepare(viewer.drawn, viewer.lit, () => {}, viewer.material);
+}
+
 async function start() {
   const { header, bytes } = contents();
   document.title = header.title;
@@ -62,12 +81,10 @@ async function start() {
   const gl = context(canvas, header);
   await busy("Reading");
   const data = new Data(bytes, header.sections);
-  const viewer = new Viewer(canvas, await Drawing.load(gl, header, data, busy), header);
+  const viewer = new Viewer(canvas, new Drawing(gl, header, data), header);
   window.viewer = viewer;
   textToView(location.hash.slice(1), viewer);
-  const prepared = () => viewer.drawing.prepare(viewer.drawn, viewer.lit, busy, viewer.material);
-  await prepared();
-  viewer.fit();
+  await load(viewer);
   viewer.controls = new Controls(viewer, fail);
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
@@ -77,16 +94,10 @@ async function start() {
   canvas.addEventListener("webglcontextrestored", async () => {
     try {
       context(canvas, header); // enables the extensions again
-      viewer.drawing = await Drawing.load(gl, header, data, busy);
-      await prepared();
-      viewer.lost = false;
-      viewer.sample = viewer.shown = undefined;
-      viewer.controls.map.gl = undefined;
-      viewer.fit();
-      viewer.touch();
-      await viewer.settled(0);
-      element("message").hidden = element("busy").hidden = true;
-      state("ready");
+      viewer.drawing = new Drawing(gl, header, data);
+      viewer.sample = viewer.shown = viewer.controls.map.gl = undefined;
+      await load(viewer);
+      await open(viewer);
     } catch (error) {
       fail(error);
     }
@@ -95,9 +106,7 @@ async function start() {
   window.addEventListener("pagehide", ({ persisted }) => {
     if (!persisted) gl.getExtension("WEBGL_lose_context")?.loseContext();
   });
-  await viewer.settled(0);
-  element("busy").hidden = true;
-  state("ready");
+  await open(viewer);
 }
 
 start().catch(fail);

@@ -2,29 +2,31 @@
 
 const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 3 };
 
-// Decode a direction from two 16-bit integers (Cigolle et al. 2014).
-function fromOctahedron(a, b, to, at) {
-  if (a === -32768) {
-    to[at] = to[at + 1] = to[at + 2] = 0;
-    return;
+const UNIT = 8191, NO_DIRECTION = -8192; // see sections.py
+
+// Decode directions, four numbers each, from two integers in each row (Cigolle et al. 2014).
+function directions(rows, width, column) {
+  const found = new Int16Array((4 * rows.length) / width);
+  for (let from = column, at = 0; at < found.length; from += width, at += 4) {
+    if (rows[from] === NO_DIRECTION) continue;
+    let x = rows[from] / UNIT, y = rows[from + 1] / UNIT;
+    const z = 1 - Math.abs(x) - Math.abs(y);
+    if (z < 0) [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
+    const scale = 32767 / Math.sqrt(x * x + y * y + z * z);
+    found[at] = Math.round(x * scale);
+    found[at + 1] = Math.round(y * scale);
+    found[at + 2] = Math.round(z * scale);
   }
-  let x = a / 32767, y = b / 32767;
-  const z = 1 - Math.abs(x) - Math.abs(y);
-  if (z < 0) [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
-  const scale = 32767 / Math.hypot(x, y, z);
-  to[at] = Math.round(x * scale);
-  to[at + 1] = Math.round(y * scale);
-  to[at + 2] = Math.round(z * scale);
+  return found;
 }
 
 async function uploadMesh(gl, data, mesh) {
   const corners = await data.array(mesh.corners);
   const columns = await data.array(mesh.columns);
   const tangents = mesh.tangents === null ? null : await data.array(mesh.tangents);
-  const count = corners.length, width = data.layouts[mesh.columns].columns;
-  const signed = new Int16Array(columns.buffer);
+  const count = corners.length, { width } = mesh;
+  const signed = new Int16Array(columns.buffer, 0, columns.length);
   const array = gl.createVertexArray(), constants = [];
-  let positions;
   gl.bindVertexArray(array);
   Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
     const place = mesh.layout[name];
@@ -33,32 +35,32 @@ async function uploadMesh(gl, data, mesh) {
       return;
     }
     const direction = name === "normal" || name === "tangent";
-    // directions are padded to four numbers: attributes start at multiples of four bytes
+    // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
     const stride = direction ? 4 : size;
     const values = direction ? new Int16Array(count * stride) : new Float32Array(count * stride);
-    for (let i = 0; i < count; ++i) {
-      const from = corners[i] * width;
-      if (name === "tangent" && tangents) {
-        const n = 2 * Math.floor(i / 3);
-        fromOctahedron(tangents[n], tangents[n + 1], values, i * stride);
-      } else if (direction) {
-        const n = from + place.column;
-        fromOctahedron(signed[n], signed[n + 1], values, i * stride);
-      } else {
-        for (let c = 0; c < size; ++c)
-          values[i * stride + c] = place.low[c] + place.step[c] * columns[from + place.column + c];
+    if (direction) {
+      const flat = name === "tangent" && tangents;
+      const found = flat ? directions(tangents, 2, 0) : directions(signed, width, place.column);
+      for (let i = 0, to = 0; i < count; ++i) {
+        const from = 4 * (flat ? Math.floor(i / 3) : corners[i]);
+        for (let c = 0; c < 4; ++c) values[to++] = found[from + c];
+      }
+    } else {
+      const { low, step, column } = place;
+      for (let i = 0, to = 0; i < count; ++i) {
+        const from = corners[i] * width + column;
+        for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
       }
     }
-    if (name === "position") positions = values;
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(location);
-    gl.vertexAttribPointer(location, size, direction ? gl.SHORT : gl.FLOAT, direction, stride * values.BYTES_PER_ELEMENT, 0);
+    gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
   });
   // one buffer for all levels: a vertex array has one index buffer
   const parts = [], lists = [];
   for (const few of FEWER) {
-    const list = count > 3 * few ? coarser(positions, few) : null;
+    const list = count > 3 * few ? coarser(columns, width, mesh.layout.position, corners, few) : null;
     parts.push(list && { first: lists.reduce((sum, { length }) => sum + length, 0), length: list.length });
     if (list) lists.push(list);
   }
@@ -79,27 +81,23 @@ async function uploadMesh(gl, data, mesh) {
 }
 
 const FEWER = [20000, 5000]; // triangles while something moves, for slow software rasterisers
-const CELLS = 100; // cells along the longest side, at most
+const CELLS = 100; // cells along the longest side, at most, below 128
 
 // Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993).
-function coarser(positions, most, cells = CELLS) {
-  const low = [0, 1, 2].map(() => Infinity), high = [0, 1, 2].map(() => -Infinity);
-  for (let i = 0; i < positions.length; ++i) {
-    if (positions[i] < low[i % 3]) low[i % 3] = positions[i];
-    if (positions[i] > high[i % 3]) high[i % 3] = positions[i];
-  }
-  const step = cells / Math.max(...high.map((x, n) => x - low[n]), 1e-30);
-  const first = new Map();
+function coarser(columns, width, { column, step }, corners, most, cells = CELLS) {
+  const places = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
+  const cell = new Int32Array(columns.length / width); // of each distinct vertex
+  for (let n = 0; n < cell.length; ++n)
+    for (let c = 0; c < 3; ++c) cell[n] = (cell[n] << 7) | (columns[n * width + column + c] * places[c]);
+  const first = new Int32Array(1 << 21).fill(-1); // corner that stands for all in a cell
   const standing = (i) => {
-    let key = 0;
-    for (let c = 0; c < 3; ++c) key = 1024 * key + Math.floor((positions[3 * i + c] - low[c]) * step);
-    if (!first.has(key)) first.set(key, i);
-    return first.get(key);
+    const n = cell[corners[i]];
+    return first[n] < 0 ? (first[n] = i) : first[n];
   };
   const found = [];
-  for (let i = 0; i < positions.length / 3; i += 3) {
+  for (let i = 0; i < corners.length; i += 3) {
     const a = standing(i), b = standing(i + 1), c = standing(i + 2);
     if (a !== b && b !== c && c !== a) found.push(a, b, c);
   }
-  return found.length > 3 * most ? coarser(positions, most, 0.7 * cells) : found;
+  return found.length > 3 * most ? coarser(columns, width, { column, step }, corners, most, 0.7 * cells) : found;
 }

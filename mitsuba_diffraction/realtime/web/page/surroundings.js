@@ -10,7 +10,6 @@ class Surroundings {
     const around = new Surroundings(), { parts, lobes, emitting, glow, background } = header.around;
     around.gl = gl;
     around.part = await Part.load(gl, data, parts);
-    around.bounces = around.part.textures.some(([name]) => name === "bounces");
     around.lobes = await Promise.all(lobes.map((one) => Part.load(gl, data, one)));
     around.glowing = await Promise.all(emitting.map(async ({ mesh, radiance }) => ({ mesh: await uploadMesh(gl, data, mesh), radiance })));
     around.glow = new Program(gl, header.vertex, glow);

@@ -42,6 +42,7 @@ class Viewer {
     this.changed = 0;
     this.dirty = true;
     this.waiting = [];
+    this.lost = true;     // whether nothing can be drawn: before all is loaded, and without a context
     this.report = () => {};
   }
 
@@ -60,12 +61,12 @@ class Viewer {
 
   // Whether environment and emitters are drawn: all light is the scene's, and none has been moved.
   get around() {
-    return this.drawing.around && this.wavelength === null && this.lights.whole;
+    return this.header.around && this.wavelength === null && this.lights.whole;
   }
 
   // Whether lobes look up the surroundings: all, or where `around` is false other surfaces alone.
   get looksUp() {
-    return this.shadows && (this.around || (this.drawing.around?.bounces ?? false));
+    return this.shadows && (this.around || (this.header.around?.bounces ?? false));
   }
 
   // Definitions of the light for programs: a few lights at once, or one.
