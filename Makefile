@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup extras demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
+.PHONY: setup extras demo test test-all fuzz package bench bench-gpu figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -54,6 +54,13 @@ fuzz: setup  ## try random surfaces, damaged files and command lines for a minut
 
 package: setup .venv/browser  ## test wheel and sdist in empty environments, with oldest and newest packages
 	@.ci/package
+
+# ten minutes where a graphics card is, longer without one
+bench-gpu: setup  ## measure a graphics card: eval, sample, pictures, frames, and pixels of the shaders
+	@mkdir -p out
+	@$(PYTHON3) -m docs.make.bench --only eval sample snake frames --json out/bench-gpu.json
+	@$(RUN) compare scenes/scales.xml --method fast exact -s 1024 --frames 512 --supersampling 2 -D resx=72 -D resy=48 \
+	    -o out/compare/gpu
 
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 bench: setup  ## measure speed and noise: docs/performance.md

@@ -223,8 +223,6 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     from ..orders.solve.orders import solve_orders
 
     light: dict[str, Any] = {}
-    if recipe.block:
-        _check_block(recipe, args)
     if args.theta is not None:
         light = {"theta": args.theta, "phi": args.phi or 0.0}
     elif args.phi is not None or (args.step is not None and not args.crossed):
@@ -262,19 +260,6 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         )
     remove_results(folder)
     return table
-
-
-def _check_block(recipe: SolvedRecipe, args: argparse.Namespace) -> None:
-    """Refuse what blocks do not have, with a usage error."""
-    for name, used in (
-        ("thin", recipe.thin), ("superstrate", recipe.superstrate != 1.0),
-        ("layer", recipe.layers), ("beneath", recipe.beneath), ("substrate", recipe.substrate),
-    ):  # fmt: skip
-        if used:
-            args.parser.error(
-                f"argument --block: not allowed with --{name}; the block's index is relative to "
-                "the medium above"
-            )
 
 
 def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:

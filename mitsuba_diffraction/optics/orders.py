@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from .arithmetic import Mask, Number, of
+from .coat import transmittances
 
 
 class OrderCell(NamedTuple):
@@ -106,6 +107,29 @@ def port_power(z: Number, other: Number) -> Number:
     total = z + xp.sqrt(xp.maximum(other, 0.0))
     square = xp.where(other > 0.0, total * total, z * z - other)
     return 4.0 * z * xp.reciprocal(xp.maximum(square, 1e-7))  # 0 only where nothing propagates
+
+
+def order_factor(came: Number, left: Number, zeroth: Mask, index: float) -> Number:
+    """Return the factor of an order that leaves a clear surface on the side that light comes from.
+
+    An efficiency over it is smooth beside the order's Rayleigh anomaly and towards grazing. Of
+    order 0 it is the reflectance of the flat surface. Of others it is H H', of both directions:
+    H = (T_s + T_p/n²)/z' of the flat surface and the normal part z' within, the mean of G of
+    `port_power` and of its equal for p light.
+
+    came, left : squared cosines of both directions, in the medium above.
+    zeroth : whether it is order 0.
+    index : n of the medium below over that above, more than 1.
+    """
+    xp = of(came, left)
+    n, factor, flat = index + 0.0 * came, 1.0 + 0.0 * left, 0.0 * came
+    for square in (left, came):
+        cosine = xp.sqrt(xp.maximum(square, 0.0))
+        s, p = transmittances(cosine, n)
+        within = xp.sqrt(cosine * cosine + (index**2 - 1.0))
+        factor = factor * (s + p * (1.0 / index**2)) * xp.reciprocal(within)
+        flat = 1.0 - 0.5 * (s + p)
+    return xp.where(zeroth, flat, factor)
 
 
 def least_c(index: float) -> float:

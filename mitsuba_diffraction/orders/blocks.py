@@ -73,12 +73,23 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     channels = np.arange(values.shape[-1] // 2)
     light = cells.from_cell(band.k, kind, channels, tau, rho, lam, optical)
     scale, known = factors(table.block * light.x, table.block * light.y, table.block)
-    divided = np.where(known, values / np.where(known, scale, 1.0), 0.0)
-    for j, q in np.ndindex(divided.shape[3:]):
-        here = known[..., j, q]
+    return divided(values, scale, known)
+
+
+def divided(values: Array, scale: Array, known: NDArray[np.bool_]) -> Array:
+    """Return ratios (a, b, c, …, n) of values at the nodes of a grid to factors (a, b, c, …).
+
+    known : (a, b, c, …) whether ratios are known; elsewhere they are the nearest node's, 0 without
+        any. Without the axis n, values have the shape of the factors.
+    """
+    extra = (1,) * (values.ndim - known.ndim)
+    lit = known.reshape(*known.shape, *extra)
+    ratios = np.where(lit, values / np.where(lit, scale.reshape(lit.shape), 1.0), 0.0)
+    for place in np.ndindex(known.shape[3:]):
+        here = known[(..., *place)]
         if here.any() and not here.all():
             nearest = scipy.ndimage.distance_transform_edt(
                 ~here, return_distances=False, return_indices=True
             )
-            divided[..., j, q] = divided[(*nearest, j, q)]
-    return np.asarray(divided)
+            ratios[(slice(None),) * 3 + place] = ratios[(*nearest, *place)]
+    return np.asarray(ratios)

@@ -10,20 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, warn
+from ..reference.boundary import mueller as mueller_matrices
 from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
-from .polarised import nearest_jones, nearest_pure, s_and_p
+from .polarised import IN_PLANE, TurnedAxes, nearest_jones, s_and_p, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
-
-#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
-_IN_PLANE = 1e-7
-#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
-MIN_ANGLE = 1e-4
-
-AnyLookup = Lookup | ListedLookup
 
 
 class _Light(NamedTuple):
@@ -86,10 +80,10 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array
     """
     at = _Light(table, *light, **sides)
     mean, cosine, sine = _linear(at)
-    turned = turned_axes(at.x, at.y)
+    turned = _turned(at)
     difference = cosine * turned.cosine
     if sine is None:
-        if np.any((np.abs(turned.sine) > _IN_PLANE) & (mean > 0.0)):
+        if np.any((np.abs(turned.sine) > IN_PLANE) & (mean > 0.0)):
             raise DiffractionError(
                 "s and p of light off the plane across the grooves need Mueller matrices; solve "
                 "the profile with polarised=True, or take groove_efficiency: E or B along the "
@@ -112,7 +106,9 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """
     at = _Light(table, *light, **sides)
     mean, difference, _ = _linear(at)
-    turned = np.abs(turned_axes(at.x, at.y).sine) > _IN_PLANE
+    turned = (
+        np.abs(turned_axes(*(np.asarray(part, np.float64) for part in at[1:3])).sine) > IN_PLANE
+    )
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
@@ -122,25 +118,8 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-class TurnedAxes(NamedTuple):
-    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
-
-    cosine: Array
-    sine: Array
-
-
-def turned_axes(x: ArrayLike, y: ArrayLike) -> TurnedAxes:
-    """Return the angle between the axes of incident light by its mirror direction.
-
-    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
-    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
-    """
-    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
-    along, across = x, -y * np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
-    squared = along**2 + across**2
-    level = squared < _IN_PLANE**2
-    cosine = np.where(level, 1.0, along**2 - across**2) / np.where(level, 1.0, squared)
-    return TurnedAxes(cosine, 2.0 * along * across / np.where(level, 1.0, squared))
+def _turned(light: _Light) -> TurnedAxes:
+    return turned_axes(np.asarray(light.x, np.float64), np.asarray(light.y, np.float64))
 
 
 def _linear(light: _Light) -> tuple[Array, Array, Array | None]:
@@ -160,7 +139,7 @@ def mueller(table: OrderTable, *light: Any) -> Array:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    return nearest_pure(*_matrices(_Light(table, *light)))
+    return mueller_matrices(_jones(_Light(table, *light)))
 
 
 def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
@@ -174,7 +153,7 @@ def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     Raises a DiffractionError if the table has no Mueller matrices.
     """
     at = _Light(table, *light)
-    of_grooves = nearest_jones(*_matrices(at))
+    of_grooves = _jones(at)
     x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
@@ -190,21 +169,22 @@ def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     return np.asarray(found * phase[..., None, None])
 
 
-def _matrices(light: _Light) -> tuple[Array, Array]:
-    """Return the interpolated Mueller matrices (…, 4, 4) of an order, and its efficiency."""
+def _jones(light: _Light) -> NDArray[np.complex128]:
+    """Return the Jones matrices (…, 2, 2) of an order about e and f; any phase."""
     if not light.table.polarised:
         raise DiffractionError(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    elements = _elements(light)
-    return elements.reshape(*elements.shape[:-1], 4, 4), efficiency(*light[:6])
+    entries = nearest_jones(list(np.moveaxis(_elements(light), -1, 0)))
+    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(*light[:6]))[..., None]
+    return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
 
 class _Placed(NamedTuple):
     """Light in a look-up, all flat, and the shape of the answer."""
 
-    lookup: AnyLookup
+    lookup: Lookup
     row: Any
     order: Any
     active: NDArray[np.bool_]
@@ -250,7 +230,7 @@ def _placed(light: _Light) -> _Placed:
 def lookup_in(
     table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
     chances: bool = False,
-) -> AnyLookup:  # fmt: skip
+) -> Lookup:  # fmt: skip
     """Return the look-up of a table, with its grid in a memory.
 
     coated, elements, chances : as for `grid.grid_of`.
@@ -265,10 +245,10 @@ def lookup_in(
     return Lookup(table, grid, held, coated=coated)
 
 
-_lookups: weakref.WeakKeyDictionary[OrderTable, AnyLookup] = weakref.WeakKeyDictionary()
+_lookups: weakref.WeakKeyDictionary[OrderTable, Lookup] = weakref.WeakKeyDictionary()
 
 
-def lookup_of(table: OrderTable) -> AnyLookup:
+def lookup_of(table: OrderTable) -> Lookup:
     """Return the look-up of the grating alone, without its coat, in NumPy's memory."""
     if table not in _lookups:
         _lookups[table] = lookup_in(table, Arrays, coated=False, elements=True)

@@ -10,8 +10,8 @@ vacuum), `theta` and `phi` (degrees), and `order_x` and `order_y` of the ports o
 Global attributes hold the rest: `period` (µm), `period_y` (of a crossed grating; else left out),
 `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
 ports of `cells`), `block` (index of a block, with the ports of `blocks`), `even` (1 for even nodes,
-else Chebyshev nodes), `in_plane` (1 for listed light of one plane), `header` (JSON), `version`, and
-`sha256` of the table's digest and header.
+else Chebyshev nodes), `in_plane` (1 for listed light of one plane), `index` (of the material, see
+`ListedResponse`), `header` (JSON), `version`, and `sha256` of the table's digest and header.
 Attributes that do not apply are left out.
 """
 
@@ -81,6 +81,8 @@ def _add_response(file: Any, table: OrderTable) -> None:
     if isinstance(response, ListedResponse):
         if response.in_plane:
             file.in_plane = np.int32(1)
+        if response.index:
+            file.index = np.float64(response.index)
         axes = zip(
             ("wavelength", "theta", "phi"), response.axes, ("nm", *["degree"] * 2), strict=True
         )
@@ -166,6 +168,7 @@ def _table(file: Any) -> OrderTable:
         response: CellResponse | ListedResponse = ListedResponse(
             (axes[0], axes[1], axes[2]), np.column_stack(orders), _floats(file, _LISTED),
             bool(getattr(file, "in_plane", False)),
+            float(file.index) if hasattr(file, "index") else None,
         )  # fmt: skip
     else:
         response = CellResponse(_bands(file), even=bool(getattr(file, "even", False)))

@@ -14,15 +14,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.orders import crossed_square, order_factor
 from . import blocks
 from .cells import Array, Counts
-from .polarised import smooth_elements
+from .listed import mirror_of
+from .polarised import MIN_ANGLE, TurnedAxes, about_s, smooth_elements, turned_axes
 from .response import MUELLER, ListedResponse
 from .rows import Kind, cells_of, kinds_of, on_cells, resampled, rows
 from .table import OrderTable
 
 #: Largest number that a half float shall hold; 65504 is its limit.
 _LARGEST = 32768.0
+#: Squared cosine of an order from which on its ratio to `order_factor` is known at a node.
+_LEAST_SQUARE = 4e-4
 
 
 class OrderGrid(NamedTuple):
@@ -35,7 +39,8 @@ class OrderGrid(NamedTuple):
     corners : (records, 8 × parts) float32, M₀₀ at the corners 000, 001, 010 … 111 of a cell: of n
         ports a cell has rows of n + 1 records, the ports' and their sum, one for each port that
         light comes through; of listed light one for each side. Under a coat two parts:
-        efficiencies within it, and chances of drawing.
+        efficiencies within it, and chances of drawing; also of listed light with an index, whose
+        first part, as its elements, are ratios (`ListedResponse.index`).
     elements : (records, n) float32, the first n elements of the Mueller matrix at each node and
         pair of ports; over cells the odd ones over y. None without polarisation.
     element_starts : as `starts`, of `elements`.
@@ -71,7 +76,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
     """
     response = table.response
     if isinstance(response, ListedResponse) and not (coated and table.superstrate != 1.0):
-        return _listed(response, elements)
+        return _listed(table, response, elements)
     table = on_cells(table)
     counts = cells_of(table, coated=coated)
     if table.block:
@@ -106,15 +111,38 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
     return grid._replace(chances=stored, chance_starts=chance_starts)
 
 
-def _listed(response: ListedResponse, elements: bool) -> OrderGrid:
+def _listed(table: OrderTable, response: ListedResponse, elements: bool) -> OrderGrid:
     """Return the records of listed light; single lights along an axis are a cell of equal ends."""
-    values = response.values.astype(np.float64)
+    raw = response.values.astype(np.float64)
+    parts = [raw] if response.index is None else [_without_anomalies(table, response), raw]
     for axis in range(3):
-        if values.shape[axis] == 1:
-            values = np.repeat(values, 2, axis=axis)
-    counts, starts = Counts(*(n - 1 for n in values.shape[:3])), np.zeros(1, np.uint32)
-    matrices = values.reshape(-1, values.shape[-1]) if elements and values.shape[-1] > 1 else None
-    return _scaled(counts, starts, corner_records(values[..., 0]), matrices, starts)
+        if raw.shape[axis] == 1:
+            parts = [np.repeat(part, 2, axis=axis) for part in parts]
+    shape = parts[0].shape
+    counts, starts = Counts(*(n - 1 for n in shape[:3])), np.zeros(1, np.uint32)
+    matrices = parts[0].reshape(-1, shape[-1]) if elements and shape[-1] > 1 else None
+    records = np.concatenate([corner_records(part[..., 0]) for part in parts], axis=-1)
+    return _scaled(counts, starts, records, matrices, starts)
+
+
+def _without_anomalies(table: OrderTable, response: ListedResponse) -> Array:
+    """Return a crossed grating's elements over their factors, as `ListedResponse.values`.
+
+    For incident light about s, which goes round with φ; along the normal each φ has its own.
+    """
+    assert response.index is not None
+    lam, theta, phi = np.meshgrid(*response.axes, indexing="ij")
+    theta = np.maximum(theta, MIN_ANGLE)
+    x, y, lam = (part[..., None] for part in (*mirror_of(theta, phi), lam))
+    shifts = (m * lam * 1e-3 / d for m, d in zip(response.orders.T, table.periods, strict=True))
+    left = crossed_square(x, y, *shifts)
+    came, zeroth = 1.0 - x * x - y * y + 0.0 * left, ~response.orders.any(axis=1)
+    scale = order_factor(came, left, zeroth, response.index)
+    values, axes = list(np.moveaxis(response.values, -1, 0).astype(np.float64)), turned_axes(x, y)
+    axes = TurnedAxes(*(part[:, :, :, None] for part in axes))
+    known = (left > _LEAST_SQUARE)[:, :, :, None]
+    turned = np.stack(about_s(values, axes), axis=-1)
+    return blocks.divided(turned, scale[:, :, :, None], known)
 
 
 def _scaled(

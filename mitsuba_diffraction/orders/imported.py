@@ -2,7 +2,7 @@
 
 Efficiencies of s and p become elements of Mueller matrices about the axes of the grooves
 (`polarised`), which have no special place at the normal: M₀₁ = ½(η_s − η_p) cos 2ψ and
-M₀₂ = ½(η_s − η_p) sin 2ψ, with ψ from the axis e to that of s (`efficiency.turned_axes`).
+M₀₂ = ½(η_s − η_p) sin 2ψ, with ψ from the axis e to that of s (`polarised.turned_axes`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
 from .cells import Array
-from .efficiency import MIN_ANGLE, turned_axes
 from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
+from .polarised import MIN_ANGLE, turned_axes
 from .response import LARGEST_SUM, ListedResponse, orders_between
 from .table import OrderTable, check_outline
 from .table_error import table_error

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..optics.arithmetic import Mask, Number, of
-from ..optics.orders import crossed_square
+from ..optics.orders import crossed_square, order_factor
 from .cells import Array
 from .grid import OrderGrid
-from .lookup import RAISED, Index, Memory, Share, corner_weights, weighted
-from .polarised import ODD
+from .lookup import Index, Lookup, Memory, Share, corner_weights
+from .polarised import ODD, about_s, turned_axes
 from .response import ListedResponse
 from .table import OrderTable
 
@@ -39,7 +39,7 @@ class ListedRow(NamedTuple):
     face: Number
 
 
-class ListedLookup:
+class ListedLookup(Lookup):
     """Rows of a table of listed light, without a coat.
 
     Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings.
@@ -50,24 +50,20 @@ class ListedLookup:
     count : number of orders.
     """
 
-    coated = has_chances = False
-
     def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory) -> None:
         response = table.response
         assert isinstance(response, ListedResponse)
-        self.memory, self._cells, self._scale = memory, grid.cells, grid.scale * memory.scale
+        super().__init__(table, grid, memory, coated=False)
+        self._material = response.index
         self._axes = [_Axis(nodes) for nodes in response.axes]
         self._in_plane, self._crossed = response.in_plane, table.crossed
-        self.sides, self.index = table.sides, table.block or 1.0
-        self._medium = table.block or table.superstrate
+        self.index = table.block or 1.0
         self._steps = [1e-3 / (period * table.superstrate) for period in table.periods]
-        self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
-        self._reach = table.reach
         self._first = response.orders[0].tolist()
         self._size = (response.orders[-1] - response.orders[0] + 1).tolist()
         self.count = len(response.orders)
 
-    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> ListedRow:
+    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> Any:
         """See `lookup.Lookup.row`; x and y belong to wave vectors over 2π/λ."""
         xp = of(x, wavelength)
         second = xp.flag(cos_i < 0.0) if self.sides == 2 else xp.index(0.0 * x)
@@ -97,11 +93,11 @@ class ListedLookup:
             phi = phi + xp.where(phi < 0.0, 360.0, 0.0)
         return wavelength, xp.arcsin(sine) * _DEGREE, phi
 
-    def ports(self, row: ListedRow) -> Index:
+    def ports(self, row: Any) -> Index:
         """See `lookup.Lookup.ports`."""
         return self.count * self.sides + 0 * row.start
 
-    def order_at(self, row: ListedRow, port: Index) -> tuple[Any, Mask]:
+    def order_at(self, row: Any, port: Index) -> tuple[Any, Mask]:
         """See `lookup.Lookup.order_at`."""
         below = port >= self.count
         place = port
@@ -118,15 +114,12 @@ class ListedLookup:
         return m_x, xp.number(along) + float(self._first[1])
 
     def port(
-        self, row: ListedRow, order: Any, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
         """See `lookup.Lookup.port`."""
         xp = of(row.wavelength)
         m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
-        shift_x, shift_y = (
-            m * row.wavelength * step for m, step in zip((m_x, m_y), self._steps, strict=True)
-        )
-        square = crossed_square(-row.x, -row.y, shift_x, shift_y)
+        square = self._square(row, m_x, m_y)
         if self.index != 1.0:
             square = square + xp.where(below, 0.0, self.index**2 - 1.0)
         leaves = active & (square > 0.0)
@@ -139,45 +132,47 @@ class ListedLookup:
             port = port + xp.where(below, self.count + 0 * port, 0 * port)
         return port, leaves
 
-    def share(
-        self, row: ListedRow, order: Any, active: Mask = True, below: Mask | None = None
-    ) -> Share:
+    def share(self, row: Any, order: Any, active: Mask = True, below: Mask | None = None) -> Share:
         """See `lookup.Lookup.share`."""
+        xp = of(row.wavelength)
         port, leaves = self.port(row, order, active, below)
-        efficiency = of(row.wavelength).where(leaves, self.at_port(row, port, 0, leaves), 0.0)
-        return Share(efficiency, efficiency)
-
-    def total(self, row: ListedRow, active: Mask = True) -> Number:
-        """See `lookup.Lookup.total`; with orders that do not propagate in this light."""
-        return self.at_port(row, self.ports(row), 0, active) * RAISED
+        chance = xp.where(leaves, self.at_port(row, port, self._parts - 1, leaves), 0.0)
+        if self._material is None:
+            return Share(chance, chance)
+        light = self.at_port(row, port, 0, leaves) * self._factor(row, *order)
+        return Share(xp.where(leaves, light, 0.0), chance)
 
     def elements(
-        self, row: ListedRow, order: Any, y: Number, active: Mask = True,
+        self, row: Any, order: Any, y: Number, active: Mask = True,
         below: Mask | None = None,
     ) -> list[Number]:  # fmt: skip
         """See `lookup.Lookup.elements`; only the sign of y is used, on grooves."""
         xp = of(row.wavelength)
         port, active = self.port(row, order, active & row.lit, below)
-        _, n_b, n_c = self._cells
-        a, b, c = row.cell // (n_b * n_c), (row.cell // n_c) % n_b, row.cell % n_c
-        ports = self.count * self.sides
-        totals: list[Any] = [0.0 * row.wavelength] * self.numbers
-        for n, weight in enumerate(row.weights):
-            i, j, k = n >> 2, (n >> 1) & 1, n & 1
-            node = ((a + i) * (n_b + 1) + b + j) * (n_c + 1) + c + k
-            place = (node * self.sides + row.second) * ports + port
-            record = self.memory.read("elements", place, self.numbers, active)
-            totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
+        ports = self.ports(row)
+        totals = self.mixed(row, row.second * ports + port, self.sides * ports, active)
+        if self._material is not None:
+            factor = self._factor(row, *order)
+            return about_s([x * factor for x in totals], turned_axes(-row.x, -row.y), -1.0)
         if self._crossed:
             return totals
         sign = xp.where(y < 0.0, -1.0 + 0.0 * y, 1.0 + 0.0 * y)
         odd = ODD.ravel()[: self.numbers]
         return [x * sign if is_odd else x for x, is_odd in zip(totals, odd, strict=True)]
 
-    def at_port(self, row: ListedRow, port: Index, part: int, active: Mask) -> Number:
-        """See `lookup.Lookup.at_port`."""
-        corners = self.memory.read("corners", row.start + port, 8, active & row.lit)
-        return weighted(row.weights, corners)
+    def _square(self, row: Any, m_x: Number, m_y: Number) -> Number:
+        """Return the squared cosine of an order above."""
+        shift_x, shift_y = (
+            m * row.wavelength * step for m, step in zip((m_x, m_y), self._steps, strict=True)
+        )
+        return crossed_square(-row.x, -row.y, shift_x, shift_y)
+
+    def _factor(self, row: Any, m_x: Number, m_y: Number) -> Number:
+        """Return `optics.orders.order_factor` of an order."""
+        assert self._material is not None
+        came = 1.0 - row.x * row.x - row.y * row.y
+        zeroth = (m_x == 0.0) & (m_y == 0.0)
+        return order_factor(came, self._square(row, m_x, m_y), zeroth, self._material)
 
 
 class _Axis:

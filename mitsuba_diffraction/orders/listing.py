@@ -18,9 +18,9 @@ from ..columns import save_numbers
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
-from .efficiency import MIN_ANGLE
 from .listed import mirror_of
 from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
+from .polarised import MIN_ANGLE
 from .response import ListedResponse, orders_between
 from .table import OrderTable
 

@@ -155,7 +155,7 @@ class Lookup:
         if not self.coated:  # directions within the medium are given
             self._step /= table.superstrate
 
-    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> Row:
+    def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> Any:
         """Return the row of light from ωi.
 
         x, y, cos_i : of ωi in the patch's frame; cos_i is below 0 for light from below a sheet.
@@ -198,9 +198,8 @@ class Lookup:
         q = port - xp.where(below, row.channels, 0) if self.sides == 2 else port
         return xp.number(row.channel) - xp.number(q), below
 
-    @staticmethod
     def port(
-        row: Row, order: Number, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
         """Return an order's port, and whether it propagates."""
         xp = of(row.wavelength)
@@ -211,9 +210,7 @@ class Lookup:
             port = port + xp.where(below, row.channels, 0)
         return port, propagates
 
-    def share(
-        self, row: Row, order: Number, active: Mask = True, below: Mask | None = None
-    ) -> Share:
+    def share(self, row: Any, order: Any, active: Mask = True, below: Mask | None = None) -> Share:
         """Return the light of an order, a whole number; 0 if it does not propagate or inactive.
 
         below : whether it leaves below a sheet; None without a sheet.
@@ -242,33 +239,40 @@ class Lookup:
         came, left = (1.0 - self._kept * (1.0 - end) for end in ends)
         return self.at_port(row, port, 0, propagates) * xp.reciprocal(xp.sqrt(came * left))
 
-    def total(self, row: Row, active: Mask = True) -> Number:
-        """Return the sum of all orders' chances, rounded up; meaningless where inactive."""
+    def total(self, row: Any, active: Mask = True) -> Number:
+        """Return the sum of all orders' chances, rounded up; meaningless where inactive.
+
+        Of listed light with orders that do not propagate in this light.
+        """
         value = self.at_port(row, self.ports(row), self._parts - 1, active)
         if self.coated:
             value = self._outside(row, value, row.face)
         return value * RAISED
 
     def elements(
-        self, row: Row, order: Number, y: Number, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, y: Number, active: Mask = True, below: Mask | None = None
     ) -> list[Number]:
         """Return the first elements of the Mueller matrix of an order, row by row.
 
         y : direction cosine of the light along the grooves, of which odd elements are multiples.
         """
-        xp = of(row.wavelength)
         port, active = self.port(row, order, active & row.lit, below)
         ports = self.ports(row)
         first = self.memory.start("element_starts", row.kind) + row.entered * ports + port
-        totals: list[Number] = [0.0 * row.wavelength] * self.numbers
-        for weight, node in zip(row.weights, self.nodes(row), strict=True):
-            index = first + node * ports * ports
-            record = self.memory.read("elements", index, self.numbers, active)
-            totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
+        totals = self.mixed(row, first, ports * ports, active)
         odd = ODD.ravel()[: self.numbers]
         return [x * y if is_odd else x for x, is_odd in zip(totals, odd, strict=True)]
 
-    def nodes(self, row: Row) -> list[Index]:
+    def mixed(self, row: Any, first: Index, stride: Index, active: Mask) -> list[Number]:
+        """Interpolate elements; first : record of node 0, and stride records each."""
+        xp = of(row.wavelength)
+        totals: list[Number] = [0.0 * row.wavelength] * self.numbers
+        for weight, node in zip(row.weights, self.nodes(row), strict=True):
+            record = self.memory.read("elements", first + node * stride, self.numbers, active)
+            totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
+        return totals
+
+    def nodes(self, row: Any) -> list[Index]:
         """Return the numbers of the nodes at a cell's corners, 000, 001, 010 … 111."""
         n_rho, n_w = self._cells.rho, self._cells.w
         tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
@@ -281,7 +285,7 @@ class Lookup:
         record = (row.start + self.ports(row)) * self._parts + self._parts - 1
         return self.memory.read("corners", record, 8, row.lit)
 
-    def at_port(self, row: Row, port: Index, part: int, active: Mask) -> Number:
+    def at_port(self, row: Any, port: Index, part: int, active: Mask) -> Number:
         """Interpolate a port between the corners of a cell; 0 where the table has no light."""
         record = (row.start + port) * self._parts + part
         corners = self.memory.read("corners", record, 8, active & row.lit)

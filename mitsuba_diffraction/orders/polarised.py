@@ -7,17 +7,20 @@ direction cosine of the light along the grooves: what is smooth in the coordinat
 their ratio to y.
 
 An order is one plane wave for each incident one, so that its matrix is a Jones matrix', and
-fully polarised light stays so. Interpolation between nodes breaks that slightly; `nearest_pure`
+fully polarised light stays so. Interpolation between nodes breaks that slightly; `nearest_jones`
 mends it, so that no matrix gains light or polarisation.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.arithmetic import Number, of, squared
+from ..optics.boundary import Jones
 from ..reference.boundary import mueller
 from . import cells
 from .cells import Array
@@ -26,9 +29,48 @@ from .table import OrderTable
 
 #: Elements (4, 4) that are odd in y: those between intensities S₀, S₁ and phases S₂, S₃.
 ODD = np.add.outer([0, 0, 1, 1], [0, 0, 1, 1]) == 1
+#: Sine of the angle between axes of polarisation below which light is in a plane of symmetry.
+IN_PLANE = 1e-7
+#: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
+MIN_ANGLE = 1e-4
 _MIN_AMPLITUDE = 1e-12
 #: Sine of the angle from the normal below which a direction has no s of its own.
 _NORMAL = 1e-9
+
+
+class TurnedAxes(NamedTuple):
+    """Cosine and sine of 2ψ, with ψ from the table's axis e to the axis of s polarisation."""
+
+    cosine: Number
+    sine: Number
+
+
+def turned_axes(x: Number, y: Number) -> TurnedAxes:
+    """Return the angle between the axes of incident light by its mirror direction.
+
+    With d = (x, y, −z), s = ẑ × d/ρ, e = (ŷ − y d)/c and f = d × e, ρ² = x² + y², c² = 1 − y²:
+    e·s = x/(ρ c) and f·s = −y z/(ρ c). Along the normal s is along the grooves.
+    """
+    xp = of(x, y)
+    across = -y * xp.sqrt(xp.maximum(1.0 - x * x - y * y, 0.0))
+    square = x * x + across * across
+    level = square < IN_PLANE**2
+    inverse = xp.reciprocal(xp.where(level, 1.0 + 0.0 * square, square))
+    cosine = xp.where(level, 1.0 + 0.0 * square, (x * x - across * across) * inverse)
+    return TurnedAxes(cosine, 2.0 * x * across * inverse)
+
+
+def about_s(elements: Sequence[Number], axes: TurnedAxes, sign: float = 1.0) -> list[Number]:
+    """Return elements of Mueller matrices, row by row, for incident light about s, not e.
+
+    sign : −1 turns back, from s to e.
+    """
+    turned, sine = list(elements), sign * axes.sine
+    for n in range(0, len(turned) - 2, 4):
+        along, oblique = turned[n + 1 : n + 3]
+        turned[n + 1] = axes.cosine * along + sine * oblique
+        turned[n + 2] = axes.cosine * oblique - sine * along
+    return turned
 
 
 def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
@@ -47,32 +89,46 @@ def smooth_elements(table: OrderTable, k: int, values: Array) -> Array:
     return np.where(ODD.ravel(), 1.0 / y, 1.0) * values
 
 
-def nearest_pure(matrices: Array, efficiency: Array) -> Array:
-    """Return about the nearest Mueller matrices (…, 4, 4) of Jones matrices, of an efficiency (…).
+def nearest_jones(m: Sequence[Number]) -> Jones:
+    """Return a Jones matrix, ½ Σ|J|² = 1, near to a Mueller matrix (16 elements, row by row).
 
-    An error that `matrices` have out of the set of pure ones is squared.
+    It is the largest eigenvector of the coherency matrix J ⊗ J* (Cloude 1986, Optik 75, 26), by one
+    step of the power method from its largest column: an error that elements have out of the set of
+    pure matrices is squared. The phase is any.
     """
-    vector = nearest_jones(matrices, efficiency).reshape(-1, 4)
-    pairs = vector[:, :, None] * vector[:, None, :].conj()
-    return np.asarray((pairs.reshape(-1, 16) @ _MATRIX).real.reshape(matrices.shape))
+    xp = of(m[0])
 
+    def half(real: Number, imag: Number) -> Number:
+        return xp.complex(0.5 * real, 0.5 * imag)
 
-def nearest_jones(matrices: Array, efficiency: Array) -> NDArray[np.complex128]:
-    """Return Jones matrices (…, 2, 2) about e and f of Mueller matrices (…, 4, 4); any phase.
+    def conj(z: Number) -> Number:
+        return xp.complex(z.real, -z.imag)
 
-    The Jones matrix is the largest eigenvector of the coherency matrix (Cloude 1986, Optik 75, 26),
-    by one step of the power method from its largest column.
-
-    efficiency : (…), ½ Σ|J|² of the result.
-    """
-    flat = matrices.reshape(-1, 16)
-    coherency = (flat @ _COHERENCY).reshape(-1, 4, 4)
-    lanes = np.arange(len(flat))
-    largest = np.diagonal(coherency, axis1=1, axis2=2).real.argmax(axis=1)
-    vector = np.einsum("nab,nb->na", coherency, coherency[lanes, :, largest])
-    power = 0.5 * np.sum(np.abs(vector) ** 2, axis=1)
-    scale = np.sqrt(np.maximum(efficiency.ravel(), 0.0) / np.maximum(power, _MIN_AMPLITUDE**2))
-    return np.asarray((vector * scale[:, None]).reshape(*matrices.shape[:-2], 2, 2))
+    # `reference.boundary.mueller` turned round
+    ss_sp, ps_pp = half(m[2] + m[6], -m[3] - m[7]), half(m[2] - m[6], m[7] - m[3])
+    ss_ps, sp_pp = half(m[8] + m[9], m[12] + m[13]), half(m[8] - m[9], m[12] - m[13])
+    ss_pp, sp_ps = half(m[10] + m[15], m[14] - m[11]), half(m[10] - m[15], m[14] + m[11])
+    signs = (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)
+    powers = [half(m[0] + a * m[1] + b * m[4] + a * b * m[5], 0.0 * m[0]) for a, b in signs]
+    columns = [
+        [powers[0], conj(ss_sp), conj(ss_ps), conj(ss_pp)],
+        [ss_sp, powers[1], conj(sp_ps), conj(sp_pp)],
+        [ss_ps, sp_ps, powers[2], conj(ps_pp)],
+        [ss_pp, sp_pp, ps_pp, powers[3]],
+    ]
+    largest, most = columns[0], powers[0].real
+    for column, power in zip(columns[1:], powers[1:], strict=True):
+        larger = power.real > most
+        most = xp.maximum(most, power.real)
+        largest = [xp.where(larger, a, b) for a, b in zip(column, largest, strict=True)]
+    vector = [
+        sum((columns[n][row] * largest[n] for n in range(1, 4)), columns[0][row] * largest[0])
+        for row in range(4)
+    ]
+    power = xp.maximum(0.5 * sum(map(squared, vector)), _MIN_AMPLITUDE**2)
+    inverse = xp.reciprocal(xp.sqrt(power))
+    ss, sp, ps, pp = (entry * inverse for entry in vector)
+    return ss, sp, ps, pp
 
 
 def s_and_p(jones: NDArray[np.complex128], incident: Array, leaving: Array) -> Any:
@@ -100,14 +156,3 @@ def s_and_p(jones: NDArray[np.complex128], incident: Array, leaving: Array) -> A
 
 def _level(direction: Array) -> Any:
     return np.hypot(direction[..., 0], direction[..., 1]) < _NORMAL
-
-
-def _coherency() -> NDArray[np.complex128]:
-    """Return the map (16, 16) of flat Mueller matrices to J_ik J_jl* at row ik and column jl."""
-    stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
-    products = np.linalg.inv(stokes) @ np.eye(16).reshape(16, 4, 4) @ stokes  # ij and kl
-    return products.reshape(16, 2, 2, 2, 2).swapaxes(2, 3).reshape(16, 16)
-
-
-_COHERENCY = _coherency()
-_MATRIX = np.linalg.inv(_COHERENCY)

@@ -129,12 +129,15 @@ class ListedResponse:
         that do not propagate have a neighbour's.
     in_plane : whether all light lies in the plane across the grooves: other light then has the
         efficiencies of the light of the same K and s (`cells`), as with perfect conductors.
+    index : of a clear material below a crossed grating, or None. With it, ratios of elements to
+        `optics.orders.order_factor` are interpolated, of incident light about s.
     """
 
     axes: tuple[Array, Array, Array]
     orders: NDArray[np.int64]
     values: NDArray[np.float32]
     in_plane: bool = False
+    index: float | None = None
 
     @property
     def elements(self) -> int:

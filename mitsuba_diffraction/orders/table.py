@@ -198,7 +198,8 @@ class OrderTable:
         outline: list[Any] = [float(x) for x in (*self.periods, *self.wavelengths, *media)]
         content = hashlib.sha256()
         if isinstance(self.response, ListedResponse):
-            outline.append(self.response.in_plane)
+            index = self.response.index
+            outline += [self.response.in_plane, *([] if index is None else [index])]
             for axis in (*self.response.axes, self.response.orders):
                 content.update(np.ascontiguousarray(axis, np.float64).data)
         else:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import jv
 
-from mitsuba_diffraction.optics.orders import crossed_square
+from mitsuba_diffraction.optics.orders import crossed_square, order_factor
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.imported import imported_table
 from mitsuba_diffraction.orders.lists import Efficiencies
@@ -13,6 +15,8 @@ from mitsuba_diffraction.orders.lists import Efficiencies
 PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
 #: Reflectance; and amplitudes of the sine waves along x and y, µm.
 REFLECTANCE, DEPTHS = 0.8, (0.03, 0.015)
+#: Of the clear material.
+INDEX = 1.5
 
 
 def efficiency(x, y, wavelength, m, n):
@@ -25,7 +29,16 @@ def efficiency(x, y, wavelength, m, n):
     return np.where(crossed_square(x, y, *shifts) > 0.0, REFLECTANCE * powers, np.nan)
 
 
-def listed(theta, phi, wavelengths):
+def clear_efficiency(x, y, wavelength, m, n):
+    """Efficiencies in constant ratios to those of shallow heights of a clear material."""
+    shifts = (1e-3 * k * wavelength / d for k, d in zip((m, n), PERIODS, strict=True))
+    came, left = crossed_square(x, y, 0.0, 0.0), crossed_square(x, y, *shifts)
+    zeroth, ratio = (m == 0) & (n == 0), 0.1 * 0.5 ** (np.abs(m) + np.abs(n))
+    light = np.where(zeroth, 1.0, ratio) * order_factor(came + 0.0 * left, left, zeroth, INDEX)
+    return np.where(left > 0.0, light, np.nan)
+
+
+def listed(theta, phi, wavelengths, of_order=efficiency):
     """Efficiencies on a grid, as a file has them."""
     m_x, m_y = (int(2e3 * period / wavelengths[0]) for period in PERIODS)
     pairs = np.mgrid[-m_x : m_x + 1, -m_y : m_y + 1].reshape(2, -1)
@@ -33,7 +46,7 @@ def listed(theta, phi, wavelengths):
         wavelengths, theta, phi, np.arange(pairs.shape[1]), indexing="ij"
     )
     sine, turn = np.sin(np.radians(polar)), np.radians(azimuth)
-    values = efficiency(-sine * np.cos(turn), -sine * np.sin(turn), lam, *pairs[:, m])
+    values = of_order(-sine * np.cos(turn), -sine * np.sin(turn), lam, *pairs[:, m])
     values = np.repeat(values[..., None], 2, axis=-1)
     return Efficiencies(np.asarray(wavelengths), theta, phi, pairs.T, values)
 
@@ -43,6 +56,16 @@ def table() -> OrderTable:
     grid = listed(np.arange(0.0, 86.0, 5.0), np.arange(0.0, 360.0, 15.0), np.arange(450, 651, 20.0))
     header = {"solver": "closed form", "material": "mirror", "profile": "sine waves"}
     return imported_table(grid, PERIODS, 1.0, "the closed form", header)
+
+
+def clear_table() -> OrderTable:
+    """Table of a clear material, `clear_efficiency`."""
+    grid = listed(
+        np.arange(0.0, 89.0, 8.0), np.arange(0.0, 360.0, 20.0), [450.0, 550.0, 650.0],
+        clear_efficiency,
+    )  # fmt: skip
+    made = imported_table(grid, PERIODS, 1.0, "the closed form", {"profile": "sine waves"})
+    return replace(made, response=replace(made.response, index=INDEX))
 
 
 def save_csv(grid: Efficiencies, path) -> None:

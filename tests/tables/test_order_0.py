@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.heights.coherence import LOOKUP
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from tests.support.directions import lit_pairs
 from tests.support.mirror import FAST, beside_the_mirror
@@ -30,8 +31,8 @@ def test_the_window_of_the_light_changes_order_0_alone():
     table = md.DiffractionTable.build(SMALL_SCAN)
     assert (table.coherence_width, table.window_width) == (65.0, min(SMALL_SCAN.extent))
     one = md.DiffractionTable.build(SMALL_SCAN, coherence_width=table.window_width)
-    # the look-up's σ_l is 1.7 times that of the light, whose lobe the taper makes up for
-    assert one.order_0_ratio == pytest.approx(1.7**-2, rel=1e-12)
+    # the look-up's σ_l is LOOKUP times that of the light, whose lobe the taper makes up for
+    assert one.order_0_ratio == pytest.approx(LOOKUP**-2, rel=1e-12)
     np.testing.assert_array_equal(table.coefficients, one.coefficients)
     q, kappa = np.array([0.0, 0.03, 0.1, 0.5, 2.0]), 20.0
     order_0 = one.order_0_at(kappa)[0]

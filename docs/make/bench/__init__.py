@@ -9,6 +9,7 @@ contenders   BSDFs to compare, the bare gathers and the thesis' look-up among th
 evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
 orders       `diffraction_orders`: times of the calls, noise of a sample
 survey       a survey of many scans, in one process and on workers
+frames       frames of the shaders
 scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
 """
 
@@ -70,9 +71,8 @@ def sections(
     def colours(backend: str) -> Iterable[Section]:
         return measure_colours(plan, tables(), scenes, backend, progress)
 
-    for backend in ("llvm", "cuda"):
-        if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
-            continue
+    found = [b for b in ("llvm", "cuda") if dr.has_backend(getattr(dr.JitBackend, b.upper()))]
+    for backend in found:
         set_variant(f"{backend}_ad_spectral")
         measured: dict[str, Callable[[], Iterable[Section]]] = {
             "eval": lambda: [measure_eval(plan, tables(), progress)],
@@ -87,3 +87,7 @@ def sections(
             if part in parts:
                 yield from measure()
                 gc.collect()  # the next part's kernels would hold the code of BSDFs of this one
+    if "frames" in parts:
+        from .frames import measure_frames
+
+        yield measure_frames(plan, tables(), scenes, progress)

@@ -27,6 +27,7 @@ from . import figures, sections
 
 PARTS = (
     "build", "survey", "eval", "sample", "snake", "orders", "noise", "efficiency", "colours",
+    "frames",
 )  # fmt: skip
 
 
@@ -41,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--against", metavar="FILE", type=Path,
         help="compare with an earlier run, written by --json",
     )  # fmt: skip
-    parser.add_argument("--only", choices=PARTS, help="measure only this")
+    parser.add_argument("--only", nargs="+", choices=PARTS, help="measure only these")
     parser.add_argument(
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="folder of the project's scenes; default: scenes",
@@ -61,8 +62,8 @@ def _bench(args: argparse.Namespace) -> None:
     if args.json is not None:
         check_outputs([args.json])
     earlier = figures.read_run(args.against) if args.against is not None else None
-    parts = (args.only,) if args.only else PARTS
-    if not {"snake", "orders", "efficiency", "colours"}.isdisjoint(parts):
+    parts = tuple(args.only or PARTS)
+    if not {"snake", "orders", "efficiency", "colours", "frames"}.isdisjoint(parts):
         _check_scenes(args.scenes)
     patch = measured_patch(args)
     plan = figures.QUICK if args.quick else figures.FULL

@@ -27,6 +27,7 @@ class Plan:
     spp: int = 16
     reference_spp: int = 2048  # of pictures that are to have converged
     map_resolution: int = 256  # directions of view along each axis, to compare colours at
+    frame: tuple[int, int] = (1920, 1080)  # pixels of the shaders' frames
 
 
 FULL = Plan()
@@ -40,6 +41,7 @@ QUICK = Plan(
     spp=4,
     reference_spp=256,
     map_resolution=96,
+    frame=(96, 54),
 )
 
 

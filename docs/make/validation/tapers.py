@@ -113,7 +113,7 @@ def seen(estimator: Estimator, spectrum: Callable[[Real, Real], Real], width: fl
     lam : wavelengths, nm.
     """
     sigma, step = 0.25 * width, 0.04
-    q = np.arange(-24.0, 24.0, step)
+    q = step * np.arange(-600, 601)  # odd in number: the convolution keeps the middle
     surface = spectrum(*np.meshgrid(q, q))
     lookup = np.exp(-np.square(estimator.lookup * sigma * q))
     lobe = np.convolve(estimator.orders(q, width), lookup, "same")

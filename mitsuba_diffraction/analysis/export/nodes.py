@@ -25,7 +25,7 @@ from ...errors import DiffractionError
 from ...llvm import require_loaded_llvm
 from ...optics.geometry import wavenumber
 from ...orders import OrderTable
-from ...orders.efficiency import AnyLookup, lookup_in
+from ...orders.efficiency import lookup_in
 from ...orders.listing import orders_of
 from ...orders.lookup import Arrays
 from ...plugin.description import VARYING, Consumer, Feature, Surface
@@ -287,7 +287,7 @@ class _Orders:
         si = flat_interaction(mi.Vector3f(0.0, 0.0, 1.0), 1)
         turn = [float(np.array(part).ravel()[0]) for part in surface.frame(si)[:2]]
         self._turn = np.array([[turn[0], turn[1]], [-turn[1], turn[0]]])  # shading frame to patch
-        self._lookup: AnyLookup = lookup_in(self._table, Arrays, coated=True, elements=False)
+        self._lookup = lookup_in(self._table, Arrays, coated=True, elements=False)
 
     def on(self, nodes: Nodes, wi: Reals, wavelengths: Reals, step: float) -> Reals:
         """Return the light of one direction on nodes, (nodes, wavelengths)."""

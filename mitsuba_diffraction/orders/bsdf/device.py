@@ -12,7 +12,7 @@ import numpy as np
 from ...plugin.loops import sum_of
 from ...plugin.memory import Halves, once_a_table, read, upload
 from ...plugin.types import Float, Index, Mask
-from ..efficiency import AnyLookup, lookup_in
+from ..efficiency import lookup_in
 from ..grid import OrderGrid
 from ..lookup import RAISED, Lookup
 from ..table import OrderTable
@@ -48,7 +48,7 @@ class Device:
 
 
 @once_a_table
-def order_lookup(table: OrderTable) -> AnyLookup:
+def order_lookup(table: OrderTable) -> Lookup:
     """Return the look-up of a table in the current variant."""
     elements = mi.is_polarized and table.polarised
     return lookup_in(table, Device, coated=True, elements=elements, chances=True)
@@ -62,10 +62,9 @@ class Drawn(NamedTuple):
     valid: Mask
 
 
-def draw(lookup: AnyLookup, row: Any, sample: Float) -> Drawn:
+def draw(lookup: Lookup, row: Any, sample: Float) -> Drawn:
     """Return an order drawn by its efficiency over `Lookup.total`."""
     if lookup.has_chances:
-        assert isinstance(lookup, Lookup)
         return _drawn_at_a_corner(lookup, row, sample)
     target, ports = sample * lookup.total(row), mi.UInt32(lookup.ports(row))
 

@@ -1,6 +1,6 @@
 """Mueller matrices of solved orders, in polarised variants (Dr.Jit).
 
-The axes are defined in `orders.polarised`, whose `nearest_pure` is here again, in a kernel.
+The axes are defined in `orders.polarised`.
 Light goes from ωi to ωo; where radiance is followed, it comes the other way, and the Jones matrix
 is transposed (de Hoop 1960, Appl. Sci. Res. B 8, 135).
 
@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ...optics.arithmetic import squared
 from ...optics.boundary import SAME_DIRECTION, Jones
 from ...optics.coat import refracted, transmittances
 from ...optics.fresnel import amplitudes
@@ -23,8 +22,8 @@ from ...plugin.arithmetic import maximum, minimum
 from ...plugin.boundary import mueller, turn, turned
 from ...plugin.directions import Pair
 from ...plugin.types import Context, Float, Mask, Spectrum, Vector3f
-from ..efficiency import AnyLookup
 from ..lookup import Lookup
+from ..polarised import nearest_jones
 from .lobes import Lit, SpectralLobes
 
 _MIN_DIVISOR, _MIN_POWER = 1e-12, 1e-30
@@ -43,14 +42,14 @@ class Wave(NamedTuple):
     share: Float
 
 
-def _wave(lookup: AnyLookup, row: Any, order: Any, y: Float, active: Mask) -> Wave:
+def _wave(lookup: Lookup, row: Any, order: Any, y: Float, active: Mask) -> Wave:
     """Return the light of an order; y : direction cosine of the light along the grooves."""
     elements = lookup.elements(row, order, y, active)
     share = mi.Float(1.0)
-    if isinstance(lookup, Lookup) and lookup.coated:
+    if lookup.coated:
         within = lookup.repeated(row, order, active & row.lit)
         share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
-    return Wave(_nearest(elements), share)
+    return Wave(nearest_jones(elements), share)
 
 
 class PolarisedLobes(SpectralLobes):
@@ -159,37 +158,3 @@ def _product(a: Jones, b: Jones) -> Jones:
         a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3],
         a[2] * b[0] + a[3] * b[2], a[2] * b[1] + a[3] * b[3],
     )  # fmt: skip
-
-
-def _nearest(m: list[Float]) -> Jones:
-    """Return the Jones matrix, with ½ Σ|J|² = 1, nearest to a Mueller matrix, row by row."""
-
-    def half(real: Float, imag: Float) -> Float:
-        return mi.Complex2f(0.5 * real, 0.5 * imag)
-
-    # coherency J ⊗ J*, from `boundary._mueller` turned round
-    ss_sp, ps_pp = half(m[2] + m[6], -m[3] - m[7]), half(m[2] - m[6], m[7] - m[3])
-    ss_ps, sp_pp = half(m[8] + m[9], m[12] + m[13]), half(m[8] - m[9], m[12] - m[13])
-    ss_pp, sp_ps = half(m[10] + m[15], m[14] - m[11]), half(m[10] - m[15], m[14] + m[11])
-    powers = [
-        half(m[0] + m[1] + m[4] + m[5], 0.0), half(m[0] - m[1] + m[4] - m[5], 0.0),
-        half(m[0] + m[1] - m[4] - m[5], 0.0), half(m[0] - m[1] - m[4] + m[5], 0.0),
-    ]  # fmt: skip
-    conj = dr.conj
-    columns = [
-        [powers[0], conj(ss_sp), conj(ss_ps), conj(ss_pp)],
-        [ss_sp, powers[1], conj(sp_ps), conj(sp_pp)],
-        [ss_ps, sp_ps, powers[2], conj(ps_pp)],
-        [ss_pp, sp_pp, ps_pp, powers[3]],
-    ]
-    largest, most = columns[0], powers[0].real
-    for column, power in zip(columns[1:], powers[1:], strict=True):
-        larger = power.real > most
-        most = maximum(most, power.real)
-        largest = [dr.select(larger, a, b) for a, b in zip(column, largest, strict=True)]
-    vector = [
-        sum((columns[n][row] * largest[n] for n in range(1, 4)), columns[0][row] * largest[0])
-        for row in range(4)
-    ]
-    inverse = dr.rsqrt(maximum(0.5 * sum(map(squared, vector)), _MIN_DIVISOR**2))
-    return tuple(entry * inverse for entry in vector)

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import warn
-from ..efficiency import turned_axes
-from ..polarised import mueller_of
+from ..polarised import mueller_of, turned_axes
 from ..response import UNPOLARISED, CellResponse
 from ..table import OrderTable
 from ..table_error import TableError, table_error, unpolarised

@@ -27,7 +27,7 @@ _SLICES = 3
 #: Longest period over the shortest wavelength: more orders take hours.
 _LONGEST = 4.0
 #: θ and φ of the directions that a table of all light has, degrees.
-THETA, PHI = np.append(np.arange(0.0, 85.0, 10.0), 85.0), np.arange(0.0, 360.0, 15.0)
+THETA, PHI = np.linspace(0.0, 88.0, 12), np.arange(0.0, 360.0, 10.0)
 
 
 class CrossedWaves:

@@ -18,7 +18,7 @@ from ...errors import DiffractionError
 from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
 from ..polarised import ODD, mueller_of
-from ..response import LINEAR, MUELLER, orders_between
+from ..response import LINEAR, MUELLER, ListedResponse, orders_between
 from ..table import OrderTable, check_outline
 from .accuracy import measured_error, powers, warn_of_error
 from .crossed import folded
@@ -33,7 +33,7 @@ from .settings import (
     announce_stage,
     header_of,
 )
-from .stations import Complex, Real
+from .stations import Complex, Grating, Real
 
 #: Lights of which the resolution is chosen, and solutions at most.
 _COMPARED, _MOST = 5, 100_000
@@ -122,10 +122,19 @@ def solve_directions(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip
     if lights.is_all:
+        assert isinstance(made.response, ListedResponse)
+        made = replace(made, response=replace(made.response, index=_clear_index(grating)))
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
     warn_of_gaps(made, table, f"the table of {grating.profile.name}")
     return replace(made, header=header | {"processor_seconds": round(work.processor_seconds, 1)})
+
+
+def _clear_index(grating: Grating) -> float | None:
+    """Return the index of a grating's material in the middle of its wavelengths; None of metals."""
+    index = grating.material.index(0.5 * sum(grating.wavelengths))
+    assert index is not None  # `crossed.check_cell`
+    return None if index.imag or index.real <= 1.0 else float(index.real)
 
 
 def _refuse_grazing(problem: Problem, waves: Real, theta: Real, phi: Real) -> None:

@@ -190,11 +190,12 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
 
 @dataclass
 class Jobs:
-    """Where stations are solved and stored.
+    """Where stations are solved, and kept: none is solved twice.
 
     Attributes
     ----------
-    folder : of results, which another run finds again, made when needed; None stores nothing.
+    folder : of results, which another run finds again, made when needed; None keeps them in memory
+        alone.
     executor : processes or a cluster; None solves here.
     progress : called as progress(done, total, text).
     """
@@ -202,7 +203,7 @@ class Jobs:
     folder: Path | None = None
     executor: Executor | None = None
     progress: Progress = silent
-    _seconds: dict[str, float] = field(default_factory=dict, init=False)
+    _known: dict[str, Solved] = field(default_factory=dict, init=False)
 
     def solve(self, problem: Problem, places: Sequence[Spot], text: str) -> dict[Spot, Real]:
         """Return the efficiencies at all places; see `amplitudes`."""
@@ -218,32 +219,38 @@ class Jobs:
 
         Raises a DiffractionError if the folder cannot be written.
         """
-        names = {
-            place: digest_of((problem.digest, problem.resolution, tuple(place)))[:24]
-            for place in places
-        }
-        files = {} if self.folder is None else {
-            place: self.folder / f"{name}{_SUFFIX}" for place, name in names.items()
-        }  # fmt: skip
-        results = {place: _read(file, names[place]) for place, file in files.items()}
-        known = {place: solved for place, solved in results.items() if solved is not None}
-        missing = [place for place in names if place not in known]
+        names, missing = _names(problem, places), self.missing(problem, places)
         if self.folder is not None and missing:
             make_folder(self.folder)
-        self.progress(len(known), len(names), text)
+        done = len(names) - len(missing)
+        self.progress(done, len(names), text)
         for place, solved in self._solved(problem, missing):
-            known[place] = solved
-            if place in files:
+            name = names[place]
+            self._known[name] = solved
+            if self.folder is not None:
                 record = Record({"seconds": solved.seconds}, [solved.values])
-                write_record(files[place], _title(names[place]), record)
-            self.progress(len(known), len(names), text)
-        self._seconds |= {names[place]: solved.seconds for place, solved in known.items()}
-        return {place: solved.values.astype(np.complex128) for place, solved in known.items()}
+                write_record(self._file(name), _title(name), record)
+            done += 1
+            self.progress(done, len(names), text)
+        return {place: self._known[n].values.astype(np.complex128) for place, n in names.items()}
+
+    def missing(self, problem: Problem, places: Iterable[Spot]) -> list[Spot]:
+        """Return the places that are not solved yet, here or in the folder."""
+        names = _names(problem, places)
+        if self.folder is not None:
+            for name in names.values():
+                if name not in self._known and (solved := _read(self._file(name), name)):
+                    self._known[name] = solved
+        return [place for place, name in names.items() if name not in self._known]
+
+    def _file(self, name: str) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{name}{_SUFFIX}"
 
     @property
     def processor_seconds(self) -> float:
         """Processor seconds of all solutions so far, including solutions read from the folder."""
-        return sum(self._seconds.values())
+        return sum(solved.seconds for solved in self._known.values())
 
     def seconds(self, problem: Problem, place: AnyPlace) -> float:
         """Return the processor seconds that a place takes."""
@@ -262,6 +269,12 @@ class Jobs:
         finally:
             for future in futures:
                 future.cancel()
+
+
+def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
+    """Return the names of the solutions of places."""
+    outline = problem.digest, problem.resolution
+    return {place: digest_of((*outline, tuple(place)))[:24] for place in places}
 
 
 def timed(problem: Problem, place: AnyPlace) -> float:

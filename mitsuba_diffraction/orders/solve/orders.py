@@ -96,7 +96,7 @@ def solve_orders(
     substrate : below them; by default the material.
     theta, phi : directions to the light, degrees, within the medium that it comes from: from the
         normal, and from x towards y; a grid of both. None solves all directions, of crossed
-        gratings 10° and 15° apart.
+        gratings 8° and 10° apart.
     step : between the wavelengths of listed directions, nm, 5 by default, and 20 for all
         directions of crossed gratings; the ends are solved exactly.
     settings : wavelengths, tolerance, method; of listed directions, the tolerance bounds the

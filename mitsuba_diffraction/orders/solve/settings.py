@@ -87,8 +87,8 @@ def announce_stage(
     places: Sequence[AnyPlace],
     size: float = 0.0,
 ) -> None:
-    """Time some of the stage's stations and announce the stage; size : of its table, bytes."""
-    if announce is silent:
+    """Time some of the stage's missing stations and announce it; size : of its table, bytes."""
+    if announce is silent or not (places := jobs.missing(problem, places)):
         return
     some = places[len(places) // (2 * _TIMED) :: max(len(places) // _TIMED, 1)]
     seconds = sum(jobs.seconds(problem, place) for place in some)

@@ -29,6 +29,7 @@ TINY = Plan(
     spp=2,
     reference_spp=2,
     map_resolution=8,
+    frame=(12, 8),
 )
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -56,16 +57,9 @@ def measured(tiny, tmp_path_factory):
 def test_everything_is_measured_and_written(measured):
     file, printed = measured
     parts = (
-        "build",
-        "eval",
-        "sample",
-        "eval_pdf",
-        "pdf",
-        "snake",
-        "noise",
-        "efficiency",
-        "colours",
-    )
+        "build", "eval", "sample", "eval_pdf", "pdf", "snake", "noise", "efficiency", "colours",
+        "frames",
+    )  # fmt: skip
     for part in ("processor", "gathers", *(f"{part}:" for part in parts)):
         assert part in printed
     data = json.loads(file.read_text(encoding="utf-8"))

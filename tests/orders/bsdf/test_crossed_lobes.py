@@ -77,8 +77,9 @@ def test_every_variant_has_the_table_s_light(every_variant, table):
     assert np.abs(values[:, 0] - truth).sum() < 3e-3 * truth.sum()
 
 
-def test_samples_carry_the_power_of_all_orders(variant, table):
-    n = 1 << 17
+@pytest.mark.parametrize("make", [crossed.table, crossed.clear_table])
+def test_samples_carry_the_power_of_all_orders(variant, make):
+    n, table = 1 << 17, make()
     rng = mi.PCG32(n)
     wi = np.array([0.3, -0.2, np.sqrt(0.87)])
     si = interaction(np.repeat(wi[None], n, 0), np.full((n, 4), LAM))

@@ -79,6 +79,20 @@ def test_a_flat_cell_reflects_as_fresnel_has_it(theta):
     assert found == {(0, 0): pytest.approx(truth, rel=1e-9)}
 
 
+def test_a_table_of_a_flat_cell_has_fresnel_s_light_of_s_and_p_in_all_directions():
+    settings = Settings((500.0, 500.0), resolution=3, polarised=True)
+    table = md.solve_orders(HeightField(np.zeros((4, 4)), 0.05), 1.5, settings=settings)
+    rng = np.random.default_rng(4)
+    radius, turn = np.sqrt(rng.random(200)), 2 * np.pi * rng.random(200)
+    x, y, c = radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1.0 - radius**2)
+    inside = np.sqrt(1.25 + c**2)
+    s, p = ((c - inside) / (c + inside)) ** 2, ((2.25 * c - inside) / (2.25 * c + inside)) ** 2
+    # half floats; their ratio is linear between directions 8° apart
+    assert table.efficiency(x, y, 500.0, 0) == pytest.approx(0.5 * (s + p), rel=1e-3)
+    found = table.polarised_efficiency(x, y, 500.0, 0)
+    assert np.abs(found - np.stack([s, p], axis=-1)).max() < 0.01
+
+
 def test_lumps_have_the_orders_of_ikarus():
     ikarus = pytest.importorskip("ikarus")
     theta, phi, count = 30.0, 25.0, 8

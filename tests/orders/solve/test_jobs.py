@@ -24,7 +24,7 @@ PROBLEM = Problem(
 def solved(tmp_path, monkeypatch):
     """`solved()`: the results at two places, and the places that were solved for them."""
 
-    def call():
+    def call(folder=tmp_path / "kept", times=1):
         made = []
 
         def solve_place(problem, place):
@@ -32,7 +32,9 @@ def solved(tmp_path, monkeypatch):
             return Solved(np.full(3, place.tau, np.complex64), 1.5)
 
         monkeypatch.setattr(jobs, "solve_place", solve_place)
-        found = Jobs(tmp_path / "kept").amplitudes(PROBLEM, PLACES, "places")
+        work = Jobs(folder)
+        for _ in range(times):
+            found = work.amplitudes(PROBLEM, PLACES, "places")
         return {place: values.tolist() for place, values in found.items()}, made
 
     return call
@@ -42,6 +44,10 @@ def test_results_are_read_again(solved):
     first, made = solved()
     assert made == PLACES
     assert solved() == (first, [])
+
+
+def test_no_place_is_solved_twice(solved):
+    assert solved(None, times=2)[1] == PLACES
 
 
 @pytest.mark.parametrize(

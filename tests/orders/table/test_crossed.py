@@ -30,6 +30,17 @@ def test_it_has_the_closed_form_s_light_between_its_nodes(table):
     assert (found[truth == 0.0] == 0.0).all()
 
 
+def test_a_clear_material_s_orders_begin_as_shallow_heights_have_them():
+    light, table = lights(oblique=0.7), crossed.clear_table()
+    truth = np.nan_to_num(crossed.clear_efficiency(*light))
+    # half floats
+    assert table.efficiency(*light) == pytest.approx(truth, rel=2e-3, abs=1e-7)
+    x, y, lam, *_ = lights(seed=1, oblique=0.99)
+    m, n = np.mgrid[-4:5, -5:6].reshape(2, -1, 1)
+    inside = x * x + y * y < 1.0
+    assert table.efficiency(x[inside], y[inside], lam[inside], m, n).sum(axis=0).max() <= 1.0
+
+
 def test_it_makes_no_light(table):
     x, y, lam, *_ = lights(seed=1, oblique=0.99)
     m, n = np.mgrid[-4:5, -5:6].reshape(2, -1, 1)
@@ -46,7 +57,9 @@ def test_light_beyond_its_wavelengths_is_not_reflected(table):
     assert table.efficiency(0.0, 0.0, far, 0, 0) == 0.0
 
 
-def test_a_file_keeps_it(table, tmp_path):
+@pytest.mark.parametrize("make", [crossed.table, crossed.clear_table])
+def test_a_file_keeps_it(make, tmp_path):
+    table = make()
     table.save(tmp_path / "crossed.nc")
     kept = OrderTable.load(tmp_path / "crossed.nc")
     assert kept.periods == table.periods

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
-from mitsuba_diffraction.heights.coherence import resolved, window_corners
+from mitsuba_diffraction.heights.coherence import LOOKUP, resolved, window_corners
 from mitsuba_diffraction.heights.validity import tilt_warning
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
@@ -80,7 +80,7 @@ def test_the_width_of_windows_follows_the_scan_and_the_light(side, light, window
     field = HeightField(heights, side / 64, cut_out=True)
     settings = resolved(TableSettings(light), [field])
     assert settings.width == pytest.approx(window)
-    assert settings.lookup_width == pytest.approx(1.7 * window)
+    assert settings.lookup_width == pytest.approx(LOOKUP * window)
     assert len(screens_of([field], settings)) == count
 
 
