@@ -1,4 +1,4 @@
-"""The notebooks run anew, smaller: no warnings, the same pictures, and what they promise."""
+"""Most notebooks run anew, smaller: no warnings, the same pictures, and what they promise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,13 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+#: Run by `make notebooks` alone: half of all the notebooks' time, and their calls have tests.
+LONG = "shaders_against_path_tracing", "solved_orders", "speed_and_accuracy"
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in NOTEBOOKS if path.stem not in LONG], ids=lambda path: path.stem
+)
 def test_it_runs_without_a_warning_and_keeps_its_promises(path, tmp_path):
     check(path, tmp_path)
 

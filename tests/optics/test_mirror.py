@@ -69,6 +69,17 @@ def test_a_flat_mirror_reflects_what_fresnel_says(name, sharp):
         assert ratio * flat < 1.004  # never more than is received, but for C of a straight horizon
 
 
+@pytest.mark.parametrize(
+    ("nm", "index", "most"), [(650.0, 1.47 + 7.79j, 1.022), (800.0, 2.8 + 8.45j, 1.056)]
+)
+def test_a_lobe_reflects_the_mean_about_aluminium_s_minimum(nm, index, most):
+    # its least R is at 84 to 86°, where a lobe of 6.4 µm is several degrees wide (docs/theory.md)
+    sharp = 2e3 * np.pi / nm * 6.4 / 4.0
+    for degrees in (80.0, 84.0, 85.0, 88.0):
+        flat = float(reflectance(np.cos(np.radians(degrees)), index))
+        assert 0.98 < albedo(sharp, degrees, index) / flat < most
+
+
 def test_the_lobe_is_reciprocal_and_that_of_fresnel_in_the_mirror_direction():
     wi, wo = (0.3, -0.2, np.sqrt(0.87)), (-0.1, 0.5, np.sqrt(0.74))
     index = 0.2 + 3.1j

@@ -208,6 +208,11 @@ def _square() -> TriangleMesh:
 _RUNNER = """
 import json, os, signal, sys
 from mitsuba_diffraction.cli import main
+from tests.support.coarse import coarse_energy
+from tests.support.kernels import compile_quickly
+
+coarse_energy()
+compile_quickly()
 
 def run(words, files):
     process = os.fork()

@@ -89,25 +89,6 @@ SMALLER = {
     "from_scan_to_bsdf": {"resolution=100, step=10": "resolution=40, step=40"},
     # rows are alike: fewer have the same mean
     "recover_grating_depth": {'"height": 32': '"height": 10'},
-    "shaders_against_path_tracing": {
-        '"width": 160, "height": 120': '"width": 80, "height": 60',
-        "spp=512": "spp=64",
-        "spp=128": "spp=16",
-    },
-    "solved_orders": {
-        "spp=256": "spp=8",
-        "tolerance=0.02": "tolerance=0.2",
-        "resolution=6": "resolution=4",
-    },
-    "speed_and_accuracy": {
-        "pixels=240": "pixels=128",
-        "PAIRS = 80": "PAIRS = 40",
-        "TOLERANCES = (1e-1, 1e-3, 1e-5)": "TOLERANCES = (1e-1, 1e-3)",
-        "measure_depths(6)": "measure_depths(2, deepest=4.0)",
-        "t in (1e-2, 1e-3, 1e-5)": "t in (1e-2,)",
-        "pairs=40, lanes=1 << 16, rounds=3": "pairs=20, lanes=1 << 12, rounds=1",
-        "spp=64": "spp=16",
-    },
 }
 
 
