@@ -28,9 +28,8 @@ FINE_CHEBYSHEV = [("chebyshev", 1e-4), ("taylor", 1e-3)]
 FINE_TAYLOR = [("chebyshev", 1e-3), ("taylor", 1e-4)]
 #: Name: (coherence width in µm, pairs of directions, what to ask for).
 SURFACES = {
-    # the defaults; finer tables of all its pixels take ten seconds: a quarter does for those
+    # the defaults; finer tables of all its pixels take ten seconds
     "elaphe": (65.0, 40, [("svd", 1e-3)]),
-    "elaphe, a quarter": (32.5, 60, FINE_CHEBYSHEV),
     "blazed along x": (20.0, 200, FINE_CHEBYSHEV),
     "blazed along y": (20.0, 200, FINE_TAYLOR),
     "oblong": (6.0, 200, [*FINE_CHEBYSHEV, *FINE_TAYLOR]),
@@ -43,8 +42,7 @@ def surface(name: str, shared_afm: Path | None) -> md.HeightField:
     if name.startswith("elaphe"):
         file = shared_afm / "elaphe-65um.png"
         field = md.HeightField.load(file, pixel_size=65 / 1332, max_height=0.375)
-        heights = field.heights[300:966, 300:966] if "quarter" in name else field.heights
-        return md.HeightField(heights, field.pixel_size)
+        return md.HeightField(field.heights, field.pixel_size)
     if name.startswith("blazed"):
         # a quarter as wide as it is long, so that the taps differ too
         return md.gratings.blazed(

@@ -65,7 +65,6 @@ CASES = {
     "sinusoid, 65 µm, dispersed": Case(sinusoid, 20.0, DISPERSED, {}, (PERIOD, 0.0)),
     "dispersed, 0°": Case(ROUGH, 0.0, DISPERSED, SMALL),
     "a made scale, 20 µm, 10°": Case(like_elaphe, 10.0, (550.0,), {"coherence_width": 20.0}),
-    "measured scale, 65 µm, its specks": Case("elaphe", 45.0, (550.0,), {}, (5.9, 0.0)),
     "measured scale, 16 µm, 80°": Case("elaphe", 80.0, (400.0,), {"coherence_width": 16.0}),
 }
 

@@ -60,7 +60,7 @@ async function uploadMesh(gl, data, mesh) {
   // one buffer for all levels: a vertex array has one index buffer
   const parts = [], lists = [];
   for (const few of FEWER) {
-    const list = count > 3 * few ? coarser(columns, width, mesh.layout.position, corners, few) : null;
+    const list = count > 3 * few ? coarser(columns, width, mesh.layout.position, corners, few, lists.at(-1)) : null;
     parts.push(list && { first: lists.reduce((sum, { length }) => sum + length, 0), length: list.length });
     if (list) lists.push(list);
   }
@@ -83,21 +83,22 @@ async function uploadMesh(gl, data, mesh) {
 const FEWER = [20000, 5000]; // triangles while something moves, for slow software rasterisers
 const CELLS = 100; // cells along the longest side, at most, below 128
 
-// Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993).
-function coarser(columns, width, { column, step }, corners, most, cells = CELLS) {
+// Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993); finer: numbers of
+// the corners of triangles to begin with, by default all.
+function coarser(columns, width, { column, step }, corners, most, finer, cells = CELLS) {
   const places = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
   const cell = new Int32Array(columns.length / width); // of each distinct vertex
   for (let n = 0; n < cell.length; ++n)
     for (let c = 0; c < 3; ++c) cell[n] = (cell[n] << 7) | (columns[n * width + column + c] * places[c]);
   const first = new Int32Array(1 << 21).fill(-1); // corner that stands for all in a cell
   const standing = (i) => {
-    const n = cell[corners[i]];
-    return first[n] < 0 ? (first[n] = i) : first[n];
+    const corner = finer ? finer[i] : i, n = cell[corners[corner]];
+    return first[n] < 0 ? (first[n] = corner) : first[n];
   };
-  const found = [];
-  for (let i = 0; i < corners.length; i += 3) {
+  const found = [], count = (finer ?? corners).length;
+  for (let i = 0; i < count; i += 3) {
     const a = standing(i), b = standing(i + 1), c = standing(i + 2);
     if (a !== b && b !== c && c !== a) found.push(a, b, c);
   }
-  return found.length > 3 * most ? coarser(columns, width, { column, step }, corners, most, 0.7 * cells) : found;
+  return found.length > 3 * most ? coarser(columns, width, { column, step }, corners, most, found, 0.7 * cells) : found;
 }
