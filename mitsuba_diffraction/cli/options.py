@@ -221,7 +221,7 @@ def add_option(
         how["action"] = "store_true"
     elif isinstance(kind, list):
         how |= {"action": "append", "type": kind[0], "default": []}
-    else:
+    elif kind is not None:  # BooleanOptionalAction takes no type, not even None
         how["choices" if isinstance(kind, tuple) else "type"] = kind
     if default is not None:
         how["default"] = default

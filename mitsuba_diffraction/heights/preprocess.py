@@ -164,15 +164,23 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
     return filled
 
 
-def plane_of(field: HeightField) -> tuple[float, float]:
+def plane_of(
+    field: HeightField, tapers: tuple[FloatArray | None, FloatArray | None] = (None, None)
+) -> tuple[float, float]:
     """Return the slopes (∂h/∂x, ∂h/∂y) of the least-squares plane.
 
     On a full grid the centred coordinates are orthogonal, so each slope is a plain projection.
+
+    tapers : weights of the pixels along y and x, symmetric about the middle; None where all count
+        alike.
     """
     x, y = _centred(field)
-    slope_x = float(field.heights.mean(axis=0) @ x / (x @ x))
-    slope_y = float(field.heights.mean(axis=1) @ y / (y @ y))
-    return slope_x, slope_y
+    along_y, along_x = (
+        np.ones(n) if t is None else t for n, t in zip(field.shape, tapers, strict=True)
+    )
+    slope_x = along_y @ field.heights @ (along_x * x) / (along_y.sum() * (along_x @ x**2))
+    slope_y = (along_y * y) @ field.heights @ along_x / (along_x.sum() * (along_y @ y**2))
+    return float(slope_x), float(slope_y)
 
 
 def plane_rise(field: HeightField) -> float:

@@ -111,9 +111,10 @@ def parts_of(field: HeightField, windows: ScanWindows | None) -> list[Real]:
     (rows, ny), (columns, nx) = _places(field, windows.width)
     cuts = [field.heights[y : y + ny, x : x + nx] for y, x in window_corners(rows, columns)]
     dx, dy = field.pixel_size
+    tapers = tapers_of(field, windows) or (None, None)
     levelled = []
     for heights in cuts:
-        slope_x, slope_y = plane_of(HeightField(heights, field.pixel_size))
+        slope_x, slope_y = plane_of(HeightField(heights, field.pixel_size), tapers)
         # a scan of one window has been levelled, or is not to be
         tilt_x = slope_x * dx * np.arange(nx) * (len(columns) > 1)
         tilt_y = slope_y * dy * np.arange(ny) * (len(rows) > 1)

@@ -146,9 +146,11 @@ class Screens:
         ny, nx = self.shape
         heights = scan.heights[top : top + ny, left : left + nx].copy()
         heights.setflags(write=False)  # so that it is not copied once more
-        slopes, (dx, dy) = plane_of(HeightField(heights, scan.pixel_size)), scan.pixel_size
+        slopes = plane_of(HeightField(heights, scan.pixel_size), self.tapers)
         heights.setflags(write=True)
-        # A tilt turns the mirror direction; a scan of one window has been levelled, or is not to be
+        # A tilt turns the mirror direction; part of a wave that an edge cuts off is none, so that
+        # pixels there count less. A scan of one window has been levelled, or is not to be
+        dx, dy = scan.pixel_size
         if self._several[1]:
             heights -= slopes[0] * dx * np.arange(nx)
         if self._several[0]:
