@@ -65,9 +65,9 @@ def test_white_furnace_in_colours(name):
     assert np.median(mean) > 0.9
 
 
-@pytest.mark.parametrize("base", [False, True])
 @pytest.mark.parametrize(("name", "seed"), SEEDED)
-def test_white_furnace_at_random_directions(name, base, seed):
+def test_white_furnace_at_random_directions(name, seed):
+    base = name == "sawtooth"
     surface = white_pair(name, orientation=10.0 * seed) if base else bsdf(name)
     assert_at_most_white(surface, seed)
 

@@ -10,7 +10,8 @@ evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spec
 orders       `diffraction_orders`: times of the calls, noise of a sample
 survey       a survey of many scans, in one process and on workers
 frames       frames of the shaders
-scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
+scenes       what is rendered; noise beside sampling by the cosine
+snake        the time of whole pictures, each scene in a process of its own
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ def sections(
     from .contenders import build_tables
     from .evaluation import measure_colours, measure_eval, measure_sampling
     from .orders import measure_orders
-    from .scenes import measure_efficiency, measure_noise, measure_snake
+    from .scenes import measure_efficiency, measure_noise
+    from .snake import measure_snake
 
     tables = functools.cache(lambda: build_tables(plan, folder, progress, patch))
 

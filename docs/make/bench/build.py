@@ -102,11 +102,10 @@ def _heights(side: int, folder: Path) -> Path:
 
 
 def _child(*arguments: str) -> str:
-    """Run a child process that finds the package where this one did; return its output."""
-    paths = os.pathsep.join(path for path in sys.path if path)
+    """Run a child process; return its output."""
     result = subprocess.run(
         [sys.executable, "-m", f"{__package__}.build", *arguments],
-        env={**os.environ, "PYTHONPATH": paths},
+        env=child_environment(),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -116,6 +115,11 @@ def _child(*arguments: str) -> str:
         last = (result.stderr.strip().splitlines() or ["no message"])[-1]
         raise DiffractionError(f"building a table in a child process failed: {last}")
     return result.stdout
+
+
+def child_environment() -> dict[str, str]:
+    """Return the environment of a child that finds the package where this process did."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 
 
 def build(heights: str, pixel_size: float, arguments: str) -> None:

@@ -19,8 +19,10 @@ from mitsuba_diffraction.analysis.timing import (
     Queries,
     kernel_operations,
     kernel_seconds,
+    kernel_time,
     ratio,
     rounds_of,
+    vector_lanes,
 )
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.progress import Progress
@@ -45,7 +47,7 @@ from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake
 
 FLOOR = "bare gathers of the defaults"
-_TIMES, _OPERATIONS = "ns/call", "operations"
+_TIMES, _CPU, _OPERATIONS = "ns/call", "CPU ns/call", "operations"
 _EVAL = "× eval"
 _BASELINES = {
     "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
@@ -80,7 +82,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         if name == DEFAULT:
             calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
             lanes[FLOOR] = lanes[name]
-    times = _nanoseconds(plan, calls, lanes, "eval", progress)
+    times, processor = _nanoseconds(plan, calls, lanes, "eval", progress)
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
     to_thesis = ratio(times[THESIS], times[DEFAULT])
     to_kirchhoff = ratio(times[DEFAULT], times[KIRCHHOFF])
@@ -98,7 +100,8 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         ],
         THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }
-    return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals, operations_of(calls))
+    title, operations = f"eval: {_conditions(plan, tables)}", operations_of(calls)
+    return _section(title, times, processor, lanes, goals, operations)
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
@@ -114,10 +117,12 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
         for what in ("eval", "eval_pdf", "pdf"):
             calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
     lanes = dict.fromkeys(calls, plan.lanes)
-    times = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
+    times, processor = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
     operations, sections = operations_of(calls), []
     for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
-        nanoseconds = {name: times[f"{what} {name}"] for name in names}
+        nanoseconds, busy = (
+            {name: of[f"{what} {name}"] for name in names} for of in (times, processor)
+        )
         evals = {name: ratio(nanoseconds[name], times[f"eval {name}"]) for name in names}
         goals = {
             name: [Goal(f"at most {most:g}× eval", evals[name] <= most)]
@@ -126,7 +131,8 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
         }
         title = f"{what}: {_conditions(plan, tables)}"
         counts = {name: operations[f"{what} {name}"] for name in names}
-        section = _section(title, nanoseconds, dict.fromkeys(names, plan.lanes), goals, counts)
+        lanes = dict.fromkeys(names, plan.lanes)
+        section = _section(title, nanoseconds, busy, lanes, goals, counts)
         for row in section.rows:
             row.values[_EVAL] = evals[row.name]
         sections.append(replace(section, columns=(*section.columns, _EVAL)))
@@ -148,16 +154,22 @@ def _nanoseconds(
     lanes: dict[str, int],
     what: str,
     progress: Progress,
-) -> dict[str, list[float]]:
-    timed = {name: partial(kernel_seconds, call) for name, call in calls.items()}
-    seconds = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))
-    return {name: [1e9 * s / lanes[name] for s in taken] for name, taken in seconds.items()}
+) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
+    """Return nanoseconds a lane on the clock, and of all cores together."""
+    timed = {name: partial(kernel_time, call) for name, call in calls.items()}
+    measured = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))
+    clock, processor = (
+        {name: [1e9 * each[n] / lanes[name] for each in taken] for name, taken in measured.items()}
+        for n in (0, 1)
+    )
+    return clock, processor
 
 
 def _conditions(plan: Plan, tables: Tables) -> str:
     wavelengths = len(mi.Spectrum(0.0))
     return (
-        f"{mi.variant()}, {plan.lanes} random pairs of directions, {wavelengths} wavelengths a "
+        f"{mi.variant()}, vectors of {vector_lanes()} lanes, {plan.lanes} random pairs of "
+        f"directions, {wavelengths} wavelengths a "
         f"call, {tables.patch} pixels; kernels alone, medians of {plan.rounds} "
         "rounds through all rows, ratios within a round"
     )
@@ -166,6 +178,7 @@ def _conditions(plan: Plan, tables: Tables) -> str:
 def _section(
     title: str,
     times: dict[str, list[float]],
+    processor: dict[str, list[float]],
     lanes: dict[str, int],
     goals: Mapping[str, Sequence[Goal]],
     operations: Mapping[str, int],
@@ -174,12 +187,13 @@ def _section(
     rows = []
     for name, taken in times.items():
         values: dict[str, float | None] = {_TIMES: statistics.median(taken)}
+        values[_CPU] = statistics.median(processor[name])
         for heading, baseline in baselines.items():
             values[heading] = ratio(taken, times[baseline])
         values[_OPERATIONS] = operations[name]
-        raw = {"ns": taken, "lanes": lanes[name]}
+        raw = {"ns": taken, "cpu_ns": processor[name], "lanes": lanes[name]}
         rows.append(Row(name, values, goals.get(name, ()), raw))
-    return Section(title, (_TIMES, *baselines, _OPERATIONS), rows)
+    return Section(title, (_TIMES, _CPU, *baselines, _OPERATIONS), rows)
 
 
 def measure_colours(

@@ -30,7 +30,7 @@ def measure_frames(plan: Plan, tables: Tables, scenes: Path, progress: Progress)
     On a software rasteriser, in processor time over the number of cores.
     """
     with contextlib.ExitStack() as stack:
-        renderer = Renderer(snake_scene(scenes, tables))
+        renderer = Renderer(snake_scene(scenes, tables.paths["default"]))
         stack.callback(renderer.release)
         target = renderer.target(*plan.frame)
         stack.callback(target.release)

@@ -13,7 +13,7 @@ import numpy as np
 from mitsuba_diffraction.analysis.timing import (
     Queries,
     kernel_operations,
-    kernel_seconds,
+    kernel_time,
     ratio,
     rounds_of,
 )
@@ -61,8 +61,9 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
         for what in _TIMES
         for name, bsdf in bsdfs.items()
     }
-    timed = {f"{what} {name}": partial(kernel_seconds, c) for (what, name), c in calls.items()}
-    seconds = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, "orders"))
+    timed = {f"{what} {name}": partial(kernel_time, c) for (what, name), c in calls.items()}
+    measured = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, "orders"))
+    seconds = {name: [each.seconds for each in taken] for name, taken in measured.items()}
     rows = []
     for what, name in calls:
         taken, baseline = seconds[f"{what} {name}"], seconds[f"{what} {_ROUGH}"]
@@ -72,6 +73,9 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
             goals = [Goal(f"at most {most:g}× roughconductor", times <= most)]
         values: dict[str, float | None] = {
             "ns/call": 1e9 * statistics.median(taken) / plan.lanes,
+            "CPU ns/call": 1e9
+            / plan.lanes
+            * statistics.median(each.cpu_seconds for each in measured[f"{what} {name}"]),
             "× roughconductor": times,
             "operations": kernel_operations(calls[what, name]),
         }
@@ -80,7 +84,8 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
         f"solved orders: {mi.variant()}, {plan.lanes} random pairs of directions; kernels alone, "
         f"medians of {plan.rounds} rounds"
     )
-    return Section(title, ("ns/call", "× roughconductor", "operations"), rows)
+    columns = "ns/call", "CPU ns/call", "× roughconductor", "operations"
+    return Section(title, columns, rows)
 
 
 def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:

@@ -1,12 +1,10 @@
-"""Scenes to measure with; noise beside drawing directions by the cosine; time of whole pictures."""
+"""Scenes to measure with; noise and variance beside drawing directions by the cosine."""
 
 from __future__ import annotations
 
-import statistics
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.analysis.timing import SEED, kernel_operations, ratio, rounds_of
+from mitsuba_diffraction.analysis.timing import SEED
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.plugin.power import PowerModel
 from mitsuba_diffraction.plugin.sampling import EVEN
@@ -32,9 +30,6 @@ AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 WAVELENGTHS = (450.0, 550.0, 650.0)
 #: Samples a pixel of the rendering in which bright pixels are looked for.
 FIREFLY_SPP = 64
-# Of the snake's scene.
-_COLUMNS = ("ms", "ns/sample", "× roughconductor", "operations")
-_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
 
 
 def furnace(bsdf: Any, resolution: int) -> Any:
@@ -94,13 +89,13 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
     )
 
 
-def snake_scene(scenes: Path, tables: Tables, **parameters: str) -> Any:
-    """`snake.xml` with the default table, without warnings of how far the model holds for it."""
+def snake_scene(scenes: Path, table: Path, **parameters: str) -> Any:
+    """`snake.xml` with a table, without warnings of how far the model holds for it."""
     file = scenes / "snake.xml"
     _check_there(file)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)
+        return mi.load_file(str(file), patch=str(table), **parameters)
 
 
 def skin_of(scene: Any) -> Any:
@@ -311,38 +306,3 @@ def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
 def _luminance(picture: Any) -> Any:
     rgb = np.array(picture)[..., :3]
     return rgb @ np.array([0.2126, 0.7152, 0.0722])
-
-
-def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
-    """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
-    size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
-    scene_of = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
-    rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
-    skin_of(scene_of[_ROUGH]).set_bsdf(rough)
-    covered = pixels_of(scene_of[_SKIN], skin_of(scene_of[_SKIN])).mean()
-    calls = {name: partial(render_seconds, scene, plan) for name, scene in scene_of.items()}
-    rounds = max(3, plan.rounds // 2)
-    seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
-    rows = []
-    samples = int(size["resx"]) * int(size["resy"]) * plan.spp
-    for name, taken in seconds.items():
-        median = statistics.median(taken)
-        to_rough = ratio(taken, seconds[_ROUGH])
-        operations = kernel_operations(partial(mi.render, scene_of[name], spp=plan.spp))
-        values = (1e3 * median, 1e9 * median / samples, to_rough, operations)
-        goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
-        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken}))
-    title = (
-        f"snake: {mi.variant()}, scenes/snake.xml, {size['resx']} × {size['resy']} pixels, "
-        f"{100 * covered:.0f} % of them snake, {plan.spp} samples per pixel; medians of {rounds} "
-        "rounds"
-    )
-    return Section(title, _COLUMNS, rows)
-
-
-def render_seconds(scene: Any, plan: Plan) -> float:
-    """Seconds to render one picture; the first call includes kernel compilation."""
-    start = time.perf_counter()
-    dr.eval(mi.render(scene, spp=plan.spp))
-    dr.sync_thread()
-    return time.perf_counter() - start

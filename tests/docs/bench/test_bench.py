@@ -72,6 +72,7 @@ def test_everything_is_measured_and_written(measured):
     for row in evaluation["rows"]:
         assert len(row["ns"]) == TINY.rounds
         assert min(row["ns"]) > 0
+        assert len(row["cpu_ns"]) == TINY.rounds
 
 
 def test_a_part_alone_is_compared_number_by_number(measured, capsys):
