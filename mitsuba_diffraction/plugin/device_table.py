@@ -23,7 +23,7 @@ from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
 from .loops import sum_of
-from .memory import Halves, index_between, once_a_table, packet_size, read_packets, upload
+from .memory import HalfFloats, index_between, once_a_table, packet_size, read_packets, upload
 from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import PlacedWindow
@@ -64,7 +64,7 @@ class DeviceTable:
                 "or use a smaller patch"
             )
         records = self.record.pack(table.coefficients)
-        self.halves = Halves(records) if records.dtype == np.float16 else None
+        self.halves = HalfFloats(records) if records.dtype == np.float16 else None
         if self.halves is None:
             self._coefficients = upload(mi.Float, records)
         self.series = series_of(table)
@@ -137,7 +137,7 @@ class DeviceTable:
         return self._place(x, y, self.series.at(kappa).interval)[0]
 
     def read(self, index: Index) -> list[Packet]:
-        """Numbers of the bin with this index, in packets; half floats over `Halves.scale`."""
+        """Numbers of the bin with this index, in packets; half floats over `HalfFloats.scale`."""
         if self.halves is not None:
             return self.halves.read(index)
         return read_packets(self._coefficients, index, self.record.numbers)

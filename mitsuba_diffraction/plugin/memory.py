@@ -93,7 +93,7 @@ def packet_size(floats: int) -> int:
     return min(PACKET, floats & -floats)
 
 
-class Halves:
+class HalfFloats:
     """Records of half floats in the variant's memory, which are read as 32-bit words.
 
     Words take fewer instructions than half floats: fewer to transpose, and no conversion. Exponent

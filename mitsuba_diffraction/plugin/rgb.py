@@ -20,7 +20,7 @@ from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, PairThrough, TablePoint
-from .memory import Halves, index_between, once_a_table, read, read_record, upload
+from .memory import HalfFloats, index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
 from .types import Buffer, Colour, Float, Index, Interaction, Powers, Vector2f
@@ -60,7 +60,7 @@ class ColourLookup:
         self._bins = table.grid.bins
         self._radius_end = table.radius_end
         self._radii, self._zs = table.order_0.shape[:2]
-        self._coefficients = Halves(table.coefficients.reshape(-1, PACKET))
+        self._coefficients = HalfFloats(table.coefficients.reshape(-1, PACKET))
         self._inverse_scale = 1.0 / table.scale
         self._order_0 = upload(mi.Float, table.order_0)
 

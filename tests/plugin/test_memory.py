@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.plugin.memory import Halves
+from mitsuba_diffraction.plugin.memory import HalfFloats
 
 #: Least normal half float; smaller ones are read as 0.
 NORMAL = 2.0**-14
@@ -19,7 +19,7 @@ def test_halves_are_read_as_stored(some_variant: str, numbers: int) -> None:
     sizes = 2.0 ** generator.uniform(-20.0, 15.9, (50, numbers))
     stored = (sizes * generator.choice([-1.0, 0.0, 1.0], sizes.shape)).astype(np.float16)
     places = generator.permutation(50)
-    halves = Halves(stored)
+    halves = HalfFloats(stored)
     packets = halves.read(mi.UInt32(places))
     read = np.stack([np.array(x) for packet in packets for x in packet], axis=1) * halves.scale
     expected = np.where(np.abs(stored) < NORMAL, np.float16(0), stored)[places]
@@ -28,7 +28,7 @@ def test_halves_are_read_as_stored(some_variant: str, numbers: int) -> None:
 
 
 def test_inactive_lanes_read_zeros(some_variant: str) -> None:
-    halves = Halves(np.ones((3, 8), np.float16))
+    halves = HalfFloats(np.ones((3, 8), np.float16))
     far, active = mi.UInt32([1, 1 << 30]), mi.Bool([True, False])
     sums = sum(dr.sum(packet, axis=0) for packet in halves.read(far, active))
     np.testing.assert_array_equal(np.array(sums) * halves.scale, [8.0, 0.0])

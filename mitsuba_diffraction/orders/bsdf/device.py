@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...plugin.loops import sum_of
-from ...plugin.memory import Halves, once_a_table, read, upload
+from ...plugin.memory import HalfFloats, once_a_table, read, upload
 from ...plugin.types import Float, Index, Mask
 from ..efficiency import lookup_in
 from ..grid import OrderGrid
@@ -29,7 +29,7 @@ class Device:
         self._starts = {k: upload(mi.UInt32, v) for k, v in arrays.items() if v.ndim == 1}
         # corners hold a record of 8 for each of their parts
         shapes = {k: v.reshape(-1, 8) if k == "corners" else v for k, v in arrays.items()}
-        self._records = {k: Halves(v) for k, v in shapes.items() if v.ndim == 2}
+        self._records = {k: HalfFloats(v) for k, v in shapes.items() if v.ndim == 2}
         self.scale = self._records["corners"].scale
 
     def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Float]:
