@@ -58,7 +58,8 @@ package: setup .venv/browser  ## test wheel and sdist in empty environments, wit
 # ten minutes where a graphics card is, longer without one
 bench-gpu: setup  ## measure a graphics card: eval, sample, pictures, frames, and pixels of the shaders
 	@mkdir -p out
-	@$(PYTHON3) -m docs.make.bench --only eval sample snake frames --json out/bench-gpu.json
+	@$(PYTHON3) -m docs.make.bench --only eval sample snake orders frames --json out/bench-gpu.json
+	@$(PYTHON3) -m docs.make.figures.tables card out/bench-gpu.json
 	@$(RUN) compare scenes/scales.xml --method fast exact -s 1024 --frames 512 --supersampling 2 -D resx=72 -D resy=48 \
 	    -o out/compare/gpu
 

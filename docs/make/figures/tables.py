@@ -88,11 +88,13 @@ def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
     return {"speed": f"{head}, {versions}.\n\n{table}"}
 
 
-def _goals(sections: list[dict[str, Any]]) -> Iterator[tuple[str, str, str]]:
-    for figure in FIGURES:
+def _goals(
+    sections: list[dict[str, Any]], figures: Sequence[Figure] = FIGURES
+) -> Iterator[tuple[str, str, str]]:
+    for figure in figures:
         row = _measured(sections, figure.section, figure.row)
         goal = ""
-        if figure.goal is not None:
+        if figure.goal is not None and row["goals"]:
             said = row["goals"][figure.goal]
             goal = said["goal"] if said["met"] else f"**missed:** {said['goal']}"
         yield figure.words, figure.pattern.format(row["values"][figure.column]), goal
@@ -107,6 +109,40 @@ def _measured(sections: list[dict[str, Any]], title: str, name: str) -> dict[str
     raise DiffractionError(
         f"nothing was measured of '{title}: {name}'; run bench in full: without --only or --quick"
     )
+
+
+_ALUMINIUM = Figure("eval", "diffraction, Al", "of aluminium", _ROUGH, "{:.1f}")
+_FRAMES = tuple(
+    Figure("frames", method, f"frames a second of the snake, `{method}`", "frames/s", "{:.3g}", 0)
+    for method in ("fast", "exact")
+)
+_RATIOS = ("eval", "sample", "snake", _SOLVED)
+
+
+def graphics_card(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+    """Ratios by processor and graphics card, and frames of the shaders."""
+    machine, sections = measured["machine"], measured["sections"]
+    drivers = [s["title"].split(",")[0] for s in sections if s["title"].startswith("frames:")]
+    kinds = {"llvm": f"{machine['processor']}, {machine['cores']} cores", "cuda": "by CUDA"}
+    found = {
+        kind: [s for s in sections if f": {kind}_ad" in s["title"]]
+        for kind in kinds
+        if any(f": {kind}_ad" in s["title"] for s in sections)
+    }
+    figures = [f for f in FIGURES if f.section in _RATIOS and f.column == _ROUGH] + [_ALUMINIUM]
+    rows = [
+        (f.words, *(_number(f, of_kind) for of_kind in found.values()), "")
+        for f in sorted(figures, key=lambda f: _RATIOS.index(f.section))
+    ]
+    empty = [""] * len(found)
+    rows += [(words, *empty, f"{n}; {g}" if g else n) for words, n, g in _goals(sections, _FRAMES)]
+    heads = ("", *(kinds[kind] for kind in found), *(d.removeprefix("frames: ") for d in drivers))
+    return {"card": pages.table(heads, tuple(rows))}
+
+
+def _number(figure: Figure, sections: list[dict[str, Any]]) -> str:
+    row = _measured(sections, figure.section, figure.row)
+    return figure.pattern.format(row["values"][figure.column])
 
 
 _SETTINGS = (
@@ -231,6 +267,8 @@ class Part:
 
 PARTS = {
     "speed": Part(speed, ("docs/performance.md",), "docs.make.bench --json", "run make bench"),
+    "card": Part(graphics_card, ("docs/performance.md",), "docs.make.bench --json",
+                 "run make bench-gpu"),
     "tradeoff": Part(tradeoff, ("docs/accuracy.md",), "tradeoff", "run make tradeoff",
                      ("tradeoff.png", "depth.png")),
     "plan": Part(plan, ("docs/performance.md",), "plan --json", "run make plan"),

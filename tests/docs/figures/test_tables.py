@@ -97,6 +97,27 @@ def test_a_missed_goal_is_shown_as_missed():
     assert "**missed:** goal 0" in tables.speed(bench(met=False))["speed"]
 
 
+def test_a_graphics_card_stands_beside_the_processor(tmp_path):
+    document = bench()
+    figures = document["sections"]
+    aluminium = {"title": "eval: x", "rows": [{"name": "diffraction, Al", "values": {}}]}
+    aluminium["rows"][0] |= {"values": {"× roughconductor": 5.0}, "goals": []}
+    document["sections"] = [
+        section | {"title": section["title"].split(":")[0] + f": {kind}_ad_spectral, …"}
+        for kind in ("llvm", "cuda")
+        for section in (*figures, aluminium)
+    ]
+    frames = [
+        {"name": name, "values": {"frames/s": 80.0}, "goals": [{"goal": "100", "met": False}]}
+        for name in ("fast", "exact")
+    ]
+    document["sections"].append({"title": "frames: Crayon 9, scenes/snake.xml", "rows": frames})
+    text = written(tmp_path, "card", document)
+    assert "|  | Abacus, 2 cores | by CUDA | Crayon 9 |" in text
+    assert "| of aluminium | 5.0 | 5.0 |  |" in text
+    assert text.count("80; **missed:** 100") == 2
+
+
 def test_a_plan_has_what_was_measured(tmp_path):
     text = written(tmp_path, "plan", plan())
     assert "| table | 8.5 MB | 1 MB |" in text
