@@ -28,13 +28,13 @@ SMALLER = 0.9
 REPEATS = "wider than the patch: its repetition shows as a grating"
 _GREEN = 0.55  # µm
 #: Taper of a scan's windows at places u from −1 to 1: (1 + Σ c_n cos nπu)/(1 + Σ c_n).
-TAPER = (0.47, -0.15)
+TAPER = (0.465, -0.145)
 #: σ_l of the look-up over σ of a scan's windows: narrow enough that ripples between orders π/W
 #: apart are small, wide enough for four orders in each direction at a tolerance of 1e-3.
 LOOKUP = 1.65
 #: Share of an order's power that each neighbour takes less, along either axis: taper and look-up
 #: alone would make lobes a fifth too wide.
-SHARPENING = 0.175
+SHARPENING = 0.165
 #: An axis with less than so many windows' widths has one window, in its middle.
 SEVERAL = 1.25
 #: Width, µm, up to which a scan is one window. Windows of wider scans are at least as wide.

@@ -43,10 +43,10 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
 
     On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
     mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
-    have no such arrays: there it stays NumPy's.
+    have no such arrays: there it stays NumPy's, in single precision for want of `mi.Float16`.
     """
     if not dr.is_jit_v(mi.Float):
-        return values.ravel()
+        return values.astype(np.float32 if kind is mi.Float16 else values.dtype).ravel()
     array = kind(values.ravel()) * dr.opaque(kind, 1)
     dr.eval(array)
     return array
@@ -77,9 +77,11 @@ def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True)
         ]
     size = packet_size(floats)
     count = floats // size
+    kind = mi.ArrayXf16 if dr.type_v(source) is dr.VarType.Float16 else mi.ArrayXf
     shape = size, dr.width(index)
     return [
-        dr.gather(mi.ArrayXf, source, index * count + n, active, shape=shape) for n in range(count)
+        mi.ArrayXf(dr.gather(kind, source, index * count + n, active, shape=shape))
+        for n in range(count)
     ]
 
 

@@ -20,7 +20,7 @@ from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
 from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, PairThrough, TablePoint
-from .memory import HalfFloats, index_between, once_a_table, read, read_record, upload
+from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
 from .types import Buffer, Colour, Float, Index, Interaction, Powers, Vector2f
@@ -58,10 +58,10 @@ class ColourLookup:
         self.expansion = table.expansion
         self.coordinates = PolarCoordinates(table)
         self._bins = table.grid.bins
+        self._inverse_scale = 1.0 / table.scale
         self._radius_end = table.radius_end
         self._radii, self._zs = table.order_0.shape[:2]
-        self._coefficients = HalfFloats(table.coefficients.reshape(-1, PACKET))
-        self._inverse_scale = 1.0 / table.scale
+        self._coefficients = upload(mi.Float16, table.coefficients)
         self._order_0 = upload(mi.Float, table.order_0)
 
     def others(self, uv: Vector2f, z: Float) -> Colour:
@@ -73,13 +73,12 @@ class ColourLookup:
         turn = coordinates.turn(uv)
         starts = [coordinates.start(ring + n) for n in range(3)]
         total = [mi.Float(0.0)] * (3 * TERMS)
-        t, lift = t * self._coefficients.scale, self._coefficients.scale
-        for n, of_ring in ((0, lift - t), (1, t)):
+        for n, of_ring in ((0, 1.0 - t), (1, t)):
             count = starts[n + 1] - starts[n]  # one more than there are azimuths
             azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
             bin_ = interval * self._bins + starts[n] + azimuth
             for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
-                packet = [x for part in self._coefficients.read(bin_ + m) for x in part]
+                packet = read_record(self._coefficients, bin_ + m, PACKET)
                 total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
         colours = []
         for c in range(3):

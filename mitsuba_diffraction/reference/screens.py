@@ -2,15 +2,15 @@
 
 A scan is a part of a larger surface. It is seen through windows of width W, half overlapping, over
 which powers are averaged (Welch, IEEE Transactions on Audio and Electroacoustics 15, 70, 1967).
-With the taper t = t(x) t(y), t(x) = 1 + 0.47 cos(2πx/W) − 0.15 cos(4πx/W) about the middle of a
+With the taper t = t(x) t(y), t(x) = 1 + 0.465 cos(2πx/W) − 0.145 cos(4πx/W) about the middle of a
 window, and s = exp(iκh), order 0 is a_0 = Σ t² s / Σ t². The other orders are DFTs of
 
     f = c t (s − a_0)   in the window, 0 around it up to 2W,   Σ_j |a_j|² = 1 over all orders,
 
 which sets c: nearly √(1/mean t²), by Parseval, but for the bin j = 0, where a_0 replaces f's. Along
-each axis neighbours take 0.175 of their power less,
+each axis neighbours take 0.165 of their power less,
 
-    P_j = |a_j|² − 0.175 (|a_j+1|² − 2|a_j|² + |a_j−1|²),
+    P_j = |a_j|² − 0.165 (|a_j+1|² − 2|a_j|² + |a_j−1|²),
 
 where |a_0|² is the mean of its neighbours. Lobes are exp(−σ_l²|q − q_j|²) with σ_l = 1.65 σ: a wave
 under them is as wide as under the light's window σ = W/4.
@@ -129,7 +129,7 @@ def tapers_of(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
     found: list[Real | None] = []
     for axis, (_, n) in enumerate(_places(field, windows.width)):
         turn = 2 * np.pi / n * (np.arange(n) - 0.5 * (n - 1))
-        taper = 1 + 0.47 * np.cos(turn) - 0.15 * np.cos(2 * turn)
+        taper = 1 + 0.465 * np.cos(turn) - 0.145 * np.cos(2 * turn)
         found.append(taper if field.varies_along(axis) else None)
     return found[0], found[1]
 
@@ -160,7 +160,7 @@ def sharpened(
         powers = np.where(empty, np.mean([powers[side].sum() for side in sides]), powers)
     for axis in axes:
         wide = np.pad(powers, [(int(n == axis),) * 2 for n in (0, 1)], mode="edge")
-        powers = powers - 0.175 * np.diff(wide, 2, axis=axis)
+        powers = powers - 0.165 * np.diff(wide, 2, axis=axis)
     return np.where(empty, 0.0, powers)
 
 

@@ -199,7 +199,8 @@ class _Powers:
             order_0 = np.minimum(order_0, total)
             return total - order_0, float(order_0.sum()), np.zeros_like(total)
         of_power = expansion.kind == "power"
-        power = np.maximum(parts[..., 0], 0.0) if of_power else np.sum(parts**2, axis=-1)
+        # a scan's sharpened powers may be below 0, and their sum is right
+        power = parts[..., 0] if of_power else np.sum(parts**2, axis=-1)
         if len(axes[0].frequency) < nx:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:

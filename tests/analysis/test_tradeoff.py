@@ -154,7 +154,8 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     from mitsuba_diffraction.cli.main import main
 
     np.save(tmp_path / "heights.npy", PATCH.heights)
-    monkeypatch.setattr(command, "QUICK", (48, 16, 256, 1, 1))
+    # errors of 16 pairs of directions scatter by half
+    monkeypatch.setattr(command, "QUICK", (48, 100, 256, 1, 1))
     few = (
         TradeoffSetting("default", "the defaults"),
         TradeoffSetting("tolerance", "1e-2", {"tolerance": 1e-2}),

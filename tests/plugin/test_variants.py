@@ -69,10 +69,8 @@ def test_values_are_those_of_the_table(name: str) -> None:
     if mi.is_rgb:  # colours of a table lack the lobe of order 0 as the horizon sees it
         far = np.hypot(*(wi + wo)[:, :2].T) > 0.15
         value, truth = value[far], truth[far]
-    # single precision: a phase of some hundred radians across the window has an error of 1e-4;
-    # CUDA's exponentials and cosines are approximations, whose sums are up to 2.01e-5 off
-    accuracy = 3e-5 if name.startswith("cuda") else 2e-5
-    assert value == pytest.approx(truth, rel=2e-3, abs=accuracy * np.abs(truth).max())
+    # single precision: a phase of some hundred radians across the window has an error of 1e-4
+    assert value == pytest.approx(truth, rel=2e-3, abs=2e-5 * np.abs(truth).max())
 
 
 def check_agreement(bsdf: Any, component: int | None = None) -> Array:
