@@ -64,7 +64,7 @@ def prepare() -> None:
 def main() -> int:
     """Run the command, and return its exit code."""
     prepare()
-    # a command's own threads share the cores; those of OpenBLAS would spin beside them
+    # A command's own threads share the cores; OpenBLAS' threads would spin beside them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         # lines hold µ and κ, which the code pages of Windows and the C locale lack

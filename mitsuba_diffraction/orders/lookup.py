@@ -41,7 +41,7 @@ Index = Number
 class Memory(Protocol):
     """Arrays of a grid where a look-up runs, and sums over ports there.
 
-    scale : factor from the numbers that `read` returns to those of the grid.
+    scale : factor from the numbers that `read` returns to the numbers of the grid.
     """
 
     scale: float

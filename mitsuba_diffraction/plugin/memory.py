@@ -114,13 +114,14 @@ class HalfFloats:
         self.numbers = records.shape[1]
         self._size = min(packet_size(self.numbers // 2), PACKET // 2)
         self.scale = 2.0**112 if dr.is_jit_v(mi.Float) else 1.0
-        self._words: Buffer = records.astype(np.float32).ravel()
-        if dr.is_jit_v(mi.Float):
-            bits = records.view(np.uint16)
-            bits = np.where((bits & 0x7C00) == 0, np.uint16(0), bits)
-            # a packet of words holds so many numbers in its lower halves, the next in its upper
-            pairs = bits.reshape(-1, 2, self._size).swapaxes(1, 2)
-            self._words = upload(mi.Int32, np.ascontiguousarray(pairs).view(np.int32))
+        if not dr.is_jit_v(mi.Float):
+            self._words: Buffer = records.astype(np.float32).ravel()
+            return
+        bits = records.view(np.uint16)
+        bits = np.where((bits & 0x7C00) == 0, np.uint16(0), bits)
+        # a packet of words holds so many numbers in its lower halves, the next in its upper
+        pairs = bits.reshape(-1, 2, self._size).swapaxes(1, 2)
+        self._words = upload(mi.Int32, np.ascontiguousarray(pairs).view(np.int32))
 
     def words(self, index: Index, active: Mask = True) -> list[Packet]:
         """Gather the words of the record with this index, in packets."""

@@ -61,6 +61,7 @@ class ColourLookup:
         self._inverse_scale = 1.0 / table.scale
         self._radius_end = table.radius_end
         self._radii, self._zs = table.order_0.shape[:2]
+        # not `HalfFloats`: dark colours are sums of subnormal numbers
         self._coefficients = upload(mi.Float16, table.coefficients)
         self._order_0 = upload(mi.Float, table.order_0)
 

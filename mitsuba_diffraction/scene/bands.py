@@ -105,9 +105,9 @@ def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -
 def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]]) -> None:
     """Warn of each surface whose table lacks wavelengths that a camera records.
 
-    Light below a table's wavelengths is black; above a table of heights it has the values of the
-    longest wavelength. Colours need no warning: tables that miss visible
-    light are refused or named when they load.
+    Light below a table's wavelengths is black; above a table of heights, light has the values of
+    the longest wavelength. Colours need no warning: tables that miss visible light are refused or
+    named when they load.
 
     sensors : cameras of the scene.
     surfaces : surfaces that diffract, by the names of their shapes.

@@ -30,7 +30,7 @@ _EVALUATE = (
     "--positions 2 --periodic exact"
 )
 
-#: What is wrong with what is named: exit code 1.
+#: Command lines that name an unsuitable file or value, and the message: exit code 1.
 REFUSED = {
     _MAP: {
         "--theta 90": "theta=90 must be at least 0 and below 90",
@@ -176,7 +176,7 @@ REFUSED = {
     "render": {"none.xml": "none.xml", "empty": "is a folder"},
 }
 
-#: What is wrong with the words: exit code 2, and the line begins with the command's name.
+#: Command lines with unsuitable options, and the message after the command's name: exit code 2.
 USAGE = {
     _MAP: {
         "--wavelength 500": "--wavelength: not allowed with argument --step",
@@ -260,7 +260,7 @@ USAGE = {
 
 @pytest.fixture(scope="module")
 def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Small inputs of every kind, and what is wrong with some."""
+    """Small inputs of every kind, some of them damaged."""
     folder = tmp_path_factory.mktemp("refusals")
     for file in original.iterdir():
         (folder / file.name).write_bytes(file.read_bytes())

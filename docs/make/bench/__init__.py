@@ -10,7 +10,7 @@ evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spec
 orders       `diffraction_orders`: times of the calls, noise of a sample
 survey       a survey of many scans, in one process and on workers
 frames       frames of the shaders
-scenes       what is rendered; noise beside sampling by the cosine
+scenes       scenes to render; noise beside sampling by the cosine
 snake        the time of whole pictures, each scene in a process of its own
 """
 

@@ -235,7 +235,7 @@ class Jobs:
         return {place: self._known[n].values.astype(np.complex128) for place, n in names.items()}
 
     def missing(self, problem: Problem, places: Iterable[Spot]) -> list[Spot]:
-        """Return the places that are not solved yet, here or in the folder."""
+        """Return the places without a solution, here or in the folder."""
         names = _names(problem, places)
         if self.folder is not None:
             for name in names.values():

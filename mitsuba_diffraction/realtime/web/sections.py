@@ -40,9 +40,9 @@ class Section:
 def packed_array(values: NDArray[Any]) -> Section:
     """Compress an array (rows, columns) without loss, in the smallest of some layouts.
 
-    Numbers stand in rows of `columns` or a multiple of it, as their bits or as differences of bits
-    from the row before. All first bytes of a column are adjacent, then all second ones: similar
-    bytes compress well. Zeros fill up the last row.
+    A layout has rows of `columns` numbers, or of a multiple of `columns`. It holds the bits of each
+    number, or the difference from the bits in the row before. All first bytes of a column are
+    adjacent, then all second bytes: similar bytes compress well. Zeros fill up the last row.
 
     values : values of a type that JavaScript has an array of, or half floats.
     """
