@@ -38,6 +38,8 @@ INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.01
 #: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02
+#: A thickness whose derivative is wanted is rounded to this, nm.
+OPTIMISED_STEP = 5.0
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 
@@ -52,8 +54,7 @@ class EnergyModel:
 
     Parameters
     ----------
-    table : of the BSDF, the mean over all positions of the window.
-    wavelength : nm, for mono variants.
+    wavelength_range : of the table, nm; wavelength : nm, for mono variants.
     material_of : `reflector_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
         keep the table.
     conserving : whether light is multiplied by s.
@@ -62,7 +63,7 @@ class EnergyModel:
 
     def __init__(
         self,
-        table: DiffractionTable,
+        wavelength_range: tuple[float, float],
         wavelength: float,
         material_of: MaterialOf,
         *,
@@ -70,15 +71,17 @@ class EnergyModel:
         beneath: bool = False,
     ) -> None:
         mono = wavelength, wavelength
-        self._table, self._material_of = table, material_of
-        self._range = mono if mi.is_monochromatic else table.wavelength_range
+        self._material_of = material_of
+        self._range = mono if mi.is_monochromatic else wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
         self._ratio: DirectionLookup | None = None
         self._ones: list[DirectionalTable] | None = None
 
-    def update(self, factors: ScaleRange) -> None:
-        """Look up, or compute, what belongs to other factors or another material.
+    def update(self, table: DiffractionTable, factors: ScaleRange) -> None:
+        """Look up, or compute, what belongs to a table, factors on it and the material.
+
+        table : of the BSDF, the mean over all positions of the window.
 
         Values are linear between height scales, 1 among them. At a height scale their derivative
         is taken from the interval above. While derivatives are taken, scales of 1 stand for none
@@ -87,7 +90,7 @@ class EnergyModel:
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
         material = self._material_of(factors.centre, self._range)
         self._both_sides = isinstance(material, conserved.Transmitter)
-        self._energy = Energy(self._table, material, wavelengths, factors.least)
+        self._energy = Energy(table, material, wavelengths, factors.least)
         nodes = factors.nodes(self._energy) if self.conserving or self.beneath else []
         energies = [self._energy.at(node) for node in nodes]
         if self.conserving:
@@ -199,11 +202,16 @@ def _rounded_indices(
 
     centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
     """
-    exact = material.at(np.clip(wavelengths * centre, *wavelength_range))
+    light = np.clip(wavelengths * centre, *wavelength_range)
+    exact = material.at(light)
     if exact is None or isinstance(exact, Stacked):
         return exact
     if isinstance(exact, fresnel.Filmed):
         index, film, depth = exact.parts
+        if getattr(material, "optimised", False):
+            thickness = float(depth.flat[0] * light.flat[0] / (2.0 * np.pi))
+            steps = max(round(thickness / OPTIMISED_STEP), thickness > 0.0)
+            depth = depth * (steps * OPTIMISED_STEP / max(thickness, 1e-9))
         phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)
         fine = min(INDEX_STEP, 10.0 ** math.floor(math.log10(phase)))  # of decimal numbers as given
         return fresnel.Filmed(rounded_index(index, INDEX_STEP), rounded_index(film, fine), depth)

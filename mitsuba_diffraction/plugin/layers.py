@@ -147,6 +147,11 @@ class UnderFilm(Material):
             return wavenumbers
         return [mi.Float(k) for k in wavenumber(self.sums.wavelengths).tolist()]
 
+    @property
+    def optimised(self) -> bool:
+        """Whether derivatives with respect to the thickness are wanted."""
+        return bool(dr.grad_enabled(self.thickness))
+
     def at(self, wavelengths: NDArray[np.float64]) -> Filmed:
         """See `Material.at`; the thickness to `THICKNESS_STEP`."""
         film, thickness = self.numbers()
