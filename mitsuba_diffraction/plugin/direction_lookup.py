@@ -132,11 +132,28 @@ def at_horizon(cosine: Float) -> Float:
 
 
 def scales_of(
-    tables: Sequence[Sequence[DirectionalTable] | None],
+    nodes: Sequence[Sequence[Sequence[DirectionalTable] | None]],
 ) -> Sequence[Sequence[DirectionalTable]] | None:
-    """Scales of all sides at several height scales, 1 where there is none; None if all are 1."""
-    some = next((sides for sides in tables if sides is not None), None)
-    return None if some is None else [sides or ones_like(some) for sides in tables]
+    """Scales of all sides at several height scales, 1 where there is none; None if all are 1.
+
+    nodes : by height scale, of the places of a surface, of which the least counts.
+    """
+    present = [sides for places in nodes for sides in places if sides is not None]
+    if not present:
+        return None
+    finest = max(present, key=lambda sides: len(sides[0].wavelengths))
+    light = finest[0].wavelengths
+    return [_least([sides or ones_like(finest) for sides in places], light) for places in nodes]
+
+
+def _least(
+    places: Sequence[Sequence[DirectionalTable]], light: NDArray[np.float64]
+) -> Sequence[DirectionalTable]:
+    """Return the least value of several places, by side, at wavelengths (n,), nm."""
+    if len(places) == 1:
+        return places[0]
+    pages = [[[side.page(nm) for nm in light] for side in sides] for sides in places]
+    return [DirectionalTable(light, values) for values in np.min(np.array(pages), axis=0)]
 
 
 def ones_like(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:

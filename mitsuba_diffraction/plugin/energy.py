@@ -8,7 +8,7 @@ albedo a reaches a nested BSDF.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -29,7 +29,7 @@ from .boundary import Boundary
 from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of
 from .directions import Site
 from .energy_factors import ScaleRange
-from .materials import Dielectric, Material
+from .materials import Dielectric, IndexAt
 from .types import Colour, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
@@ -41,10 +41,15 @@ FILM_PHASE = 0.02
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 
-#: Material of a surface, from the factor on its lengths (`ScaleRange.centre`) and wavelengths, nm.
-MaterialOf = Callable[[float, tuple[float, float]], conserved.Reflector | conserved.Transmitter]
-#: Function of direction in a `Conservation`, by side; None where it is 1 everywhere.
-SidesOf = Callable[[Conservation], list[DirectionalTable] | None]
+#: Materials of a surface at its places, one or several of a kind, from the factor on its lengths
+#: (`ScaleRange.centre`) and wavelengths, nm.
+MaterialsOf = Callable[
+    [float, tuple[float, float]], Sequence[conserved.Reflector | conserved.Transmitter]
+]
+#: Function of direction, by side; None where it is 1 everywhere.
+Sides = Sequence[DirectionalTable] | None
+#: The function at the places of a surface.
+SidesOf = Callable[[Sequence[Conservation]], Sequence[Sides]]
 
 
 class EnergyModel:
@@ -54,7 +59,7 @@ class EnergyModel:
     ----------
     table : of the BSDF, the mean over all positions of the window.
     wavelength : nm, for mono variants.
-    material_of : `reflector_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
+    materials_of : `reflectors_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
         keep the table.
     conserving : whether light is multiplied by s.
     beneath : whether light that is not reflected goes on to a nested BSDF, by the albedo.
@@ -64,13 +69,13 @@ class EnergyModel:
         self,
         table: DiffractionTable,
         wavelength: float,
-        material_of: MaterialOf,
+        materials_of: MaterialsOf,
         *,
         conserving: bool,
         beneath: bool = False,
     ) -> None:
         mono = wavelength, wavelength
-        self._table, self._material_of = table, material_of
+        self._table, self._materials_of = table, materials_of
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
@@ -83,35 +88,41 @@ class EnergyModel:
         Values are linear between height scales, 1 among them. At a height scale their derivative
         is taken from the interval above. While derivatives are taken, scales of 1 stand for none
         after there were some: an optimisation compiles no other kernel.
+
+        Where the material varies, the scale is the least of all, and the ratio that of the means.
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
-        material = self._material_of(factors.centre, self._range)
-        self._both_sides = isinstance(material, conserved.Transmitter)
-        self._energy = Energy(self._table, material, wavelengths, factors.least)
-        nodes = factors.nodes(self._energy) if self.conserving or self.beneath else []
-        energies = [self._energy.at(node) for node in nodes]
+        materials = self._materials_of(factors.centre, self._range)
+        self._both_sides = isinstance(materials[0], conserved.Transmitter)
+        self._energies = [
+            Energy(self._table, material, wavelengths, factors.least) for material in materials
+        ]
+        nodes = factors.nodes(self._energies[0]) if self.conserving or self.beneath else []
+        energies = [self._at(node) for node in nodes]
         if self.conserving:
-            scales = scales_of([energy.scales for energy in energies])
+            scales = scales_of([[each.scales for each in places] for places in energies])
             if scales is None and factors.differentiable and self._ones is not None:
                 scales = [self._ones] * len(nodes)
             if scales is not None and factors.differentiable:
                 self._ones = ones_like(scales[0])
             self._scale = None if scales is None else DirectionLookup(scales, nodes, factors)
         if self.beneath:
-            ratios = [self._ratio_of(energy) for energy in energies]
+            ratios = [self._ratio_of(places) for places in energies]
             self._ratio = DirectionLookup(ratios, nodes, factors)
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
 
-        def fine(energy: Conservation) -> list[DirectionalTable] | None:
-            return energy.scales and [side.on(FINE) for side in energy.scales]
+        def fine(places: Sequence[Conservation]) -> Sequence[Sides]:
+            return [each.scales and [side.on(FINE) for side in each.scales] for each in places]
 
         return self._tabulated(fine, height_scale) if self.conserving else None
 
     def ratio(self, height_scale: float) -> DirectionalTable | None:
         """Return the table of `reflected`, for shaders; None where it is 1."""
-        return self._tabulated(self._ratio_of, height_scale) if self.beneath else None
+        if not self.beneath:
+            return None
+        return self._tabulated(lambda places: [self._ratio_of(places)], height_scale)
 
     @property
     def scales(self) -> bool:
@@ -138,43 +149,56 @@ class EnergyModel:
             return mi.UnpolarizedSpectrum(1.0)
         return mi.UnpolarizedSpectrum(self._ratio.at(direction, site))
 
-    def _ratio_of(self, energy: Conservation) -> list[DirectionalTable]:
-        albedo, material = energy.albedo, self._energy.material
-        assert albedo is not None
-        assert isinstance(material, conserved.Reflector)
-        index: Any = material.index(albedo.wavelengths)
-        cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
-        flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
-        flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
+    def _at(self, height_scale: float) -> list[Conservation]:
+        """Conserve the energy of each material at a height scale."""
+        return [energy.at(height_scale) for energy in self._energies]
+
+    def _ratio_of(self, places: Sequence[Conservation]) -> list[DirectionalTable]:
+        albedos = [each.albedo for each in places if each.albedo is not None]
+        wavelengths, grid = albedos[0].wavelengths, albedos[0].grid
+        index: Any = None
+        flats = []
+        for energy in self._energies:
+            material = energy.material
+            assert isinstance(material, conserved.Reflector)
+            index = material.index(wavelengths)
+            cosine, coat = np.cos(grid.theta), np.asarray(material.coat)
+            flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
+            flats.append(coated_reflectance(fresnel.reflectance(cosine, coat), flat))
+        flat = np.mean(flats, axis=0)
         # of an index of 1 there is neither
         ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
-        values = albedo.values * ratio
+        values = np.mean([albedo.values for albedo in albedos], axis=0) * ratio
         if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
             values = np.minimum(values, MOST_RATIO)
-        return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
+        return [DirectionalTable(wavelengths, values.astype(np.float32))]
 
     def _tabulated(self, sides_of: SidesOf, height_scale: float) -> DirectionalTable | None:
         """Return the function that a look-up shows above the surface; None where it is 1."""
         centre = self._factors.centre
         height_scale /= centre
-        nodes = self._energy.nodes(height_scale, height_scale)
-        tables = scales_of([sides_of(self._energy.at(node)) for node in nodes])
+        nodes = self._energies[0].nodes(height_scale, height_scale)
+        tables = scales_of([sides_of(self._at(node)) for node in nodes])
         if tables is None:
             return None
         table = between([sides[0] for sides in tables], nodes, height_scale)
         return DirectionalTable(table.wavelengths * centre, table.values)
 
 
-def reflector_of(
+def reflectors_of(
     boundary: Boundary,
     coat: Dielectric | None,
     centre: float,
     wavelength_range: tuple[float, float],
-) -> conserved.Reflector:
-    """Return the material of a surface that reflects, under a coat or none (`MaterialOf`)."""
+) -> list[conserved.Reflector]:
+    """Return the materials of a surface that reflects, under a coat or none (`MaterialsOf`)."""
     index = 1.0 if coat is None else float(rounded_index(plain(coat.eta), COAT_STEP))
-    indices = partial(_rounded_indices, boundary.material, centre, wavelength_range)
-    return conserved.Reflector(boundary.model.name, indices, index)
+    return [
+        conserved.Reflector(
+            boundary.model.name, partial(_rounded_indices, at, centre, wavelength_range), index
+        )
+        for at in boundary.material.everywhere()
+    ]
 
 
 def dielectric_of(
@@ -183,23 +207,24 @@ def dielectric_of(
     thin: bool,
     centre: float,
     wavelength_range: tuple[float, float],
-) -> conserved.Transmitter:
-    """Return the material of an interface or a thin sheet (`MaterialOf`)."""
+) -> list[conserved.Transmitter]:
+    """Return the material of an interface or a thin sheet (`MaterialsOf`)."""
     index = float(rounded_index(plain(material.eta), DIELECTRIC_STEP))
-    return conserved.Transmitter(index, boundary.model.name, thin)
+    return [conserved.Transmitter(index, boundary.model.name, thin)]
 
 
 def _rounded_indices(
-    material: Material,
+    at: IndexAt,
     centre: float,
     wavelength_range: tuple[float, float],
     wavelengths: NDArray[np.float64],
 ) -> Any:
     """Return indices to `INDEX_STEP`, of the light that tables have at these wavelengths.
 
+    at : `Material.at` of a place.
     centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
     """
-    exact = material.at(np.clip(wavelengths * centre, *wavelength_range))
+    exact = at(np.clip(wavelengths * centre, *wavelength_range))
     if exact is None or isinstance(exact, Stacked):
         return exact
     if isinstance(exact, fresnel.Filmed):

@@ -49,6 +49,14 @@ class TriangleMesh:
             raise DiffractionError(f"mesh: 'faces' names a vertex outside 0 to {n - 1}")
 
 
+    def part(self, chosen: NDArray[np.bool_]) -> TriangleMesh:
+        """Return the mesh of some triangles, (m,), with their vertices alone."""
+        kept, faces = np.unique(self.faces[chosen], return_inverse=True)
+        turns = None if self.orientation is None else self.orientation[kept]
+        arrays = (array[kept] for array in (self.positions, self.normals, self.uv))
+        return TriangleMesh(*arrays, faces.reshape(-1, 3), turns)
+
+
 def cell_corners(grid: Ints) -> tuple[Ints, ...]:
     """The four corners of every cell of a grid of vertex numbers, in the sense of rotation."""
     corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]

@@ -180,11 +180,9 @@ class Drawing {
     this.add = new Program(gl, whole, ADD);
     this.shown = new Program(gl, whole, header.shown.fragment);
     this.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
-    this.surfaces = [];
-    for (const surface of header.surfaces)
-      this.surfaces.push({
-        ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
-      });
+    this.surfaces = await Promise.all(header.surfaces.map(async (surface) => ({
+      ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
+    })));
     this.daylight = await data.array(light.daylight);
     this.spectra = light.spectra === null ? null : await data.array(light.spectra);
     this.responses = texels(gl, gl.RGBA32F, this.daylight.length / 4, RESPONSES);
@@ -222,9 +220,8 @@ class Drawing {
 
   resize(width, height) {
     for (const target of [this.sample, this.held, ...(this.sums ?? [])]) target?.release();
-    Object.assign(this, { width, height });
-    [this.sample, this.held] = [0, 1].map(() => new Target(this.gl, width, height, { depth: true }));
-    this.sums = [0, 1].map(() => new Target(this.gl, width, height));
+    // made when they are drawn into: the first picture takes but one
+    Object.assign(this, { width, height, sample: undefined, held: undefined, sums: undefined });
   }
 
   // Upload the lights' spectra for the method `exact`.
@@ -286,6 +283,7 @@ class Drawing {
   // Draw one sample of every pixel in rows [bottom, top) of a picture, linear.
   drawRows(view, bottom, top) {
     const { gl } = this;
+    this.sample ??= new Target(gl, this.width, this.height, { depth: true });
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.sample.frame);
     gl.viewport(0, 0, view.width, view.height);
     gl.enable(gl.SCISSOR_TEST);
@@ -320,6 +318,7 @@ class Drawing {
       [this.sample, this.held] = [this.held, this.sample];
       return;
     }
+    this.sums ??= [0, 1].map(() => new Target(this.gl, this.width, this.height));
     this.sums.reverse();
     this.add.use();
     this.add.set({ first, covers: view.lookup ? 0 : 1 });

@@ -21,60 +21,67 @@ function directions(rows, width, column) {
 }
 
 async function uploadMesh(gl, data, mesh) {
-  const corners = await data.array(mesh.corners);
-  const columns = await data.array(mesh.columns);
-  const tangents = mesh.tangents === null ? null : await data.array(mesh.tangents);
-  const count = corners.length, { width } = mesh;
-  const signed = new Int16Array(columns.buffer, 0, columns.length);
-  const array = gl.createVertexArray(), constants = [];
-  gl.bindVertexArray(array);
-  Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
-    const place = mesh.layout[name];
-    if (place && place.value) {
-      constants.push([location, [...place.value, 0, 0].slice(0, 4)]);
-      return;
-    }
-    const direction = name === "normal" || name === "tangent";
-    // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
-    const stride = direction ? 4 : size;
-    const values = direction ? new Int16Array(count * stride) : new Float32Array(count * stride);
-    if (direction) {
-      const flat = name === "tangent" && tangents;
-      const found = flat ? directions(tangents, 2, 0) : directions(signed, width, place.column);
-      for (let i = 0, to = 0; i < count; ++i) {
-        const from = 4 * (flat ? Math.floor(i / 3) : corners[i]);
-        for (let c = 0; c < 4; ++c) values[to++] = found[from + c];
+  const sections = [mesh.corners, mesh.columns, ...(mesh.tangents === null ? [] : [mesh.tangents])];
+  const [corners, columns, tangents] = await Promise.all(sections.map((section) => data.array(section)));
+  const count = corners.length, { width, layout } = mesh;
+  const signed = new Int16Array(columns.buffer, 0, columns.length), decoded = {}, constants = [];
+
+  // Upload triangles by the numbers of their corners, null for all, with vertices of their own.
+  const uploaded = (chosen) => {
+    const array = gl.createVertexArray(), length = chosen ? chosen.length : count;
+    gl.bindVertexArray(array);
+    Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
+      const place = layout[name];
+      if (place && place.value) {
+        constants[location] = [...place.value, 0, 0].slice(0, 4);
+        return;
       }
-    } else {
-      const { low, step, column } = place;
-      for (let i = 0, to = 0; i < count; ++i) {
-        const from = corners[i] * width + column;
-        for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
+      const direction = name === "normal" || name === "tangent";
+      // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
+      const stride = direction ? 4 : size;
+      const values = direction ? new Int16Array(length * stride) : new Float32Array(length * stride);
+      if (direction) {
+        const flat = name === "tangent" && tangents;
+        const found = (decoded[name] ??= flat ? directions(tangents, 2, 0) : directions(signed, width, place.column));
+        for (let i = 0, to = 0; i < length; ++i) {
+          const corner = chosen ? chosen[i] : i, from = 4 * (flat ? (corner / 3) | 0 : corners[corner]);
+          values[to++] = found[from];
+          values[to++] = found[from + 1];
+          values[to++] = found[from + 2];
+          ++to;
+        }
+      } else {
+        const { low, step, column } = place;
+        for (let i = 0, to = 0; i < length; ++i) {
+          const from = corners[chosen ? chosen[i] : i] * width + column;
+          for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
+        }
       }
+      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
+    });
+    gl.bindVertexArray(null);
+    return { array, length };
+  };
+
+  // Levels of detail, each made when it is drawn first: 0 is all triangles, larger numbers fewer.
+  const lists = [null], levels = [];
+  const listed = (level) => {
+    if (lists[level] === undefined) {
+      const finer = listed(level - 1), few = FEWER[level - 1];
+      lists[level] = count > 3 * few ? coarser(columns, width, layout.position, corners, few, finer) : finer;
     }
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(location);
-    gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
-  });
-  // one buffer for all levels: a vertex array has one index buffer
-  const parts = [], lists = [];
-  for (const few of FEWER) {
-    const list = count > 3 * few ? coarser(columns, width, mesh.layout.position, corners, few, lists.at(-1)) : null;
-    parts.push(list && { first: lists.reduce((sum, { length }) => sum + length, 0), length: list.length });
-    if (list) lists.push(list);
-  }
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lists.flat()), gl.STATIC_DRAW);
-  gl.bindVertexArray(null);
+    return lists[level];
+  };
+  const made = (level) => (levels[level] ??= level && listed(level) === listed(level - 1) ? made(level - 1) : uploaded(listed(level)));
   return {
-    // detail: 0 draws all triangles, larger numbers fewer
-    draw(detail) {
-      const few = detail ? parts[detail - 1] : null;
-      for (const [location, value] of constants) gl.vertexAttrib4fv(location, value);
+    draw(level) {
+      const { array, length } = made(level);
+      constants.forEach((value, location) => gl.vertexAttrib4fv(location, value));
       gl.bindVertexArray(array);
-      if (few) gl.drawElements(gl.TRIANGLES, few.length, gl.UNSIGNED_INT, 4 * few.first);
-      else gl.drawArrays(gl.TRIANGLES, 0, count);
+      gl.drawArrays(gl.TRIANGLES, 0, length);
       gl.bindVertexArray(null);
     },
   };
@@ -84,21 +91,26 @@ const FEWER = [20000, 5000]; // triangles while something moves, for slow softwa
 const CELLS = 100; // cells along the longest side, at most, below 128
 
 // Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993); finer: numbers of
-// the corners of triangles to begin with, by default all.
+// the corners of triangles to begin with, null for all. Returns numbers of corners.
 function coarser(columns, width, { column, step }, corners, most, finer, cells = CELLS) {
-  const places = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
+  const [x, y, z] = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
   const cell = new Int32Array(columns.length / width); // of each distinct vertex
-  for (let n = 0; n < cell.length; ++n)
-    for (let c = 0; c < 3; ++c) cell[n] = (cell[n] << 7) | (columns[n * width + column + c] * places[c]);
+  for (let n = 0, at = column; n < cell.length; ++n, at += width)
+    cell[n] = (((columns[at] * x) | 0) << 14) | (((columns[at + 1] * y) | 0) << 7) | (columns[at + 2] * z);
   const first = new Int32Array(1 << 21).fill(-1); // corner that stands for all in a cell
+  const length = (finer ?? corners).length, found = new Int32Array(length);
   const standing = (i) => {
     const corner = finer ? finer[i] : i, n = cell[corners[corner]];
     return first[n] < 0 ? (first[n] = corner) : first[n];
   };
-  const found = [], count = (finer ?? corners).length;
-  for (let i = 0; i < count; i += 3) {
+  let count = 0;
+  for (let i = 0; i < length; i += 3) {
     const a = standing(i), b = standing(i + 1), c = standing(i + 2);
-    if (a !== b && b !== c && c !== a) found.push(a, b, c);
+    if (a === b || b === c || c === a) continue;
+    found[count++] = a;
+    found[count++] = b;
+    found[count++] = c;
   }
-  return found.length > 3 * most ? coarser(columns, width, { column, step }, corners, most, found, 0.7 * cells) : found;
+  const kept = found.subarray(0, count);
+  return count > 3 * most ? coarser(columns, width, { column, step }, corners, most, kept, 0.7 * cells) : kept;
 }
