@@ -125,7 +125,9 @@ def materials_of(file: Path) -> list[Material]:
         if any("material" not in primitive for primitive in primitives):
             found.append(Material(len(found), NO_MATERIAL, 0.0, 1.0, ()))
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise DiffractionError(f"'{file}' cannot be read as glTF: {one_line(str(error))}") from error
+        raise DiffractionError(
+            f"'{file}' cannot be read as glTF: {one_line(str(error))}"
+        ) from error
     return found
 
 

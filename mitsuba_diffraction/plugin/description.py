@@ -133,7 +133,8 @@ class Surface:
     index : of the material, see `Index`; None of a mirror and for solved orders. In RGB variants it
         interpolates three values.
     material : name of a material whose index is tabulated, else empty.
-    layer : FILM or STACK on the structure, or None; film_varies : whether a film's thickness varies.
+    layer : FILM or STACK on the structure, or None.
+    film_varies : whether the thickness of a film varies.
     coat : index of a coat over the medium above it, or None.
     model : name of the boundary model; empty for solved orders.
     energy_scale : scale s of directions and wavelengths as a function of the height scale, on

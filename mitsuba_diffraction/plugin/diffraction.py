@@ -243,6 +243,10 @@ class Diffraction(DiffractingSurface):
             partial(reflectors_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
             beneath=nested is not None,
+            place=material.thickness.place
+            if isinstance(material := self.boundary.material, UnderFilm)
+            and material.thickness.texture
+            else None,
         )
         self.ready()
 

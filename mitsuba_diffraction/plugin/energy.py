@@ -30,7 +30,7 @@ from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, s
 from .directions import Site
 from .energy_factors import ScaleRange
 from .materials import Dielectric, IndexAt
-from .types import Colour, Vector3f
+from .types import Colour, Float, Interaction, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the ratio of albedos as constants.
@@ -41,15 +41,13 @@ FILM_PHASE = 0.02
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 
-#: Materials of a surface at its places, one or several of a kind, from the factor on its lengths
+#: Material of a surface, or materials evenly along its `place`, from the factor on its lengths
 #: (`ScaleRange.centre`) and wavelengths, nm.
 MaterialsOf = Callable[
     [float, tuple[float, float]], Sequence[conserved.Reflector | conserved.Transmitter]
 ]
-#: Function of direction, by side; None where it is 1 everywhere.
-Sides = Sequence[DirectionalTable] | None
-#: The function at the places of a surface.
-SidesOf = Callable[[Sequence[Conservation]], Sequence[Sides]]
+#: Function of direction in a `Conservation` of an energy, by side; None where it is 1 everywhere.
+SidesOf = Callable[[Energy, Conservation], list[DirectionalTable] | None]
 
 
 class EnergyModel:
@@ -63,6 +61,7 @@ class EnergyModel:
         keep the table.
     conserving : whether light is multiplied by s.
     beneath : whether light that is not reflected goes on to a nested BSDF, by the albedo.
+    place : function that returns the place, 0 to 1, among several materials at hits.
     """
 
     def __init__(
@@ -73,9 +72,10 @@ class EnergyModel:
         *,
         conserving: bool,
         beneath: bool = False,
+        place: Callable[[Interaction], Float] | None = None,
     ) -> None:
         mono = wavelength, wavelength
-        self._table, self._materials_of = table, materials_of
+        self._table, self._materials_of, self._place = table, materials_of, place
         self._range = mono if mi.is_monochromatic else table.wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
@@ -88,8 +88,6 @@ class EnergyModel:
         Values are linear between height scales, 1 among them. At a height scale their derivative
         is taken from the interval above. While derivatives are taken, scales of 1 stand for none
         after there were some: an optimisation compiles no other kernel.
-
-        Where the material varies, the scale is the least of all, and the ratio that of the means.
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
         materials = self._materials_of(factors.centre, self._range)
@@ -97,32 +95,43 @@ class EnergyModel:
         self._energies = [
             Energy(self._table, material, wavelengths, factors.least) for material in materials
         ]
-        nodes = factors.nodes(self._energies[0]) if self.conserving or self.beneath else []
-        energies = [self._at(node) for node in nodes]
         if self.conserving:
-            scales = scales_of([[each.scales for each in places] for places in energies])
+            nodes, scales = self._nodes(_scales_of)
             if scales is None and factors.differentiable and self._ones is not None:
                 scales = [self._ones] * len(nodes)
             if scales is not None and factors.differentiable:
                 self._ones = ones_like(scales[0])
-            self._scale = None if scales is None else DirectionLookup(scales, nodes, factors)
+            self._scale = (
+                None if scales is None else DirectionLookup(scales, nodes, factors, self._place)
+            )
         if self.beneath:
-            ratios = [self._ratio_of(places) for places in energies]
-            self._ratio = DirectionLookup(ratios, nodes, factors)
+            nodes, ratios = self._nodes(_ratio_of)
+            assert ratios is not None
+            self._ratio = DirectionLookup(ratios, nodes, factors, self._place)
+
+    def _nodes(
+        self, sides_of: SidesOf
+    ) -> tuple[list[float], Sequence[Sequence[DirectionalTable]] | None]:
+        """Return nodes, of height scales or of the place, and a function's tables at them."""
+        if self._place is None:
+            (energy,) = self._energies
+            nodes = self._factors.nodes(energy)
+            return nodes, scales_of([sides_of(energy, energy.at(node)) for node in nodes])
+        height = self._factors.height_scale
+        places = np.linspace(0.0, 1.0, len(self._energies)).tolist()
+        return places, scales_of([_at_height(each, sides_of, height) for each in self._energies])
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
 
-        def fine(places: Sequence[Conservation]) -> Sequence[Sides]:
-            return [each.scales and [side.on(FINE) for side in each.scales] for each in places]
+        def fine(energy: Energy, found: Conservation) -> list[DirectionalTable] | None:
+            return found.scales and [side.on(FINE) for side in found.scales]
 
         return self._tabulated(fine, height_scale) if self.conserving else None
 
     def ratio(self, height_scale: float) -> DirectionalTable | None:
         """Return the table of `reflected`, for shaders; None where it is 1."""
-        if not self.beneath:
-            return None
-        return self._tabulated(lambda places: [self._ratio_of(places)], height_scale)
+        return self._tabulated(_ratio_of, height_scale) if self.beneath else None
 
     @property
     def scales(self) -> bool:
@@ -149,40 +158,48 @@ class EnergyModel:
             return mi.UnpolarizedSpectrum(1.0)
         return mi.UnpolarizedSpectrum(self._ratio.at(direction, site))
 
-    def _at(self, height_scale: float) -> list[Conservation]:
-        """Conserve the energy of each material at a height scale."""
-        return [energy.at(height_scale) for energy in self._energies]
-
-    def _ratio_of(self, places: Sequence[Conservation]) -> list[DirectionalTable]:
-        albedos = [each.albedo for each in places if each.albedo is not None]
-        wavelengths, grid = albedos[0].wavelengths, albedos[0].grid
-        index: Any = None
-        flats = []
-        for energy in self._energies:
-            material = energy.material
-            assert isinstance(material, conserved.Reflector)
-            index = material.index(wavelengths)
-            cosine, coat = np.cos(grid.theta), np.asarray(material.coat)
-            flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
-            flats.append(coated_reflectance(fresnel.reflectance(cosine, coat), flat))
-        flat = np.mean(flats, axis=0)
-        # of an index of 1 there is neither
-        ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
-        values = np.mean([albedo.values for albedo in albedos], axis=0) * ratio
-        if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
-            values = np.minimum(values, MOST_RATIO)
-        return [DirectionalTable(wavelengths, values.astype(np.float32))]
-
     def _tabulated(self, sides_of: SidesOf, height_scale: float) -> DirectionalTable | None:
-        """Return the function that a look-up shows above the surface; None where it is 1."""
+        """Return the function that a look-up shows above the surface; None where it is 1.
+
+        Where the material varies, that at place 0: no shader shows it.
+        """
         centre = self._factors.centre
-        height_scale /= centre
-        nodes = self._energies[0].nodes(height_scale, height_scale)
-        tables = scales_of([sides_of(self._at(node)) for node in nodes])
-        if tables is None:
+        sides = _at_height(self._energies[0], sides_of, height_scale / centre)
+        if sides is None:
             return None
-        table = between([sides[0] for sides in tables], nodes, height_scale)
-        return DirectionalTable(table.wavelengths * centre, table.values)
+        return DirectionalTable(sides[0].wavelengths * centre, sides[0].values)
+
+
+def _at_height(
+    energy: Energy, sides_of: SidesOf, height_scale: float
+) -> list[DirectionalTable] | None:
+    """Interpolate a function between the nodes around a height scale; None where it is 1."""
+    nodes = energy.nodes(height_scale, height_scale)
+    tables = scales_of([sides_of(energy, energy.at(node)) for node in nodes])
+    if tables is None:
+        return None
+    return [between(side, nodes, height_scale) for side in zip(*tables, strict=True)]
+
+
+def _scales_of(energy: Energy, found: Conservation) -> list[DirectionalTable] | None:
+    return found.scales
+
+
+def _ratio_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
+    """Return the albedo over the flat reflectance (`SidesOf`)."""
+    albedo, material = found.albedo, energy.material
+    assert albedo is not None
+    assert isinstance(material, conserved.Reflector)
+    index: Any = material.index(albedo.wavelengths)
+    cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
+    flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
+    flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
+    # of an index of 1 there is neither
+    ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
+    values = albedo.values * ratio
+    if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
+        values = np.minimum(values, MOST_RATIO)
+    return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
 
 
 def reflectors_of(

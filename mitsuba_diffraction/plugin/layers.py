@@ -55,8 +55,8 @@ class UnderCoat(Material):
 COHERENCE = 12e3
 #: A film's thickness is rounded to this, nm, for scales of energy.
 THICKNESS_STEP = 1.0
-#: Largest change of a fringe's phase, rad, between thicknesses that energy is conserved for.
-THICKNESS_PHASE = 0.5 * math.pi
+#: Thicknesses, in a fringe of the shortest wavelength, between which scales of energy are linear.
+FRINGE = 6
 #: Power that comes back of light that would see the material alone, below which nobody sees it.
 LEAST_THROUGH = 1e-6
 
@@ -114,6 +114,15 @@ class Thickness(Varying):
         """See `Varying.at`."""
         value = super().at(si, active)
         return value if self.texture is None else dr.fma(value, self._rise, self._first)
+
+    def place(self, si: Interaction) -> Float:
+        """Return a texture's value."""
+        return super().at(si, True)
+
+    def places(self, step: float) -> list[float]:
+        """Return thicknesses, `step` apart at most, at even values of a texture from 0 to 1."""
+        first, last = self._ends
+        return np.linspace(first, last, 2 + math.floor(abs(last - first) / step)).tolist()
 
     @property
     def number(self) -> float:
@@ -187,16 +196,11 @@ class UnderFilm(Material):
         return self._of_thickness(self.thickness.number, wavelengths)
 
     def everywhere(self) -> list[IndexAt]:
-        """See `Material.everywhere`.
-
-        Thicker films repeat the phases of those that are thicker by up to one fringe.
-        """
-        low, high = self.thickness.range()
-        index = 2.0 * self.numbers()[0].real
-        last = min(high, low + self._range[1] / index)
-        step = self._range[0] * THICKNESS_PHASE / (2.0 * math.pi * index)
-        count = 1 + math.ceil((last - low) / step)
-        return [partial(self._of_thickness, d) for d in np.linspace(last, low, count).tolist()]
+        """See `Material.everywhere`."""
+        if self.thickness.texture is None:
+            return [self.at]
+        fringe = self._range[0] / (2.0 * self.numbers()[0].real)
+        return [partial(self._of_thickness, d) for d in self.thickness.places(fringe / FRINGE)]
 
     def _of_thickness(self, thickness: float, wavelengths: NDArray[np.float64]) -> Filmed:
         rounded = round(thickness / THICKNESS_STEP) * THICKNESS_STEP

@@ -99,7 +99,7 @@ class Material:
         return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
 
     def everywhere(self) -> list[IndexAt]:
-        """Return the functions `at` of places of the surface, where they differ."""
+        """Return `at`; or, of a film of varying thickness, one for each of even places."""
         return [self.at]
 
     def refusal(self) -> str | None:

@@ -79,6 +79,7 @@ _EXCLUDED = (
     (Feature.NESTED, Feature.MIRROR), (Feature.NESTED, Feature.OPAQUE),
     (Feature.NESTED, Feature.TRANSMISSION), (Feature.PLACED, Feature.TRANSMISSION),
     (Feature.PLACED, Feature.COLOURS),
+    (Feature.VARYING_FILM, Feature.VARYING_HEIGHT), (Feature.VARYING_FILM, Feature.VARYING_LENGTH),
 )  # fmt: skip
 
 
@@ -156,7 +157,11 @@ def _unknown(name: str, plugin: str) -> str:
 
 def check_combination(props: Properties, material: Material, nested: BSDF | None) -> None:
     """Refuse features of a scene that exclude each other, naming both."""
+    textures = {name for name, value in props.objects() if isinstance(value, mi.Texture)}
     chosen = {
+        Feature.VARYING_FILM: FILM_ENDS[1] in props,
+        Feature.VARYING_HEIGHT: "height_scale" in textures,
+        Feature.VARYING_LENGTH: "lateral_scale" in textures,
         Feature.NESTED: nested is not None,
         Feature.COAT: "coat_ior" in props,
         Feature.FILM: "film_ior" in props,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .orbit import ORBIT
 from .mesh_materials import OWN, PART, own_bsdf
+from .orbit import ORBIT
 from .orientation.mesh_files import load_materials, write_ply
 from .orientation.trimesh import TriangleMesh
 from .surfaces import MATERIAL, REFLECTING, copied, targets_of

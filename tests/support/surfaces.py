@@ -123,7 +123,9 @@ SURFACES: dict[str, Callable[[Path], dict[str, Any]]] = {
     "solved under a layer": _solved(superstrate=1.5),
     "film": _heights(material="Al", film_ior=1.5, film_thickness=300.0),
     "film by a texture": _heights(
-        material="Al", film_ior=1.5, film_thickness_max=400.0,
+        material="Al",
+        film_ior=1.5,
+        film_thickness_max=400.0,
         film_thickness=lambda: _bitmap(np.linspace(0.2, 1.0, _SIDE)),
     ),
     "stack": _layered,

@@ -171,7 +171,7 @@ class Drawing {
     Object.assign(this, { gl, header, data, programs: {}, tables: {}, materials: {} });
   }
 
-  // Load all but tables, while the driver compiles; arguments: those of `compiled`.
+  // Load all but tables and meshes, while the driver compiles; arguments: those of `compiled`.
   async load(method, lit, material) {
     const { gl, header, data } = this, { light } = header;
     this.sources = JSON.parse(await data.text(header.programs));
@@ -181,13 +181,18 @@ class Drawing {
     this.shown = new Program(gl, whole, header.shown.fragment);
     this.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
     this.surfaces = await Promise.all(header.surfaces.map(async (surface) => ({
-      ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
+      ...surface, mesh: new Mesh(gl, surface.mesh), part: await Part.load(gl, data, surface.parts),
     })));
     this.daylight = await data.array(light.daylight);
     this.spectra = light.spectra === null ? null : await data.array(light.spectra);
     this.responses = texels(gl, gl.RGBA32F, this.daylight.length / 4, RESPONSES);
     this.empty = gl.createVertexArray();
     this.around = header.around && (await Surroundings.load(gl, header, data));
+  }
+
+  async loadMeshes() {
+    for (const { mesh } of [...this.surfaces, ...(this.around?.glowing ?? [])]) await mesh.load(this.data);
+    for (const map of Object.values(this.shadows)) map.key = undefined; // those of the stand-ins
   }
 
   // Programs of all surfaces, one for each of some definitions of the light; material: number of a

@@ -20,20 +20,35 @@ function directions(rows, width, column) {
   return found;
 }
 
-async function uploadMesh(gl, data, mesh) {
-  const sections = [mesh.corners, mesh.columns, ...(mesh.tangents === null ? [] : [mesh.tangents])];
-  const [corners, columns, tangents] = await Promise.all(sections.map((section) => data.array(section)));
-  const count = corners.length, { width, layout } = mesh;
-  const signed = new Int16Array(columns.buffer, 0, columns.length), decoded = {}, constants = [];
+// Triangles of a surface. Each level of detail is uploaded when it is drawn first: 0 is all, larger
+// numbers are fewer. Before `load` one triangle stands for all, in the same formats.
+class Mesh {
+  constructor(gl, described) {
+    Object.assign(this, { gl, described });
+    const { width, layout } = described, columns = new Uint16Array(3 * width);
+    for (let n = 0; n < 3; ++n) columns[n * width + (layout.position.column ?? 0) + n] = 65535;
+    this.fill(new Uint32Array([0, 1, 2]), columns, new Int16Array(2));
+  }
+
+  fill(corners, columns, tangents) {
+    const signed = new Int16Array(columns.buffer, 0, columns.length);
+    Object.assign(this, { corners, columns, signed, tangents, decoded: {}, constants: [], lists: [null], levels: [] });
+  }
+
+  async load(data) {
+    const { corners, columns, tangents } = this.described;
+    this.fill(...(await Promise.all([corners, columns, tangents].map((section) => section === null ? null : data.array(section)))));
+  }
 
   // Upload triangles by the numbers of their corners, null for all, with vertices of their own.
-  const uploaded = (chosen) => {
-    const array = gl.createVertexArray(), length = chosen ? chosen.length : count;
+  uploaded(chosen) {
+    const { gl, corners, columns, tangents, decoded } = this, { width, layout } = this.described;
+    const array = gl.createVertexArray(), { length } = chosen ?? corners;
     gl.bindVertexArray(array);
     Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
       const place = layout[name];
       if (place && place.value) {
-        constants[location] = [...place.value, 0, 0].slice(0, 4);
+        this.constants[location] = [...place.value, 0, 0].slice(0, 4);
         return;
       }
       const direction = name === "normal" || name === "tangent";
@@ -41,8 +56,8 @@ async function uploadMesh(gl, data, mesh) {
       const stride = direction ? 4 : size;
       const values = direction ? new Int16Array(length * stride) : new Float32Array(length * stride);
       if (direction) {
-        const flat = name === "tangent" && tangents;
-        const found = (decoded[name] ??= flat ? directions(tangents, 2, 0) : directions(signed, width, place.column));
+        const flat = name === "tangent" && this.described.tangents !== null;
+        const found = (decoded[name] ??= flat ? directions(tangents, 2, 0) : directions(this.signed, width, place.column));
         for (let i = 0, to = 0; i < length; ++i) {
           const corner = chosen ? chosen[i] : i, from = 4 * (flat ? (corner / 3) | 0 : corners[corner]);
           values[to++] = found[from];
@@ -64,27 +79,30 @@ async function uploadMesh(gl, data, mesh) {
     });
     gl.bindVertexArray(null);
     return { array, length };
-  };
+  }
 
-  // Levels of detail, each made when it is drawn first: 0 is all triangles, larger numbers fewer.
-  const lists = [null], levels = [];
-  const listed = (level) => {
+  listed(level) {
+    const { lists, columns, corners, described } = this;
     if (lists[level] === undefined) {
-      const finer = listed(level - 1), few = FEWER[level - 1];
-      lists[level] = count > 3 * few ? coarser(columns, width, layout.position, corners, few, finer) : finer;
+      const finer = this.listed(level - 1), few = FEWER[level - 1];
+      const fewer = corners.length > 3 * few;
+      lists[level] = fewer ? coarser(columns, described.width, described.layout.position, corners, few, finer) : finer;
     }
     return lists[level];
-  };
-  const made = (level) => (levels[level] ??= level && listed(level) === listed(level - 1) ? made(level - 1) : uploaded(listed(level)));
-  return {
-    draw(level) {
-      const { array, length } = made(level);
-      constants.forEach((value, location) => gl.vertexAttrib4fv(location, value));
-      gl.bindVertexArray(array);
-      gl.drawArrays(gl.TRIANGLES, 0, length);
-      gl.bindVertexArray(null);
-    },
-  };
+  }
+
+  made(level) {
+    const same = level && this.listed(level) === this.listed(level - 1);
+    return (this.levels[level] ??= same ? this.made(level - 1) : this.uploaded(this.listed(level)));
+  }
+
+  draw(level) {
+    const { gl } = this, { array, length } = this.made(level);
+    this.constants.forEach((value, location) => gl.vertexAttrib4fv(location, value));
+    gl.bindVertexArray(array);
+    gl.drawArrays(gl.TRIANGLES, 0, length);
+    gl.bindVertexArray(null);
+  }
 }
 
 const FEWER = [20000, 5000]; // triangles while something moves, for slow software rasterisers
