@@ -89,8 +89,11 @@ coat_ior : float or string [none]
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
     differentiable `film_eta`. Excludes a coat.
-film_thickness : float ∂ [none]
-    Thickness of the film along the vertical, nm; 2 n d is at most 12 µm.
+film_thickness : float or texture ∂ [none]
+    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture's name, raw texture or mesh
+    attribute of one channel, 0 to 1.
+film_thickness_min, film_thickness_max : float [0, none]
+    Thicknesses, nm, where a texture of film_thickness is 0 and 1.
 film_k : float ∂ [0]
     Absorption of the film, k of its index n + ik. Excludes a nested BSDF.
 layers : string [none]
@@ -194,8 +197,8 @@ from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
 from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
-from .energy import EnergyModel, reflector_of
-from .layers import UnderCoat
+from .energy import EnergyModel, reflectors_of
+from .layers import UnderCoat, UnderFilm
 from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
 from .surface import DiffractingSurface
@@ -238,9 +241,13 @@ class Diffraction(DiffractingSurface):
         self.energy = EnergyModel(
             self.table.wavelength_range,
             self.wavelength,
-            partial(reflector_of, self.boundary, self.coat),
+            partial(reflectors_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
             beneath=nested is not None,
+            place=material.thickness.place
+            if isinstance(material := self.boundary.material, UnderFilm)
+            and material.thickness.texture
+            else None,
         )
         self.ready()
 
@@ -328,6 +335,7 @@ class Diffraction(DiffractingSurface):
             getattr(material, "reflects_all", False),
             getattr(material, "sums", None),
             material.tint is None,
+            str(material.thickness.texture) if isinstance(material, UnderFilm) else "",
         )
         own = self.vcavity, self.coat is None, self.energy.kernel_constants()
         return *super().kernel_constants(), *own, *other_kernels

@@ -18,6 +18,7 @@ from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
+from .layers import UnderFilm
 from .loops import only_in
 from .materials import Material, tinted
 from .power import PowerModel, power_model
@@ -275,6 +276,7 @@ class DiffractingSurface(SurfaceBSDF):
             index=None if material.kind is Feature.MIRROR else material.at,
             material=material.name if tabulated_range(material.name) else "",
             layer=structure.layer,
+            film_varies=isinstance(structure, UnderFilm) and bool(structure.thickness.texture),
             model=str(self.boundary),
             transmits=self.transmits,
         )
