@@ -91,7 +91,7 @@ film_ior : float or string [none]
     differentiable `film_eta`. Excludes a coat.
 film_thickness : float or texture ∂ [none]
     Along the vertical, nm; 2 n d is at most 12 µm. Or a picture's name, raw texture or mesh
-    attribute of one channel, 0 to 1.
+    attribute, 0 to 1.
 film_thickness_min, film_thickness_max : float [0, none]
     Thicknesses, nm, where a texture of film_thickness is 0 and 1.
 film_k : float ∂ [0]
