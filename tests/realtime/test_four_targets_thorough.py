@@ -325,7 +325,7 @@ def test_cycles_shows_them_as_the_path_tracer_does(stage: Stage, tmp_path: Path)
 def test_what_no_target_shows_is_refused_with_the_reason(tmp_path: Path) -> None:
     """By features of the one list, in one sentence."""
     names = "film", "stack", "interface", "sheet", "solved sheet", "crossed", "speckle of places"
-    for name in (*names, "lower by a texture"):
+    for name in (*names, "lower by a texture", "film by a texture"):
         bsdf = mi.load_dict(SURFACES[name](tmp_path))
         for consumer in (GLSL, OSL):
             sentence = refusal(consumer, bsdf)
