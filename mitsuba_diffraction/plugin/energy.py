@@ -55,8 +55,7 @@ class EnergyModel:
 
     Parameters
     ----------
-    table : of the BSDF, the mean over all positions of the window.
-    wavelength : nm, for mono variants.
+    wavelength_range : of the table, nm; wavelength : nm, for mono variants.
     materials_of : `reflectors_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
         keep the table.
     conserving : whether light is multiplied by s.
@@ -66,7 +65,7 @@ class EnergyModel:
 
     def __init__(
         self,
-        table: DiffractionTable,
+        wavelength_range: tuple[float, float],
         wavelength: float,
         materials_of: MaterialsOf,
         *,
@@ -75,15 +74,17 @@ class EnergyModel:
         place: Callable[[Interaction], Float] | None = None,
     ) -> None:
         mono = wavelength, wavelength
-        self._table, self._materials_of, self._place = table, materials_of, place
-        self._range = mono if mi.is_monochromatic else table.wavelength_range
+        self._materials_of, self._place = materials_of, place
+        self._range = mono if mi.is_monochromatic else wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
         self._ratio: DirectionLookup | None = None
         self._ones: list[DirectionalTable] | None = None
 
-    def update(self, factors: ScaleRange) -> None:
-        """Look up, or compute, what belongs to other factors or another material.
+    def update(self, table: DiffractionTable, factors: ScaleRange) -> None:
+        """Look up, or compute, what belongs to a table, factors on it and the material.
+
+        table : of the BSDF, the mean over all positions of the window.
 
         Values are linear between height scales, 1 among them. At a height scale their derivative
         is taken from the interval above. While derivatives are taken, scales of 1 stand for none
@@ -93,7 +94,7 @@ class EnergyModel:
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
         self._energies = [
-            Energy(self._table, material, wavelengths, factors.least) for material in materials
+            Energy(table, material, wavelengths, factors.least) for material in materials
         ]
         if self.conserving:
             nodes, scales = self._nodes(_scales_of)

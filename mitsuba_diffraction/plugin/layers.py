@@ -55,6 +55,8 @@ class UnderCoat(Material):
 COHERENCE = 12e3
 #: A film's thickness is rounded to this, nm, for scales of energy.
 THICKNESS_STEP = 1.0
+#: The same while derivatives by the thickness are taken: each step costs seconds.
+OPTIMISED_STEP = 5.0
 #: Thicknesses, in a fringe of the shortest wavelength, between which scales of energy are linear.
 FRINGE = 6
 #: Power that comes back of light that would see the material alone, below which nobody sees it.
@@ -197,6 +199,9 @@ class UnderFilm(Material):
 
     def everywhere(self) -> list[IndexAt]:
         """See `Material.everywhere`."""
+        if self.thickness.texture is None and self.thickness.differentiable:
+            steps = max(round(self.thickness.number / OPTIMISED_STEP), 1)
+            return [partial(self._of_thickness, steps * OPTIMISED_STEP)]
         if self.thickness.texture is None:
             return [self.at]
         fringe = self._range[0] / (2.0 * self.numbers()[0].real)

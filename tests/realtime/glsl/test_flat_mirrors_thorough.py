@@ -31,7 +31,8 @@ MIRRORS: dict[str, tuple[dict[str, Any], complex | None, float]] = {
     "own index": ({"eta": OWN.real, "k": OWN.imag}, OWN, 1.0),
     "lacquered": ({"material": "Al", "coat_ior": 1.5}, ALUMINIUM, 1.5),
 }
-_NODES = 50
+#: Of the quadrature over a lobe, across which they are 0.4 of its deviations apart.
+_NODES = 24
 
 
 def flat(width: float) -> md.HeightField:
