@@ -103,14 +103,18 @@ def note_named(file: Path) -> None:
 
 
 def materials_of(file: Path) -> list[Material]:
-    """Return the materials of a glTF file, and `NO_MATERIAL` if there are triangles without.
+    """Return the materials of a glTF file's meshes, and `NO_MATERIAL` if there are some without.
 
     Raises a DiffractionError if the file is damaged.
     """
     try:
         document, _ = _parts(file)
-        found = []
-        for number, given in enumerate(document.get("materials", ())):
+        primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
+        used = {primitive.get("material") for primitive in primitives}
+        found, all_materials = [], document.get("materials", [])
+        for number, given in enumerate(all_materials):
+            if number not in used:
+                continue
             surface = given.get("pbrMetallicRoughness", {})
             extensions = given.get("extensions", {})
             present = [*given, *surface, *extensions]
@@ -121,9 +125,8 @@ def materials_of(file: Path) -> list[Material]:
             )
             name = str(given.get("name") or f"material {number}")
             found.append(Material(number, name, metal, rough, tuple(left)))
-        primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
-        if any("material" not in primitive for primitive in primitives):
-            found.append(Material(len(found), NO_MATERIAL, 0.0, 1.0, ()))
+        if None in used:
+            found.append(Material(len(all_materials), NO_MATERIAL, 0.0, 1.0, ()))
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         raise DiffractionError(
             f"'{file}' cannot be read as glTF: {one_line(str(error))}"
