@@ -68,8 +68,8 @@ def postscript(file: Path) -> Path:
 
 #: Text of a file outside of the folder, which nothing may print.
 PRIVATE = "PRIVATE"
-#: Suffixes of pipes.
-PIPES = ("xml", "png", "npy", "csv", "toml", "nc", "ply", "exr", "gltf", "tif", "spm")
+#: Suffixes of pipes that scenes name.
+PIPES = ("xml", "png", "npy", "csv", "toml", "nc")
 _BENIGN = """<scene version="3.0.0"><integrator type="path"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="6"/>
 <integer name="height" value="4"/></film><sampler type="independent">
