@@ -158,7 +158,7 @@ def test_a_misspelt_parameter_of_a_scene_is_one_line(run, here, command):
 @pytest.mark.parametrize(
     "command",
     ["precompute {}", "info {}", "solve {}", "survey a.npy --treatments {}", "plan a.xml",
-     "brdf-map a.npy --pixel-size 0.1 --coherence-width 2 --tolerance 0.1 --material Al --layers {}"],
+     "brdf-map a.npy --pixel-size 0.1 --coherence-width 2 --tolerance 0.1 --layers {}"],
 )  # fmt: skip
 def test_a_whole_number_of_many_digits_in_toml_is_refused_in_one_line(run, here, command, digits):
     Path("a.toml").write_text(f"pixel_size = {digits * '9'}\n")

@@ -28,7 +28,7 @@ def measure_survey(plan: Plan, folder: Path, progress: Progress) -> Section:
     """Time `survey` of gratings with roughness, in one process and on two workers."""
     files = [str(file) for file in _scans(folder, plan.scans)]
     ways = {"one process": []}
-    if importlib.util.find_spec("distributed") is not None:
+    if plan.scans > 1 and importlib.util.find_spec("distributed") is not None:
         ways["two workers"] = ["--workers", "2"]
     rows = []
     for n, (name, options) in enumerate(ways.items()):
