@@ -8,13 +8,14 @@ import json
 import struct
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from PIL import Image
 
-from .errors import DiffractionError
+from .errors import DiffractionError, one_line
 from .extras import optional
 from .files import path_beside, read_bytes, refuse_pipe
 from .images import without_programs
@@ -24,6 +25,31 @@ from .limits import MOST_PLACED, bounded_memory, check_content, check_count, tre
 # Bytes of a number by the code of its type, and numbers of an item (glTF 2.0, 3.6.2)
 _BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+@dataclass(frozen=True)
+class Material:
+    """Material of a glTF file.
+
+    Attributes
+    ----------
+    number, name : in the file; triangles without a material have the number after the last.
+    metallic, roughness : factors of its surface (glTF 2.0, 3.9.2).
+    left_out : names of what else it has, but its base colour.
+    """
+
+    number: int
+    name: str
+    metallic: float
+    roughness: float
+    left_out: tuple[str, ...]
+
+
+#: Name of what has no material.
+NO_MATERIAL = "none"
+#: What a `Material` holds, in the document's words.
+_HELD = ("name", "pbrMetallicRoughness", "baseColorFactor", "baseColorTexture", "metallicFactor",
+         "roughnessFactor", "doubleSided", "extras", "alphaCutoff", "alphaMode")  # fmt: skip
 
 # Compressions of meshes by their extension, and attributes that are read
 _COMPRESSED = {
@@ -76,11 +102,43 @@ def note_named(file: Path) -> None:
                 note_input(file.parent / unquote(name))
 
 
+def materials_of(file: Path) -> list[Material]:
+    """Return the materials of a glTF file's meshes, and `NO_MATERIAL` if there are some without.
+
+    Raises a DiffractionError if the file is damaged.
+    """
+    try:
+        document, _ = _parts(file)
+        primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
+        used = {primitive.get("material") for primitive in primitives}
+        found, all_materials = [], document.get("materials", [])
+        for number, given in enumerate(all_materials):
+            if number not in used:
+                continue
+            surface = given.get("pbrMetallicRoughness", {})
+            extensions = given.get("extensions", {})
+            present = [*given, *surface, *extensions]
+            left = [n for n in present if n not in (*_HELD, "extensions")]
+            left += ["alphaMode"] if given.get("alphaMode", "OPAQUE") != "OPAQUE" else []
+            metal, rough = (
+                float(surface.get(f"{name}Factor", 1.0)) for name in ("metallic", "roughness")
+            )
+            name = str(given.get("name") or f"material {number}")
+            found.append(Material(number, name, metal, rough, tuple(left)))
+        if None in used:
+            found.append(Material(len(all_materials), NO_MATERIAL, 0.0, 1.0, ()))
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise DiffractionError(
+            f"'{file}' cannot be read as glTF: {one_line(str(error))}"
+        ) from error
+    return found
+
+
 def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
     """Return a glTF file as a scene of `trimesh`; its pictures are not decoded yet.
 
     wanted_by : option or parameter that names the file, for the message if `trimesh` is missing.
-    materials : keep the materials, for their base colour.
+    materials : keep the materials, for their base colour; otherwise their numbers alone, as names.
 
     Raises
     ------
@@ -96,12 +154,12 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
     _check(document, size + folder.size_of(document), f"'{file}'")
     _check_encoding(document, f"'{file}'")
     if not materials:  # `trimesh` decodes pictures of some, and keeps UV only beside a material
-        document["materials"] = [{}]
+        document["materials"] = [{} for _ in range(len(document.get("materials", ())) + 1)]
         document.pop("images", None)
         document.pop("textures", None)
         for mesh in document.get("meshes", ()):
             for primitive in mesh.get("primitives", ()):
-                primitive["material"] = 0
+                primitive.setdefault("material", len(document["materials"]) - 1)
     for number, material in enumerate(document.get("materials", ())):
         material["name"] = str(number)
     content = json.dumps(document).encode()

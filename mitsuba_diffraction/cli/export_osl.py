@@ -47,11 +47,11 @@ def run(args: argparse.Namespace) -> Figures:
     def files_in(folder: Path) -> list[Path]:
         return [folder / f"{name}{suffix}" for suffix in (".osl", ".json")]
 
-    folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
-
-    from ..osl import export
+    from ..osl import check_name, export
     from ..scene.load import set_variant
 
+    check_name(name)  # before the folder and the tables are made
+    folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
     set_variant(args.mode)
     with mitsuba_warnings(), Bar(args) as bar:
         bar(0, 0, "making tables")

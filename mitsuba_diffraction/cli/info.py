@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files import MESHES, FileKind
+from ..files import GLTF, MESHES, FileKind
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
@@ -210,6 +210,14 @@ def _mesh(file: Path) -> dict[str, Any]:
         "kind": "mesh",
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
         **summary,
+        **({"materials": _materials(file)} if file.suffix.lower() in GLTF else {}),
         "normals": "in the file" if has_own_normals(file) else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }
+
+
+def _materials(file: Path) -> list[str]:
+    """Return the names of a glTF file's materials, which --preset and --assign take."""
+    from ..gltf import materials_of
+
+    return [material.name for material in materials_of(file)] or ["none"]

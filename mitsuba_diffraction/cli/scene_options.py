@@ -41,10 +41,10 @@ SCENE = (
     ("--patch FILE", "surface of a mesh: heights, recipe or table; pixel_size, max_height, "
      "material, up, turn and the lamp are set by -D", Path),
     ("--preset [ID=]NAME[,NAME=VALUE...]", "preset instead of --patch, e.g. cd or "
-     "snake,height_scale=0.7; of a scene, for the BSDF or shape of this id; default of ID: "
-     "surface", [str], None, {"dest": "presets"}),
-    ("--assign ID=FILE[,NAME=VALUE...]", "surface on the BSDF or shape of this id, e.g. "
-     "mat-Skin=scale.exr,int_ior=1.56; may be given several times",
+     "snake,height_scale=0.7; for the BSDF or shape of this id, or the material of a glTF mesh; "
+     "default of ID: surface", [str], None, {"dest": "presets"}),
+    ("--assign ID=FILE[,NAME=VALUE...]", "surface on the BSDF or shape of this id, or the material "
+     "of a glTF mesh, e.g. mat-Skin=scale.exr,int_ior=1.56; may be given several times",
      [definition], None, {"dest": "materials"}),
     MODE,
     ("-D --define KEY=VALUE", "set a parameter of the scene; may be given several times",
@@ -64,13 +64,18 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     surfaces = list(args.materials)
     for text in args.presets:
         head, comma, changes = text.partition(",")
-        name, _, look = head.rpartition("=")
-        surfaces.append((name or SURFACE, f"{PRESET}{look}{comma}{changes}"))
+        look = head.rpartition("=")[2]
+        surfaces.append((_id_of(text), f"{PRESET}{look}{comma}{changes}"))
     ids = [name for name, _ in surfaces]
     for name in ids:
         if ids.count(name) > 1:
             args.parser.error(f"argument --assign, --preset: {name!r} is given more than once")
     return parameters | {MATERIAL + name: value for name, value in surfaces}
+
+
+def _id_of(preset: str) -> str:
+    """Return the id of a value of --preset."""
+    return preset.partition(",")[0].rpartition("=")[0] or SURFACE
 
 
 def put_on_stage(args: argparse.Namespace) -> None:
@@ -93,7 +98,8 @@ def put_on_stage(args: argparse.Namespace) -> None:
                 "--assign ID=FILE"
             )
         return
-    if (args.patch is None) == (not args.presets):
+    ids = [*map(_id_of, args.presets), *(name for name, _ in args.materials)]
+    if (args.patch is None and not ids) or (args.patch is not None and SURFACE in ids):
         args.parser.error(
             f"'{args.scene}' is a mesh: say which surface it has, --patch FILE (heights, recipe "
             "or table) or --preset NAME"
@@ -102,17 +108,20 @@ def put_on_stage(args: argparse.Namespace) -> None:
     if args.patch is not None:
         args.parameters.append(("patch", str(readable_file(args.patch).absolute())))
     else:
-        _change_look(args)
+        _change_looks(args)
+    if args.patch is None and SURFACE not in ids and "others" not in dict(args.parameters):
+        args.parameters.append(("others", "own"))
     args.scene = STUDIO
 
 
-def _change_look(args: argparse.Namespace) -> None:
-    """Put parameters of the surface behind the look that replaces the studio's surface."""
+def _change_looks(args: argparse.Namespace) -> None:
+    """Put parameters of the surface behind the looks in place of the studio's surface."""
     from ..plugin.parameters import NAMES, REFLECTING
 
-    changes = [f",{name}={value}" for name, value in args.parameters if name in NAMES[REFLECTING]]
+    changes = "".join(f",{k}={v}" for k, v in args.parameters if k in NAMES[REFLECTING])
     args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
-    args.presets = [args.presets[0] + "".join(changes), *args.presets[1:]]
+    args.presets = [preset + changes for preset in args.presets]
+    args.materials = [(name, file + changes) for name, file in args.materials]
 
 
 def _definitions(args: argparse.Namespace) -> dict[str, str]:

@@ -18,6 +18,6 @@ Sources in OSL are in the folder shaders.
 from __future__ import annotations
 
 from .addon import make_addon
-from .export import Exported, export
+from .export import Exported, check_name, export
 
-__all__ = ["Exported", "export", "make_addon"]
+__all__ = ["Exported", "check_name", "export", "make_addon"]

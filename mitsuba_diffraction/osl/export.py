@@ -131,8 +131,8 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     folder : made if it is missing.
     name : of the shader and its files; letters, digits and underscores.
     """
+    check_name(name)
     shader = shader_of(OSL.described(bsdf))
-    check_name(name, shader)
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -170,18 +170,20 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     return exported
 
 
-def check_name(name: str, shader: OslShader) -> None:
-    """Refuse a name that a shader cannot have.
+def check_name(name: str) -> None:
+    """Refuse a name that a shader cannot have, without its tables.
 
-    Raises a DiffractionError if it is no identifier, or a word of OSL or of the shader's source.
+    Raises a DiffractionError if it is no identifier, or a word of OSL or of a shader's source.
     """
     allowed = "letters, digits and underscores, a letter first"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise DiffractionError(f"name={quoted(name)} must be {allowed}: it is the name of a shader")
-    source = re.sub("//.*", "", _source(shader, shader.sockets, ""))
-    if name in _RESERVED.split() or re.search(rf"\b{name}\b", re.sub('"[^"]*"', "", source)):
+    files = (shader_file(file) for file in ("common.osl", "patch.osl", "orders.osl"))
+    formulas = [order_formulas(), *(patch_formulas(model, True) for model in MODELS.values())]
+    source = re.sub('"[^"]*"', "", re.sub("//.*", "", "\n".join([*files, *formulas])))
+    if name in _RESERVED.split() or re.search(rf"\b{name}\b", source):
         raise DiffractionError(
-            f"name='{name}' is a word of the Open Shading Language or of the shader's source; "
+            f"name='{name}' is a word of the Open Shading Language or of the shaders' source; "
             f"choose another of {allowed}, for example 'my_{name}'"
         )
 

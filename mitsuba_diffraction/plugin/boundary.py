@@ -52,6 +52,10 @@ class HeightStatistic:
     """A statistic of the heights at an order's frequency, linear between nodes."""
 
     def __init__(self, table: RoughnessTable) -> None:
+        self.take(table)
+
+    def take(self, table: RoughnessTable) -> None:
+        """Look up a statistic of other heights from now on."""
         self._first = table.first
         nodes = table.nodes.astype(np.float32)
         self._last = len(nodes) - 2.0
@@ -90,6 +94,11 @@ class Boundary:
     def of(self, material: Material) -> Boundary:
         """Return the model of another material on the same heights."""
         return replace(self, material=material)
+
+    def take(self, roughness: RoughnessTable) -> None:
+        """Have other heights from now on, with all boundaries `of` other materials."""
+        if self.statistic is not None and self.model.statistic is not None:
+            self.statistic.take(self.model.statistic(roughness))
 
     def factor(
         self,

@@ -40,6 +40,7 @@ class Feature(Enum):
     COAT = "", "a coat (coat_ior)"
     FILM = "", "a thin film (film_ior)"
     STACK = "", "a stack of layers (layers)"
+    VARYING_FILM = "", "a film_thickness that varies"
     SMALL_SLOPE = "model", "model='small_slope'"
     KIRCHHOFF = "model", "model='kirchhoff'"
     OWN_MODEL = "model", "model='{model}'"
@@ -133,6 +134,7 @@ class Surface:
         interpolates three values.
     material : name of a material whose index is tabulated, else empty.
     layer : FILM or STACK on the structure, or None.
+    film_varies : whether the thickness of a film varies.
     coat : index of a coat over the medium above it, or None.
     model : name of the boundary model; empty for solved orders.
     energy_scale : scale s of directions and wavelengths as a function of the height scale, on
@@ -158,6 +160,7 @@ class Surface:
     index: Index | None = None
     material: str = ""
     layer: Feature | None = None
+    film_varies: bool = False
     coat: float | None = None
     model: str = ""
     energy_scale: Callable[[float], DirectionalTable | None] = unscaled
@@ -228,6 +231,7 @@ class Surface:
             Feature.ORIENTATION: turned.texture is None and turned.number != 0.0,
             Feature.VARYING_ORIENTATION: turned.texture is not None,
             Feature.NESTED: self.nested is not None,
+            Feature.VARYING_FILM: self.film_varies,
         }
         chosen = (self.kind, self.layer, known.get(self.model, Feature.OWN_MODEL))
         found = {feature for feature, has in present.items() if has}
@@ -270,6 +274,7 @@ VARYING = frozenset(
         Feature.VARYING_LENGTH,
         Feature.VARYING_ORIENTATION,
         Feature.VARYING_WEIGHTS,
+        Feature.VARYING_FILM,
     }
 )
 

@@ -26,6 +26,10 @@ class Data(mi.Object):
         super().__init__()
         self.value = value
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Data:
+        """Return another object of the same value, which never changes."""
+        return Data(self.value)
+
 
 def bsdf_dict(
     field: HeightField | DiffractionTable | SolvedOrders | str | os.PathLike[str],
@@ -59,6 +63,6 @@ def bsdf_dict(
     if isinstance(field, SolvedOrders):
         return {"type": ORDERS, "data": Data(field), **arguments}
     raise DiffractionError(
-        f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
-        "one of an array with HeightField(heights, pixel_size)"
+        f"bsdf_dict: expected a HeightField, a table or the path of a file, got {quoted(field)}; "
+        "make a field of an array with HeightField(heights, pixel_size)"
     )

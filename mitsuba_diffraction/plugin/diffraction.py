@@ -11,6 +11,7 @@ filename : string
     of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
     Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
+    `mi.traverse` has it: other heights make another table.
 pixel_size : float or string [from the file]
     Distance between heights, µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
@@ -53,8 +54,8 @@ coherence_width : float or string [auto]
     Width over which light is coherent, µm, 4σ of a Gaussian window. `auto`: 65 (sunlight), or the
     width of the table or recipe.
 coherence : string [ensemble]
-    `ensemble`: mean over all windows. `patch`: speckle of one window. `surface`: speckle of the
-    window where the light falls.
+    `ensemble`: mean over all windows. `patch`: speckle of one window, at the patch's centre.
+    `surface`: speckle of the window where the light falls.
 uv_scale : float or string [none]
     Size of a unit of the texture coordinates, µm, for coherence=surface: one number, or "u, v".
 world_scale : float [none]
@@ -88,8 +89,11 @@ coat_ior : float or string [none]
 film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
     differentiable `film_eta`. Excludes a coat.
-film_thickness : float ∂ [none]
-    Thickness of the film along the vertical, nm; 2 n d is at most 12 µm.
+film_thickness : float or texture ∂ [none]
+    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture's name, raw texture or mesh
+    attribute of one channel, 0 to 1.
+film_thickness_min, film_thickness_max : float [0, none]
+    Thicknesses, nm, where a texture of film_thickness is 0 and 1.
 film_k : float ∂ [0]
     Absorption of the film, k of its index n + ik. Excludes a nested BSDF.
 layers : string [none]
@@ -147,7 +151,7 @@ spread, polarised variants keep the mean phase between s and p.
 **Energy.** Dielectrics are unaffected; metal gratings lose some per cent in directions without gain
 (docs/energy.md). The scale costs seconds once and is cached. It is interpolated over height_scale.
 For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
-indices and films hold it constant.
+indices and films hold it constant, in steps of 5 nm of film_thickness.
 
 **The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface and
 its coat. Spectra of pigments are constant beyond their ends.
@@ -193,8 +197,8 @@ from .arithmetic import maximum, plain
 from .boundary import KIRCHHOFF, Boundary
 from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
-from .energy import EnergyModel, reflector_of
-from .layers import UnderCoat
+from .energy import EnergyModel, reflectors_of
+from .layers import UnderCoat, UnderFilm
 from .properties import choice
 from .sampling import EVEN, direction_of, with_even_share
 from .surface import DiffractingSurface
@@ -235,11 +239,15 @@ class Diffraction(DiffractingSurface):
             self.fresnel = UnderCoat(self.boundary.material, self.coat)
             self.mirror = Boundary(KIRCHHOFF, self.coat)
         self.energy = EnergyModel(
-            self.mean_table,
+            self.table.wavelength_range,
             self.wavelength,
-            partial(reflector_of, self.boundary, self.coat),
+            partial(reflectors_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
             beneath=nested is not None,
+            place=material.thickness.place
+            if isinstance(material := self.boundary.material, UnderFilm)
+            and material.thickness.texture
+            else None,
         )
         self.ready()
 
@@ -327,6 +335,7 @@ class Diffraction(DiffractingSurface):
             getattr(material, "reflects_all", False),
             getattr(material, "sums", None),
             material.tint is None,
+            str(material.thickness.texture) if isinstance(material, UnderFilm) else "",
         )
         own = self.vcavity, self.coat is None, self.energy.kernel_constants()
         return *super().kernel_constants(), *own, *other_kernels

@@ -125,7 +125,7 @@ class DiffractionDielectric(DiffractingSurface):
         self.inner_boundary = self.boundary.of(Inside(material, self.thin))
         self.mirror = Boundary(KIRCHHOFF, material)
         self.energy = EnergyModel(
-            self.table,
+            self.table.wavelength_range,
             self.wavelength,
             partial(dielectric_of, self.boundary, material, self.thin),
             conserving=self.energy_conserving,

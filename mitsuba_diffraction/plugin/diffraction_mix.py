@@ -1,18 +1,20 @@
 """The Mitsuba BSDF plugin `diffraction_mix`: several surfaces in one, by weights.
 
-Back and belly of a snake, worn scales and fresh ones: f = Σ w f / Σ w over its nested BSDFs. A
-surface is evaluated only where its weight is above 0, and one that is alone at a point is drawn
-from and evaluated once; `blendbsdf` evaluates both everywhere.
+Back and belly of a snake, worn scales and fresh ones.
 
+The surfaces
+------------
 NAME : BSDF ∂
     Two surfaces or more, each with a name.
-weight_NAME : float or texture ∂ [what the others leave of 1]
-    Of the surface of that name, at least 0: a number, a bitmap (raw) or another texture or mesh
-    attribute of one channel. One surface may have none. All must not be 0 at one point; where mesh
-    attributes are, it is black.
+weight_NAME : float or texture ∂ [the rest of 1]
+    Number from 0 on, raw texture or mesh attribute of one channel. Not all may be 0 at a point;
+    mesh attributes make it black.
 depth : float or texture ∂
-    In place of all weights, for surfaces of type `diffraction_orders` that are one profile at
-    several depths: µm, between theirs. The light is interpolated between the two nearest.
+    Instead, for `diffraction_orders` of one profile at several depths: µm, between theirs.
+
+The model is f = Σ w f / Σ w. Where a weight is 0 its surface is not evaluated.
+
+XML and the same in Python:
 
     <bsdf type="diffraction_mix">
         <bsdf type="diffraction" name="back"> ... </bsdf>

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import drjit as dr
 import mitsuba as mi
@@ -17,7 +17,7 @@ from .arithmetic import clip, float_of, index_of
 from .directions import Site
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
-from .types import Buffer, Float, Index, Vector2f, Vector3f
+from .types import Buffer, Float, Index, Interaction, Vector2f, Vector3f
 
 Array = NDArray[np.float32]
 
@@ -34,6 +34,7 @@ class DirectionLookup:
     Parameters
     ----------
     tables : of one or two sides, at evenly spaced height scales, `nodes`.
+    place : function that returns another coordinate of `nodes` than the height scale, at hits.
     """
 
     def __init__(
@@ -41,8 +42,10 @@ class DirectionLookup:
         tables: Sequence[Sequence[DirectionalTable]],
         nodes: list[float],
         scales: ScaleRange,
+        place: Callable[[Interaction], Float] | None = None,
     ) -> None:
-        height_scale, varies = scales.height_scale, scales.varies
+        height_scale, varies = scales.height_scale, scales.varies or place is not None
+        self._coordinate = place
         maps = np.stack([[_cells(side, scales.centre) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
@@ -66,9 +69,12 @@ class DirectionLookup:
         frame, wavenumbers = site.frame, site.wavenumbers
         cosine = mi.Frame3f.cos_theta(direction)
         tangential, share = frame.turned(direction), None
-        height_scale = site.scale * dr.rcp(frame.stretch)
-        if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
-            share = (height_scale - self._low) * self._slope
+        if self._coordinate is None:
+            place = site.scale * dr.rcp(frame.stretch)
+        else:
+            place = self._coordinate(site.si)
+        if self._nodes is not None and (self._varies or dr.grad_enabled(place)):
+            share = (place - self._low) * self._slope
         both = self._sides == 2
         cell, s, t = self._cell(*self._place(tangential, dr.abs(cosine) if both else cosine))
         if both:
@@ -134,9 +140,24 @@ def at_horizon(cosine: Float) -> Float:
 def scales_of(
     tables: Sequence[Sequence[DirectionalTable] | None],
 ) -> Sequence[Sequence[DirectionalTable]] | None:
-    """Scales of all sides at several height scales, 1 where there is none; None if all are 1."""
-    some = next((sides for sides in tables if sides is not None), None)
-    return None if some is None else [sides or ones_like(some) for sides in tables]
+    """Scales of all sides at several nodes, 1 where there is none; None if all are 1.
+
+    They have the wavelengths of those that have most.
+    """
+    present = [sides for sides in tables if sides is not None]
+    if not present:
+        return None
+    finest = max(present, key=lambda sides: len(sides[0].wavelengths))
+    light = finest[0].wavelengths
+    return [
+        [side if len(side.wavelengths) == len(light) else _at_light(side, light) for side in sides]
+        for sides in (sides or ones_like(finest) for sides in tables)
+    ]
+
+
+def _at_light(table: DirectionalTable, wavelengths: NDArray[np.float64]) -> DirectionalTable:
+    """Interpolate to other wavelengths, nm."""
+    return DirectionalTable(wavelengths, np.stack([table.page(nm) for nm in wavelengths.tolist()]))
 
 
 def ones_like(sides: Sequence[DirectionalTable]) -> list[DirectionalTable]:

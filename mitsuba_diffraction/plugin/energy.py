@@ -8,7 +8,7 @@ albedo a reaches a nested BSDF.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -29,8 +29,8 @@ from .boundary import Boundary
 from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of
 from .directions import Site
 from .energy_factors import ScaleRange
-from .materials import Dielectric, Material
-from .types import Colour, Vector3f
+from .materials import Dielectric, IndexAt
+from .types import Colour, Float, Interaction, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the ratio of albedos as constants.
@@ -41,10 +41,13 @@ FILM_PHASE = 0.02
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 
-#: Material of a surface, from the factor on its lengths (`ScaleRange.centre`) and wavelengths, nm.
-MaterialOf = Callable[[float, tuple[float, float]], conserved.Reflector | conserved.Transmitter]
-#: Function of direction in a `Conservation`, by side; None where it is 1 everywhere.
-SidesOf = Callable[[Conservation], list[DirectionalTable] | None]
+#: Material of a surface, or materials evenly along its `place`, from the factor on its lengths
+#: (`ScaleRange.centre`) and wavelengths, nm.
+MaterialsOf = Callable[
+    [float, tuple[float, float]], Sequence[conserved.Reflector | conserved.Transmitter]
+]
+#: Function of direction in a `Conservation` of an energy, by side; None where it is 1 everywhere.
+SidesOf = Callable[[Energy, Conservation], list[DirectionalTable] | None]
 
 
 class EnergyModel:
@@ -52,66 +55,84 @@ class EnergyModel:
 
     Parameters
     ----------
-    table : of the BSDF, the mean over all positions of the window.
-    wavelength : nm, for mono variants.
-    material_of : `reflector_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
+    wavelength_range : of the table, nm; wavelength : nm, for mono variants.
+    materials_of : `reflectors_of` or `dielectric_of`. A reference to the BSDF would be a cycle, and
         keep the table.
     conserving : whether light is multiplied by s.
     beneath : whether light that is not reflected goes on to a nested BSDF, by the albedo.
+    place : function that returns the place, 0 to 1, among several materials at hits.
     """
 
     def __init__(
         self,
-        table: DiffractionTable,
+        wavelength_range: tuple[float, float],
         wavelength: float,
-        material_of: MaterialOf,
+        materials_of: MaterialsOf,
         *,
         conserving: bool,
         beneath: bool = False,
+        place: Callable[[Interaction], Float] | None = None,
     ) -> None:
         mono = wavelength, wavelength
-        self._table, self._material_of = table, material_of
-        self._range = mono if mi.is_monochromatic else table.wavelength_range
+        self._materials_of, self._place = materials_of, place
+        self._range = mono if mi.is_monochromatic else wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
         self._ratio: DirectionLookup | None = None
         self._ones: list[DirectionalTable] | None = None
 
-    def update(self, factors: ScaleRange) -> None:
-        """Look up, or compute, what belongs to other factors or another material.
+    def update(self, table: DiffractionTable, factors: ScaleRange) -> None:
+        """Look up, or compute, what belongs to a table, factors on it and the material.
+
+        table : of the BSDF, the mean over all positions of the window.
 
         Values are linear between height scales, 1 among them. At a height scale their derivative
         is taken from the interval above. While derivatives are taken, scales of 1 stand for none
         after there were some: an optimisation compiles no other kernel.
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
-        material = self._material_of(factors.centre, self._range)
-        self._both_sides = isinstance(material, conserved.Transmitter)
-        self._energy = Energy(self._table, material, wavelengths, factors.least)
-        nodes = factors.nodes(self._energy) if self.conserving or self.beneath else []
-        energies = [self._energy.at(node) for node in nodes]
+        materials = self._materials_of(factors.centre, self._range)
+        self._both_sides = isinstance(materials[0], conserved.Transmitter)
+        self._energies = [
+            Energy(table, material, wavelengths, factors.least) for material in materials
+        ]
         if self.conserving:
-            scales = scales_of([energy.scales for energy in energies])
+            nodes, scales = self._nodes(_scales_of)
             if scales is None and factors.differentiable and self._ones is not None:
                 scales = [self._ones] * len(nodes)
             if scales is not None and factors.differentiable:
                 self._ones = ones_like(scales[0])
-            self._scale = None if scales is None else DirectionLookup(scales, nodes, factors)
+            self._scale = (
+                None if scales is None else DirectionLookup(scales, nodes, factors, self._place)
+            )
         if self.beneath:
-            ratios = [self._ratio_of(energy) for energy in energies]
-            self._ratio = DirectionLookup(ratios, nodes, factors)
+            nodes, ratios = self._nodes(_ratio_of)
+            assert ratios is not None
+            self._ratio = DirectionLookup(ratios, nodes, factors, self._place)
+
+    def _nodes(
+        self, sides_of: SidesOf
+    ) -> tuple[list[float], Sequence[Sequence[DirectionalTable]] | None]:
+        """Return nodes, of height scales or of the place, and a function's tables at them."""
+        if self._place is None:
+            (energy,) = self._energies
+            nodes = self._factors.nodes(energy)
+            return nodes, scales_of([sides_of(energy, energy.at(node)) for node in nodes])
+        height = self._factors.height_scale
+        places = np.linspace(0.0, 1.0, len(self._energies)).tolist()
+        return places, scales_of([_at_height(each, sides_of, height) for each in self._energies])
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
 
-        def fine(energy: Conservation) -> list[DirectionalTable] | None:
-            return energy.scales and [side.on(FINE) for side in energy.scales]
+        def fine(energy: Energy, found: Conservation) -> list[DirectionalTable] | None:
+            return found.scales and [side.on(FINE) for side in found.scales]
 
         return self._tabulated(fine, height_scale) if self.conserving else None
 
     def ratio(self, height_scale: float) -> DirectionalTable | None:
         """Return the table of `reflected`, for shaders; None where it is 1."""
-        return self._tabulated(self._ratio_of, height_scale) if self.beneath else None
+        return self._tabulated(_ratio_of, height_scale) if self.beneath else None
 
     @property
     def scales(self) -> bool:
@@ -138,43 +159,64 @@ class EnergyModel:
             return mi.UnpolarizedSpectrum(1.0)
         return mi.UnpolarizedSpectrum(self._ratio.at(direction, site))
 
-    def _ratio_of(self, energy: Conservation) -> list[DirectionalTable]:
-        albedo, material = energy.albedo, self._energy.material
-        assert albedo is not None
-        assert isinstance(material, conserved.Reflector)
-        index: Any = material.index(albedo.wavelengths)
-        cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
-        flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
-        flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
-        # of an index of 1 there is neither
-        ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
-        values = albedo.values * ratio
-        if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
-            values = np.minimum(values, MOST_RATIO)
-        return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
-
     def _tabulated(self, sides_of: SidesOf, height_scale: float) -> DirectionalTable | None:
-        """Return the function that a look-up shows above the surface; None where it is 1."""
+        """Return the function that a look-up shows above the surface; None where it is 1.
+
+        Where the material varies, that at place 0: no shader shows it.
+        """
         centre = self._factors.centre
-        height_scale /= centre
-        nodes = self._energy.nodes(height_scale, height_scale)
-        tables = scales_of([sides_of(self._energy.at(node)) for node in nodes])
-        if tables is None:
+        sides = _at_height(self._energies[0], sides_of, height_scale / centre)
+        if sides is None:
             return None
-        table = between([sides[0] for sides in tables], nodes, height_scale)
-        return DirectionalTable(table.wavelengths * centre, table.values)
+        return DirectionalTable(sides[0].wavelengths * centre, sides[0].values)
 
 
-def reflector_of(
+def _at_height(
+    energy: Energy, sides_of: SidesOf, height_scale: float
+) -> list[DirectionalTable] | None:
+    """Interpolate a function between the nodes around a height scale; None where it is 1."""
+    nodes = energy.nodes(height_scale, height_scale)
+    tables = scales_of([sides_of(energy, energy.at(node)) for node in nodes])
+    if tables is None:
+        return None
+    return [between(side, nodes, height_scale) for side in zip(*tables, strict=True)]
+
+
+def _scales_of(energy: Energy, found: Conservation) -> list[DirectionalTable] | None:
+    return found.scales
+
+
+def _ratio_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
+    """Return the albedo over the flat reflectance (`SidesOf`)."""
+    albedo, material = found.albedo, energy.material
+    assert albedo is not None
+    assert isinstance(material, conserved.Reflector)
+    index: Any = material.index(albedo.wavelengths)
+    cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
+    flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
+    flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
+    # of an index of 1 there is neither
+    ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
+    values = albedo.values * ratio
+    if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
+        values = np.minimum(values, MOST_RATIO)
+    return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
+
+
+def reflectors_of(
     boundary: Boundary,
     coat: Dielectric | None,
     centre: float,
     wavelength_range: tuple[float, float],
-) -> conserved.Reflector:
-    """Return the material of a surface that reflects, under a coat or none (`MaterialOf`)."""
+) -> list[conserved.Reflector]:
+    """Return the materials of a surface that reflects, under a coat or none (`MaterialsOf`)."""
     index = 1.0 if coat is None else float(rounded_index(plain(coat.eta), COAT_STEP))
-    indices = partial(_rounded_indices, boundary.material, centre, wavelength_range)
-    return conserved.Reflector(boundary.model.name, indices, index)
+    return [
+        conserved.Reflector(
+            boundary.model.name, partial(_rounded_indices, at, centre, wavelength_range), index
+        )
+        for at in boundary.material.everywhere()
+    ]
 
 
 def dielectric_of(
@@ -183,23 +225,24 @@ def dielectric_of(
     thin: bool,
     centre: float,
     wavelength_range: tuple[float, float],
-) -> conserved.Transmitter:
-    """Return the material of an interface or a thin sheet (`MaterialOf`)."""
+) -> list[conserved.Transmitter]:
+    """Return the material of an interface or a thin sheet (`MaterialsOf`)."""
     index = float(rounded_index(plain(material.eta), DIELECTRIC_STEP))
-    return conserved.Transmitter(index, boundary.model.name, thin)
+    return [conserved.Transmitter(index, boundary.model.name, thin)]
 
 
 def _rounded_indices(
-    material: Material,
+    at: IndexAt,
     centre: float,
     wavelength_range: tuple[float, float],
     wavelengths: NDArray[np.float64],
 ) -> Any:
     """Return indices to `INDEX_STEP`, of the light that tables have at these wavelengths.
 
+    at : `Material.at` of a place.
     centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
     """
-    exact = material.at(np.clip(wavelengths * centre, *wavelength_range))
+    exact = at(np.clip(wavelengths * centre, *wavelength_range))
     if exact is None or isinstance(exact, Stacked):
         return exact
     if isinstance(exact, fresnel.Filmed):

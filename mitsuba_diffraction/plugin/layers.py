@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import drjit as dr
 import mitsuba as mi
@@ -21,9 +22,10 @@ from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
 from .arithmetic import plain
 from .description import Feature
-from .materials import INDEX_PARTS, Dielectric, Material
+from .materials import INDEX_PARTS, Dielectric, IndexAt, Material
 from .parameter_changes import Bounded
-from .types import Colour, Float, Interaction, Mask, Number
+from .types import Colour, Float, Interaction, Mask, Number, Texture
+from .varying import Varying
 
 
 class UnderCoat(Material):
@@ -53,6 +55,10 @@ class UnderCoat(Material):
 COHERENCE = 12e3
 #: A film's thickness is rounded to this, nm, for scales of energy.
 THICKNESS_STEP = 1.0
+#: The same while derivatives by the thickness are taken: each step costs seconds.
+OPTIMISED_STEP = 5.0
+#: Thicknesses, in a fringe of the shortest wavelength, between which scales of energy are linear.
+FRINGE = 6
 #: Power that comes back of light that would see the material alone, below which nobody sees it.
 LEAST_THROUGH = 1e-6
 
@@ -90,6 +96,46 @@ class Channels:
         ]
 
 
+class Thickness(Varying):
+    """Thickness of a film, nm: a number, or by a texture of 0 to 1 between two thicknesses.
+
+    Parameters
+    ----------
+    value : number, or raw texture or mesh attribute of one channel.
+    ends : thicknesses where a texture is 0 and 1.
+    """
+
+    def __init__(self, value: float | Texture, ends: tuple[float, float]) -> None:
+        self._ends = ends
+        self._first, self._rise = mi.Float(ends[0]), mi.Float(ends[1] - ends[0])
+        dr.make_opaque(self._first, self._rise)
+        high, unit = (1.0, "") if isinstance(value, mi.Texture) else (COHERENCE, " nm")
+        super().__init__("film_thickness", value, 0.0, high, unit=unit)
+
+    def at(self, si: Interaction, active: Mask) -> Float:
+        """See `Varying.at`."""
+        value = super().at(si, active)
+        return value if self.texture is None else dr.fma(value, self._rise, self._first)
+
+    def place(self, si: Interaction) -> Float:
+        """Return a texture's value."""
+        return super().at(si, True)
+
+    def places(self, step: float) -> list[float]:
+        """Return thicknesses, `step` apart at most, at even values of a texture from 0 to 1."""
+        first, last = self._ends
+        return np.linspace(first, last, 2 + math.floor(abs(last - first) / step)).tolist()
+
+    @property
+    def number(self) -> float:
+        """The thickness, or the largest of a texture's."""
+        return super().number if self.texture is None else max(self._ends)
+
+    def range(self) -> tuple[float, float]:
+        """Return the smallest and the largest thickness."""
+        return super().range() if self.texture is None else (min(self._ends), max(self._ends))
+
+
 class UnderFilm(Material):
     """Material under a film.
 
@@ -98,9 +144,9 @@ class UnderFilm(Material):
     material : the material itself.
     film : the real part of the film's index, relative to the medium above it.
     k : its imaginary part.
-    thickness : nm.
+    thickness : of the film.
     wavelength : nm, of mono variants.
-    shortest : shortest wavelength that the table serves, nm.
+    wavelength_range : shortest and longest wavelength that the table serves, nm.
     """
 
     layer = Feature.FILM
@@ -110,18 +156,17 @@ class UnderFilm(Material):
         material: Material,
         film: Dielectric,
         k: float,
-        thickness: float,
+        thickness: Thickness,
         wavelength: float,
-        shortest: float,
+        wavelength_range: tuple[float, float],
     ) -> None:
         self.material: Material = material
         self.film, self._fixed = film, mi.Float(wavelength)
         dr.make_opaque(self._fixed)
-        self._shortest = shortest
+        self._range, self.thickness = wavelength_range, thickness
         self._k = Bounded("film_k", k, *INDEX_PARTS["k"], _k_refusal)
-        self._thickness = Bounded("film_thickness", thickness, 0.0, math.inf, _thickness_refusal)
-        self.changeable = (*material.changeable, *film.changeable, self._k, self._thickness)
-        self.k, self.thickness = self._k.value, self._thickness.value
+        self.changeable = (*material.changeable, *film.changeable, self._k, *thickness.changeable)
+        self.k = self._k.value
         self.sums: Channels | None = None
         self._path = -1.0
         self.derive()
@@ -134,7 +179,8 @@ class UnderFilm(Material):
             indices = _between(indices, self.sums.wavelengths)
         elif len(indices) == 1:
             indices *= len(waves)
-        film, depth = mi.Complex2f(self.film.eta, self.k), self.thickness * (2.0 * dr.pi)
+        film = mi.Complex2f(self.film.eta, self.k)
+        depth = self.thickness.at(si, active) * (2.0 * dr.pi)
         return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(indices, waves, strict=True)]
 
     def channels(self, values: list[Float]) -> Colour:
@@ -148,13 +194,28 @@ class UnderFilm(Material):
         return [mi.Float(k) for k in wavenumber(self.sums.wavelengths).tolist()]
 
     def at(self, wavelengths: NDArray[np.float64]) -> Filmed:
-        """See `Material.at`; the thickness to `THICKNESS_STEP`."""
-        film, thickness = self.numbers()
+        """See `Material.at`; of the largest thickness, to `THICKNESS_STEP`."""
+        return self._of_thickness(self.thickness.number, wavelengths)
+
+    def everywhere(self) -> list[IndexAt]:
+        """See `Material.everywhere`."""
+        if self.thickness.texture is None and self.thickness.differentiable:
+            steps = max(round(self.thickness.number / OPTIMISED_STEP), 1)
+            return [partial(self._of_thickness, steps * OPTIMISED_STEP)]
+        if self.thickness.texture is None:
+            return [self.at]
+        fringe = self._range[0] / (2.0 * self.numbers()[0].real)
+        return [partial(self._of_thickness, d) for d in self.thickness.places(fringe / FRINGE)]
+
+    def _of_thickness(self, thickness: float, wavelengths: NDArray[np.float64]) -> Filmed:
         rounded = round(thickness / THICKNESS_STEP) * THICKNESS_STEP
-        return Filmed(self.material.at(wavelengths), film, 2.0 * np.pi * rounded / wavelengths)
+        depth = 2.0 * np.pi * rounded / wavelengths
+        return Filmed(self.material.at(wavelengths), self.numbers()[0], depth)
 
     def refusal(self) -> str | None:
         """Reason why the film is too thick to interfere or opaque, or None."""
+        if refused := self.thickness.refusal():
+            return refused
         index, thickness = self.numbers()
         if 2.0 * index.real * thickness > COHERENCE:
             return (
@@ -162,7 +223,7 @@ class UnderFilm(Material):
                 f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 "
                 "nm); a thicker layer is a coat: coat_ior"
             )
-        if math.exp(-8.0 * math.pi * index.imag * thickness / self._shortest) < LEAST_THROUGH:
+        if math.exp(-8.0 * math.pi * index.imag * thickness / self._range[0]) < LEAST_THROUGH:
             return (
                 f"film_k={index.imag:g} at film_thickness={thickness:g} nm absorbs all light on "
                 "its way to the material beneath; give the film's index as the material, eta and k"
@@ -173,7 +234,7 @@ class UnderFilm(Material):
         """Derive what depends on indices and thickness: in RGB variants, the wavelengths summed."""
         self.material.derive()
         self.film.derive()
-        path = 2.0 * plain(self.film.eta) * plain(self.thickness)
+        path = 2.0 * plain(self.film.eta) * self.thickness.number
         # Fewer fringes need no other kernels
         if mi.is_rgb and path > self._path:
             self._path, self.sums = path, Channels.of(path)
@@ -184,8 +245,8 @@ class UnderFilm(Material):
         return plain(self.k) > 0.0
 
     def numbers(self) -> tuple[complex, float]:
-        """The film's index and its thickness, nm."""
-        return complex(plain(self.film.eta), plain(self.k)), plain(self.thickness)
+        """The film's index and its thickness, the largest where it varies, nm."""
+        return complex(plain(self.film.eta), plain(self.k)), self.thickness.number
 
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if self.sums is not None:
@@ -193,17 +254,13 @@ class UnderFilm(Material):
         return list(si.wavelengths) if mi.is_spectral else [self._fixed]
 
     def __str__(self) -> str:
-        index, thickness = self.numbers()
-        return f"{self.material} under film[eta = {index:.5g}, {thickness:.5g} nm]"
+        ends = " to ".join(f"{d:.5g}" for d in dict.fromkeys(self.thickness.range()))
+        return f"{self.material} under film[eta = {self.numbers()[0]:.5g}, {ends} nm]"
 
 
 def _k_refusal(value: float) -> str:
     low, high = INDEX_PARTS["k"]
     return f"film_k={value:g} must be between {low:g} and {high:g}: the film's index is n + ik"
-
-
-def _thickness_refusal(value: float) -> str:
-    return f"film_thickness={value:g} nm must be at least 0"
 
 
 def _complex(index: Number) -> Number:

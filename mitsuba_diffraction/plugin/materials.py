@@ -5,6 +5,7 @@ Materials under a film, a coat or a stack (`layers`, `stack`) are materials, too
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -30,6 +31,8 @@ INDICES = (1e-3, 1e3)
 INDEX_PARTS = {"eta": INDICES, "k": (0.0, INDICES[1])}
 
 Array = NDArray[Any]
+#: Index of a material at wavelengths (n,), nm, as `Material.at`.
+IndexAt = Callable[[Array], Any]
 #: Wavelengths of a metal's spectrum that its colour is made of, nm.
 _VISIBLE = np.arange(380.0, 780.0)
 #: Wavelengths that a table of optical constants has to cover, nm. Daylight beyond is 0.3 % of what
@@ -94,6 +97,10 @@ class Material:
             return np.broadcast_to(values, wavelengths.shape)
         colours = np.broadcast_to(np.ravel(indices[0]), len(RGB_WAVELENGTHS))
         return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
+
+    def everywhere(self) -> list[IndexAt]:
+        """Return `at`; or, of a film of varying thickness, one for each of even places."""
+        return [self.at]
 
     def refusal(self) -> str | None:
         """Reason why parameters that are allowed each by itself are refused together, or None."""

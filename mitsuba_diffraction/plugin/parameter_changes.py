@@ -84,6 +84,62 @@ class Bounded:
         callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
 
 
+class Heights:
+    """Heights given as `data`: another table is made where they change.
+
+    Derivatives by heights are of `md.design`: a table has none.
+
+    Parameters
+    ----------
+    name : for `mi.traverse`.
+    heights : µm, shape (ny, nx).
+    make : function of heights that returns what is made of them, or refuses them.
+    """
+
+    def __init__(
+        self, name: str, heights: NDArray[np.float64], make: Callable[[NDArray[np.float64]], Any]
+    ) -> None:
+        self._values, self._loaded = mi.TensorXf(heights), heights
+        self._name, self._make = name, make
+        self._first = self._kept = self._served = self._numbers()
+
+    def _numbers(self) -> NDArray[Any]:
+        return np.array(dr.detach(self._values))
+
+    def made(self) -> Any:
+        """Return what is made of other heights than before; None of the same."""
+        numbers = self._numbers()
+        if np.array_equal(numbers, self._served):
+            return None
+        as_loaded = np.array_equal(numbers, self._first)  # then in double precision
+        made = self._make(self._loaded if as_loaded else numbers.astype(np.float64))
+        self._served = numbers
+        return made
+
+    def refusal(self) -> str | None:
+        """See `Changeable.refusal`."""
+        if dr.grad_enabled(self._values):
+            return f"{self._name} has no derivatives in a rendering; md.design has them"
+        if self._values.shape == self._kept.shape:
+            return None
+        shape, kept = (
+            " × ".join(map(str, each)) for each in (self._values.shape, self._kept.shape)
+        )
+        return f"{self._name} of {shape} heights must be of {kept}, as loaded; load the plugin anew"
+
+    def restore(self) -> None:
+        """See `Changeable.restore`."""
+        mi.set_property(self._values, mi.TensorXf(self._kept))
+
+    def keep(self) -> None:
+        """See `Changeable.keep`."""
+        self._kept = self._numbers()
+
+    def traverse(self, callback: Callback) -> None:
+        """See `Changeable.traverse`."""
+        callback.put(self._name, self._values, mi.ParamFlags.NonDifferentiable)
+
+
 class ObjectValues:
     """All values of one of Mitsuba's objects: a spectrum, a texture or a nested BSDF.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import mitsuba as mi
 
 from ..errors import DiffractionError, warn
+from ..files import readable_file
 from ..heights.lengths import numbers_of
 from ..heights.read import LoadOptions
 from ..llvm import require_loaded_llvm
@@ -22,10 +23,10 @@ from ..tables.table import DiffractionTable
 from .arithmetic import plain
 from .description import Feature
 from .dictionary import ORDERS, PLUGINS
-from .layers import UnderFilm
+from .layers import Thickness, UnderFilm
 from .materials import INDEX_PARTS, Conductor, Dielectric, Material, Perfect
 from .parameter_changes import ObjectValues
-from .pigment import pigment_bsdf
+from .pigment import PICTURES, pigment_bsdf
 from .properties import choice, class_of, number
 from .stack import UnderStack, read_layers
 from .types import BSDF, Properties
@@ -42,11 +43,8 @@ TABLE = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: Layers, pigment and medium that "none" leaves out, so that a scene can have a parameter for them.
 OPTIONAL = ("coat_ior", "film_ior", "layers", "ext_ior", "pigment")
-# End of the message on a film whose thickness is a texture
-_UNEVEN_FILM = (
-    "; for an uneven film, weight surfaces with films of several thicknesses by textures "
-    "in a diffraction_mix"
-)
+#: Thicknesses, nm, where a texture of film_thickness is 0 and 1.
+FILM_ENDS = ("film_thickness_min", "film_thickness_max")
 #: µm a unit; beyond, single precision holds positions on the surface to no better than 1 µm.
 MOST_UV_SCALE = 1e7
 #: nm, of mono variants.
@@ -68,7 +66,7 @@ _COMMON = (
 NAMES: Mapping[str, tuple[str, ...]] = {
     REFLECTING: (
         *_COMMON, *PLACING, "material", "eta", "k", "coat_ior", "film_ior", "film_k",
-        "film_thickness", "layers", "pigment", "shadowing",
+        "film_thickness", *FILM_ENDS, "layers", "pigment", "shadowing",
     ),
     TRANSMITTING: (*_COMMON, "thin"),
     ORDERS: (*SOURCES, "coherence_width", "orientation", "wavelength"),
@@ -81,6 +79,7 @@ _EXCLUDED = (
     (Feature.NESTED, Feature.MIRROR), (Feature.NESTED, Feature.OPAQUE),
     (Feature.NESTED, Feature.TRANSMISSION), (Feature.PLACED, Feature.TRANSMISSION),
     (Feature.PLACED, Feature.COLOURS),
+    (Feature.VARYING_FILM, Feature.VARYING_HEIGHT), (Feature.VARYING_FILM, Feature.VARYING_LENGTH),
 )  # fmt: skip
 
 
@@ -158,7 +157,11 @@ def _unknown(name: str, plugin: str) -> str:
 
 def check_combination(props: Properties, material: Material, nested: BSDF | None) -> None:
     """Refuse features of a scene that exclude each other, naming both."""
+    textures = {name for name, value in props.objects() if isinstance(value, mi.Texture)}
     chosen = {
+        Feature.VARYING_FILM: FILM_ENDS[1] in props,
+        Feature.VARYING_HEIGHT: "height_scale" in textures,
+        Feature.VARYING_LENGTH: "lateral_scale" in textures,
         Feature.NESTED: nested is not None,
         Feature.COAT: "coat_ior" in props,
         Feature.FILM: "film_ior" in props,
@@ -282,7 +285,8 @@ def layered(props: Properties, material: Material, table: DiffractionTable) -> M
         layers = read_layers(Path(str(mi.file_resolver().resolve(name))))
         medium = plain(Dielectric(_above(props), 1.0).eta)
         return UnderStack(material, layers, medium, wavelength, table.wavelength_range)
-    parameters = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
+    names = "film_ior", "film_k", "film_thickness", *FILM_ENDS
+    parameters = [name for name in names if name in props]
     if not parameters:
         return material
     if not {"film_ior", "film_thickness"} <= set(parameters):
@@ -292,12 +296,42 @@ def layered(props: Properties, material: Material, table: DiffractionTable) -> M
     if isinstance(material, Perfect):
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")
     film = Dielectric(read_index(props, "film_ior"), _above(props), "film_eta")
-    k, thickness = number(props, "film_k", 0.0), number(props, "film_thickness", 0.0, _UNEVEN_FILM)
-    filmed = UnderFilm(material, film, k, thickness, wavelength, table.wavelength_range[0])
+    k, thickness = number(props, "film_k", 0.0), thickness_of(props)
+    filmed = UnderFilm(material, film, k, thickness, wavelength, table.wavelength_range)
     for refused in (*(parameter.refusal() for parameter in filmed.changeable), filmed.refusal()):
         if refused:
             raise DiffractionError(refused)
     return filmed
+
+
+def thickness_of(props: Properties) -> Thickness:
+    """Return the thickness of a film: a number, or a texture of 0 to 1 between two of them.
+
+    The name of a picture stands for its texture.
+
+    Raises a DiffractionError if a texture lacks its thicknesses, or a number has them.
+    """
+    name, ends = "film_thickness", [each for each in FILM_ENDS if each in props]
+    value = dict(props.objects()).get(name)
+    text = str(props.get(name)) if value is None else ""
+    if Path(text).suffix.lower() in PICTURES:
+        file = readable_file(resolved_path(text, name))
+        value = mi.load_dict({"type": "bitmap", "filename": str(file), "raw": True})
+    if isinstance(value, mi.Texture):
+        if FILM_ENDS[1] not in ends:
+            raise DiffractionError(
+                f"{name} is a texture of 0 to 1 between {FILM_ENDS[0]} (0 by default) and "
+                f"{FILM_ENDS[1]}; give {FILM_ENDS[1]}, the thickness where it is 1, in nm"
+            )
+        first, last = (number(props, each, 0.0) for each in FILM_ENDS)
+        for each, end in zip(FILM_ENDS, (first, last), strict=True):
+            if end < 0.0:
+                raise DiffractionError(f"{each}={end:g} nm must be at least 0 nm")
+        return Thickness(value, (first, last))
+    if ends:
+        raise DiffractionError(f"{ends[0]} is for a {name} that is a texture")
+    advice = f", a texture, or a picture ({', '.join(PICTURES)}) of 0 to 1"
+    return Thickness(number(props, name, 0.0, advice), (0.0, 0.0))
 
 
 def warn_of_film(material: Material, table: DiffractionTable, scale: float) -> None:

@@ -93,30 +93,38 @@ def _reflectance(text: str) -> dict[str, Any]:
     if Path(text).suffix.lower() in PICTURES:
         return {"type": "bitmap", "filename": str(readable_file(text).absolute())}
     if Path(text).suffix.lower() in GLTF:
-        return _base_colour(readable_file(text))
+        return base_colour(readable_file(text), f"pigment='{text}'")
     colour = _colour(text)
     if len(set(colour)) == 1:
         return {"type": "uniform", "value": colour[0]}
     return {"type": "rgb", "value": colour}
 
 
-def _base_colour(file: Path) -> dict[str, Any]:
+def base_colour(file: Path, shown: str, number: int | None = None) -> dict[str, Any]:
     """Return the base colour of a glTF file's material: factor, times a texture if it has one.
 
-    Linear values, as glTF 2.0 (Khronos 2021), section 3.9.2, defines factor and texture.
+    Linear values, as glTF 2.0 (Khronos 2021), section 3.9.2, defines factor and texture; white of
+    triangles without a material.
+
+    shown : the file, for messages.
+    number : of the material; None takes the only one.
     """
-    trimesh = optional("trimesh", f"pigment='{file}'")
+    trimesh = optional("trimesh", shown)
     try:
-        meshes = load_gltf(file, f"pigment='{file}'", materials=True).geometry.values()
+        meshes = load_gltf(file, shown, materials=True).geometry.values()
     except DiffractionError:
         raise
     except Exception as error:  # whatever the package makes of damaged files
-        raise DiffractionError(f"pigment='{file}': cannot be read as glTF") from error
+        raise DiffractionError(f"{shown}: cannot be read as glTF") from error
     materials = {id(m): m for mesh in meshes if (m := getattr(mesh.visual, "material", None))}
     own = [m for m in materials.values() if isinstance(m, trimesh.visual.material.PBRMaterial)]
-    if len(own) != 1:
+    if number is not None:
+        own = [m for m in own if m.name == str(number)]
+        if not own:
+            return {"type": "rgb", "value": [1.0, 1.0, 1.0]}
+    elif len(own) != 1:
         raise DiffractionError(
-            f"pigment='{file}': it has {len(own)} materials, and a pigment is one; bake their base "
+            f"{shown}: it has {len(own)} materials, and a pigment is one; bake their base "
             "colours into a picture, and give that"
         )
     given = own[0].baseColorFactor
@@ -126,9 +134,8 @@ def _base_colour(file: Path) -> dict[str, Any]:
         return {"type": "rgb", "value": factor.tolist()}
     if picture.format not in FORMATS:
         raise DiffractionError(
-            f"pigment='{file}': its picture is none of {', '.join(FORMATS)}; save it as PNG"
+            f"{shown}: its picture is none of {', '.join(FORMATS)}; save it as PNG"
         )
-    shown = f"pigment='{file}'"
     check_content(24.0 * picture.width * picture.height, file.stat().st_size, shown)
     try:
         levels = np.asarray(picture.convert("RGB"))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError, warn
 from ..files import FileKind
@@ -18,6 +20,7 @@ from ..settings import SURFACE, checked
 from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import Data
+from .parameter_changes import Heights
 from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
 from .types import Properties
 
@@ -26,10 +29,15 @@ SHORTEST_WAVELENGTH = 360.0
 
 
 class Patch(NamedTuple):
-    """Table of a scene, and function that reads the heights that the table is made of."""
+    """Table of a scene, and the heights that it is made of.
+
+    heights : function that reads them.
+    given : heights that came as `data`, which may change; None of a file or a table.
+    """
 
     table: DiffractionTable
     heights: Callable[[], HeightField]
+    given: Heights | None = None
 
 
 def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
@@ -59,11 +67,16 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
         _check_table(table, shown, options, asked, height_scale, stretch)
         return Patch(table, partial(_no_heights, shown))
     if name == "data":
-        source = TableSource.of(_heights_of(value, options))
-    elif isinstance(value, str):
-        source = TableSource.of(resolved_path(value, name), options)
-    else:
+        field = _heights_of(value, options)
+
+        def patch_of(heights: NDArray[np.float64]) -> Patch:
+            given = replace(field, heights=heights)
+            return _built(TableSource.of(treat(given, options)), asked, height_scale, stretch)
+
+        return patch_of(field.heights)._replace(given=Heights("data", field.heights, patch_of))
+    if not isinstance(value, str):
         raise DiffractionError(f"{name}={value!r} must be the name of a file")
+    source = TableSource.of(resolved_path(value, name), options)
     if source.kind is FileKind.ORDERS:
         raise DiffractionError(
             f"'{source.path}' is a table of orders, which the BSDF 'diffraction_orders' has as its "
@@ -72,9 +85,26 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
     if source.kind is FileKind.TABLE:
         table = loaded_table(source.files[0])
         _check_table(table, str(source.path), options, asked, height_scale, stretch)
-    else:
-        settings = source.settings_for(asked, height_scale)
-        table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
+        _warn_of_limits(table, source)
+        return Patch(table, partial(_field_of, source, stretch))
+    return _built(source, asked, height_scale, stretch)
+
+
+def _built(
+    source: TableSource, asked: Mapping[str, Any], height_scale: float, stretch: float
+) -> Patch:
+    """Return the table of heights, from the cache or built, and the heights."""
+    settings = source.settings_for(asked, height_scale)
+    table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
+    _warn_of_limits(table, source)
+    return Patch(table, partial(_field_of, source, stretch))
+
+
+def _field_of(source: TableSource, stretch: float) -> HeightField:
+    return source.fields()[0].stretched(stretch)
+
+
+def _warn_of_limits(table: DiffractionTable, source: TableSource) -> None:
     if table.limited:
         x, y = table.frequency_limit
         shown = source.path.name if source.path else source.names[0]
@@ -83,7 +113,6 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
             f"{y:.4g} rad/µm along y (frequency_limit): light that the surface sends beyond is "
             "missing"
         )
-    return Patch(table, lambda: source.fields()[0].stretched(stretch))
 
 
 def _logged(done: int, total: int, text: str) -> None:
@@ -106,13 +135,13 @@ def _heights_of(data: Any, options: LoadOptions) -> HeightField:
         assert isinstance(field, HeightField)
         if options.pixel_size not in (None, field.pixel_size):
             raise DiffractionError("pixel_size is for arrays; a HeightField has its own already")
-        return treat(field, options)
+        return field
     if options.pixel_size is None:
         raise DiffractionError("data needs pixel_size, the distance between its heights in µm")
     values = np.array(data, np.float64)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
-    return treat(HeightField(values, options.pixel_size, name="data"), options)
+    return HeightField(values, options.pixel_size, name="data")
 
 
 def _no_heights(shown: str) -> HeightField:

@@ -18,9 +18,10 @@ from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
+from .layers import UnderFilm
 from .loops import only_in
 from .materials import Material, tinted
-from .power import power_model
+from .power import PowerModel, power_model
 from .properties import flag
 from .sources import read_patch
 from .types import (
@@ -49,7 +50,8 @@ class DiffractingSurface(SurfaceBSDF):
     Attributes
     ----------
     table : the diffraction table.
-    heights : function that reads the heights that the table is made of.
+    heights : function that reads the heights that the table is made of; given : the parameter
+        `data`, or None.
     window_positions : positions of windows, or None where the table averages over them.
     orientation, lateral_scale, height_scale : the patch as it lies on the surface.
     boundary : model of the structure's material; fresnel : flat surface with all layers.
@@ -78,7 +80,8 @@ class DiffractingSurface(SurfaceBSDF):
         self.lateral_scale = LateralScale(props)
         # κ grows by the index, as if heights did
         stretch = self.lateral_scale.of_table
-        self.table, self.heights = read_patch(props, largest * optical, stretch)
+        patch = read_patch(props, largest * optical, stretch)
+        self.table, self.heights, self.given = patch
         most = largest if varies else self.table.height_scale_max / optical
         advice = ", the table's range; load the plugin anew with that height_scale"
         self.height_scale = Varying("height_scale", scale, 0.0, most, positive=True, advice=advice)
@@ -86,7 +89,7 @@ class DiffractingSurface(SurfaceBSDF):
         self.wavelength = read.mono_wavelength(props, self.table.wavelength_range)
         self.energy_conserving = flag(props, "energy_conserving", True)
         self.window_positions = read.window_positions(props, self.table)
-        self.power = power_model(self.table, self.wavelength, self.window_positions)
+        self.power = self._power()
         material = read.layered(props, material, self.table)
         read.warn_of_film(material, self.table, largest)
         self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
@@ -95,6 +98,8 @@ class DiffractingSurface(SurfaceBSDF):
 
     def ready(self) -> None:
         """See `PluginBSDF.ready`."""
+        if self.given is not None:
+            self.parameters.append(self.given)
         owners = self.height_scale, self.orientation, self.lateral_scale, self.fresnel
         self.parameters += [each for owner in owners for each in owner.changeable]
         super().ready()
@@ -222,9 +227,16 @@ class DiffractingSurface(SurfaceBSDF):
         )
 
     def derive(self) -> None:
-        """Compute what depends on the parameters: indices and scales of energy."""
+        """Compute what depends on the parameters: a table, indices and scales of energy."""
+        if self.given is not None and (patch := self.given.made()) is not None:
+            self.table, self.heights = patch.table, patch.heights
+            self.power = self._power()
+            self.boundary.take(self.table.roughness)
         self.fresnel.derive()
-        self.energy.update(self.scale_range())
+        self.energy.update(self.mean_table, self.scale_range())
+
+    def _power(self) -> PowerModel:
+        return power_model(self.table, self.wavelength, self.window_positions)
 
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""
@@ -264,6 +276,7 @@ class DiffractingSurface(SurfaceBSDF):
             index=None if material.kind is Feature.MIRROR else material.at,
             material=material.name if tabulated_range(material.name) else "",
             layer=structure.layer,
+            film_varies=isinstance(structure, UnderFilm) and bool(structure.thickness.texture),
             model=str(self.boundary),
             transmits=self.transmits,
         )

@@ -16,14 +16,19 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
+from .mesh_materials import OWN, PART, own_bsdf
 from .orbit import ORBIT
-from .orientation.mesh_files import write_ply
+from .orientation.mesh_files import load_materials, write_ply
+from .orientation.trimesh import TriangleMesh
 from .surfaces import MATERIAL, REFLECTING, copied, targets_of
 
 #: Shape that is put on the stage.
 FITTED = "fitted_mesh"
 #: Scene parameter that limits samples, in units of white.
 CLAMP = "render:clamp"
+
+# Properties of such a shape that say how its file is read
+_OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
 
 
 class SceneValues(NamedTuple):
@@ -67,6 +72,7 @@ def fit_meshes(state: Any, folder: Path) -> None:
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
+    fitted: dict[tuple[Path, bool, str], tuple[TriangleMesh, Any]] = {}
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
             continue
@@ -74,11 +80,21 @@ def fit_meshes(state: Any, folder: Path) -> None:
         if "filename" not in props:
             raise DiffractionError(f"shape '{FITTED}': the parameter filename is missing")
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
-        mesh = fitted_mesh(file, fit=_boolean(props, "fit"), up=props.get("up", "auto"))
-        written = folder / f"{number}.ply"
-        write_ply(written, mesh)
+        fit, up, written = _boolean(props, "fit"), props.get("up", "auto"), folder / f"{number}.ply"
+        if (file, fit, up) not in fitted:
+            fitted[file, fit, up] = fitted_mesh(file, fit=fit, up=up), load_materials(file)
+        mesh, materials = fitted[file, fit, up]
         _frame(state, mesh.positions, props)
-        ply = copied(props, "ply", leave=("filename", "fit", "up", "frame"))
+        part = [int(each) for each in props.get(PART, "").split(",") if each]
+        ply = copied(props, "ply", leave=_OF_FILE)
+        if part:
+            if not (chosen := np.isin(materials, part)).any():
+                raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
+                                       f"'{props.id()}'; delete that material")  # fmt: skip
+            mesh = mesh.part(chosen)
+        if OWN in props:
+            ply["bsdf"] = own_bsdf(file, part[0])
+        write_ply(written, mesh)
         ply["filename"] = str(written)
         ply.set_id(props.id())
         node.props = ply

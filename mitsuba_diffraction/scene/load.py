@@ -14,7 +14,7 @@ import contextlib
 import functools
 import re
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -122,7 +122,8 @@ def load_scene(
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     try:
-        with contextlib.nullcontext() if bands is None else wider_tables(bands.first):
+        serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
+        with serving, _files_beside(file):
             _check_parameters_act(file, values, defaults)
             scene, edits = _instantiated(file, known, values, box_filter, bands)
     except (RuntimeError, UnicodeDecodeError) as error:
@@ -153,6 +154,8 @@ def _check_parameters_act(
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
     import mitsuba as mi
 
+    from .additions import FITTED
+    from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
 
     @functools.cache
@@ -162,8 +165,10 @@ def _check_parameters_act(
         config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
-        if covered:
-            put_materials(parsed, values.materials)
+        split_meshes(parsed, values.materials, FITTED)
+        if covered:  # without `mesh` there is another one, of other materials
+            ids = parsed.id_to_index
+            put_materials(parsed, {k: v for k, v in values.materials.items() if k in ids})
         return effective(parsed)
 
     for name, value in values.parameters.items() if values.materials else ():
@@ -202,13 +207,10 @@ def _instantiated(
     """
     import mitsuba as mi
 
-    from .additions import (
-        fit_meshes,
-        put_box_filters,
-        remove_dark_lights,
-    )
+    from .additions import FITTED, fit_meshes, put_box_filters, remove_dark_lights
     from .bands import put_bands
     from .clamping import put_clamp
+    from .mesh_materials import split_meshes
     from .nodes import check_nodes
     from .surfaces import put_materials, put_surface_parameters
 
@@ -216,31 +218,40 @@ def _instantiated(
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
     # reaches a plugin in Python on the main thread only
     config.parallel = False
+    with tempfile.TemporaryDirectory() as folder:
+        state = mi.parser.parse_file(config, str(file), **values.parameters)
+        check_includes([Path(str(path)) for path in state.files], known)
+        installed.check_plugins(state)
+        installed.search_first()  # before the scene's folder
+        _check_films(state)
+        _note_files(state)
+        of_meshes = split_meshes(state, values.materials, FITTED)
+        fit_meshes(state, Path(folder))
+        edits = put_materials(state, values.materials, of_meshes)
+        edits += put_surface_parameters(state, values.surface)
+        mi.parser.transform_all(config, state)
+        check_nodes(state)
+        remove_dark_lights(state)
+        if values.clamp is not None:
+            put_clamp(state, values.clamp)
+        if box_filter:
+            put_box_filters(state)
+        if bands is not None:
+            put_bands(state, bands)
+        return mi.parser.instantiate(config, state), edits
+
+
+@contextlib.contextmanager
+def _files_beside(scene: Path) -> Iterator[None]:
+    """Resolve files that a scene names relative to it."""
+    import mitsuba as mi
+
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
-    resolver.prepend(str(file.absolute().parent))  # files that the scene names are relative to it
+    resolver.prepend(str(scene.absolute().parent))
     mi.set_file_resolver(resolver)
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            state = mi.parser.parse_file(config, str(file), **values.parameters)
-            check_includes([Path(str(path)) for path in state.files], known)
-            installed.check_plugins(state)
-            installed.search_first()  # before the scene's folder
-            _check_films(state)
-            _note_files(state)
-            fit_meshes(state, Path(folder))
-            edits = put_materials(state, values.materials)
-            edits += put_surface_parameters(state, values.surface)
-            mi.parser.transform_all(config, state)
-            check_nodes(state)
-            remove_dark_lights(state)
-            if values.clamp is not None:
-                put_clamp(state, values.clamp)
-            if box_filter:
-                put_box_filters(state)
-            if bands is not None:
-                put_bands(state, bands)
-            return mi.parser.instantiate(config, state), edits
+        yield
     finally:
         mi.set_file_resolver(before)
 

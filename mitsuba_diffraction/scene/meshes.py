@@ -23,12 +23,14 @@ class MeshArrays(NamedTuple):
     positions, normals : (n, 3); normals may be absent.
     uv : (n, 2) texture coordinates, or None.
     faces : (m, 3) indices of vertices.
+    materials : (m,) number of each triangle's material in a glTF file, or None.
     """
 
     positions: Floats
     normals: Floats | None
     uv: Floats | None
     faces: Ints
+    materials: Ints | None = None
 
 
 class SmoothMesh(NamedTuple):

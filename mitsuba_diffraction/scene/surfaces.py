@@ -75,7 +75,9 @@ def _material(surface: Surface) -> str:
     return f"{surface.text}, n = {n.real:.4g}" + (f" + {n.imag:.4g}i" if n.imag else "")
 
 
-def put_materials(state: Any, materials: Mapping[str, str]) -> list[Edit]:
+def put_materials(
+    state: Any, materials: Mapping[str, str], of_meshes: Sequence[str] = ()
+) -> list[Edit]:
     """Put surfaces on the BSDFs or shapes of these ids.
 
     A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor,
@@ -83,11 +85,12 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> list[Edit]:
 
     state : `mi.parser.ParserState`.
     materials : `FILE[,parameter=value…]` or `preset:NAME[,parameter=value…]` by id.
+    of_meshes : names of materials of the scene's mesh files, for messages.
 
     Raises a DiffractionError if an id is unknown, with a list of the scene's; if two ids are of one
     BSDF; or if no shape uses a BSDF.
     """
-    numbers = {name: _node_of(state, name) for name in materials}
+    numbers = {name: _node_of(state, name, of_meshes) for name in materials}
     for name, number in numbers.items():
         if twice := [other for other, n in numbers.items() if n == number and other != name]:
             raise DiffractionError(
@@ -190,16 +193,17 @@ def _parameters_of(node: Any) -> tuple[str, ...]:
     return NAMES.get(plugin, ())
 
 
-def _node_of(state: Any, name: str) -> int:
+def _node_of(state: Any, name: str, of_meshes: Sequence[str]) -> int:
     """Return the number of the BSDF or shape of this id."""
     kinds = (mi.ObjectType.BSDF, mi.ObjectType.Shape)
     known = {k: n for k, n in state.id_to_index.items() if state.nodes[n].type in kinds}
     if name not in known:
         listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
+        meshes = f"; materials of its meshes are {', '.join(of_meshes)}" if of_meshes else ""
         raise DiffractionError(
-            f"{MATERIAL}{name}: no BSDF or shape of the scene has this id; there are "
-            f"{listed or 'none: add id attributes to the scene'}. A mesh file is one shape; for "
-            "one of its materials, save the triangles of each as a file and give it a shape"
+            f"{MATERIAL}{name}: no BSDF or shape of the scene has this id, and no material of its "
+            "glTF meshes this name; there are "
+            f"{listed or 'none: add id attributes to the scene'}{meshes}"
         )
     return int(known[name])
 

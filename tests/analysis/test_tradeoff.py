@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import warnings
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+import mitsuba_diffraction as md
 from docs.make.figures import tables
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.analysis import tradeoff
@@ -23,6 +25,8 @@ from mitsuba_diffraction.analysis.tradeoff.measuring import (
     settings,
 )
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
+from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli.options import table_options
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -51,28 +55,24 @@ def test_the_error_of_twice_the_power_is_one(sample):
     assert sample.error(2.0 * sample.exact) == pytest.approx((1.0, 1.0), abs=1e-12)
 
 
-def result(name, error, relative, megabytes, **arguments) -> MeasuredSetting:
-    setting = TradeoffSetting("tolerance", name, arguments)
-    return MeasuredSetting(setting, error=error, relative=relative, megabytes=megabytes)
+def result(tolerance: float, relative: float, megabytes: float) -> MeasuredSetting:
+    setting = TradeoffSetting("tolerance", {"tolerance": tolerance})
+    return MeasuredSetting(setting, error=tolerance, relative=relative, megabytes=megabytes)
 
 
-RESULTS = [
-    result("coarse", 1e-2, 2.0, 4.0),
-    result("default", 1e-3, 3.0, 8.0),
-    result("fine", 1e-5, 5.0, 30.0),
-    result("unfit", 1e-9, 1.0, 1.0, tolerance=0.999),  # nobody can ask for it
-]
+COARSE, MIDDLE, FINE = (f"--tolerance 1e-0{digits}" for digits in (2, 3, 5))
+RESULTS = [result(1e-2, 2.0, 4.0), result(1e-3, 3.0, 8.0), result(1e-5, 5.0, 30.0)]
 
 
 @pytest.mark.parametrize(
     ("budget", "expected"),
     [
-        (Budget(tolerance=1e-3), "default"),
-        (Budget(tolerance=2e-2), "coarse"),
-        (Budget(tolerance=1e-4), "fine"),
-        (Budget(megabytes=10.0), "default"),
-        (Budget(relative=2.5), "coarse"),
-        (Budget(), "fine"),
+        (Budget(tolerance=1e-3), MIDDLE),
+        (Budget(tolerance=2e-2), COARSE),
+        (Budget(tolerance=1e-4), FINE),
+        (Budget(megabytes=10.0), MIDDLE),
+        (Budget(relative=2.5), COARSE),
+        (Budget(), FINE),
     ],
 )
 def test_the_recommended_setting_is_the_best_within_the_budget(budget, expected):
@@ -85,10 +85,41 @@ def test_a_budget_that_nothing_meets_is_refused_in_one_line():
     assert "\n" not in str(caught.value)
 
 
-def test_settings_have_names_of_their_own():
-    for quick in (False, True):
-        names = [setting.name for setting in settings(quick)]
-        assert len(set(names)) == len(names)
+@pytest.mark.parametrize("quick", [False, True])
+def test_every_row_is_options_that_can_be_typed(quick):
+    """All that build a table take them: here the command that does nothing else."""
+    parser, names = build_parser(), []
+    for setting in settings(quick):
+        typed = [] if setting.name == "the defaults" else setting.name.split()
+        args = parser.parse_args(["precompute", "scale.npy", "-o", "table.exr", *typed])
+        assert table_options(args) == setting.arguments
+        names.append(setting.name)
+    assert len(set(names)) == len(names)
+
+
+def test_the_recommended_row_has_its_error_in_a_rendering(some_variant):
+    chosen = [TradeoffSetting("default"), TradeoffSetting("tolerance", {"tolerance": 1e-2})]
+    measured = tradeoff.measure(PATCH, chosen, coherence_width=WIDTH, lanes=64, rounds=1)
+    best = recommended(measured, Budget(tolerance=1e-2))
+
+    def picture(**arguments: float) -> np.ndarray:
+        """A plate in the light of a point: the light itself has no noise."""
+        bsdf = md.bsdf_dict(PATCH, coherence_width=WIDTH, material="none", **arguments)
+        to = mi.ScalarTransform4f().look_at([0, -1.5, 2], [0, 0, 0], [0, 1, 0])
+        film = {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}}
+        scene = {
+            "type": "scene",
+            "integrator": {"type": "direct", "bsdf_samples": 0},
+            "plate": {"type": "rectangle", "bsdf": bsdf},
+            "light": {"type": "point", "position": [0.3, 1.2, 2.0]},
+            "sensor": {"type": "perspective", "fov": 50, "to_world": to, "film": film},
+        }
+        return np.array(mi.render(mi.load_dict(scene), spp=64, seed=3))
+
+    exact, found = picture(tolerance=1e-6), picture(**best.setting.arguments)
+    error = np.abs(found - exact).sum() / np.abs(exact).sum()
+    # stated of the worst κ, and of the region by order 0 or elsewhere that has more of it
+    assert 0.0 < error <= best.error
 
 
 def test_taylor_s_series_holds_for_shallow_surfaces_and_not_for_deep_ones():
@@ -114,8 +145,8 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     # errors of 16 pairs of directions scatter by half
     monkeypatch.setattr(command, "QUICK", (48, 100, 256, 1, 1))
     few = (
-        TradeoffSetting("default", "the defaults"),
-        TradeoffSetting("tolerance", "1e-2", {"tolerance": 1e-2}),
+        TradeoffSetting("default"),
+        TradeoffSetting("tolerance", {"tolerance": 1e-2}),
     )
     monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
     heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]
@@ -127,14 +158,14 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "recommended (tolerance 0.001): " in said
     document = json.loads((out / "tradeoff.json").read_text("utf-8"))
-    assert [record["setting"] for record in document["settings"]] == ["the defaults", "1e-2"]
+    assert [record["setting"] for record in document["settings"]] == ["the defaults", COARSE]
     assert all(0.0 < record["error"] <= 1e-2 for record in document["settings"])
     assert (out / "tradeoff.csv").read_text("utf-8").startswith("group,setting,")
     page, images = tmp_path / "page.md", tmp_path / "images"
     page.write_text("<!-- begin settings -->\nstale\n<!-- end settings -->\n", "utf-8")
     images.mkdir()
     assert tables.main(["tradeoff", str(out), "-o", str(page), "--images", str(images)]) == 0
-    assert f"| 1e-2 | {document['settings'][1]['error']:.1e} |" in page.read_text("utf-8")
+    assert f"| {COARSE} | {document['settings'][1]['error']:.1e} |" in page.read_text("utf-8")
     for name in ("tradeoff.png", "depth.png"):
         assert (images / name).read_bytes() == (out / name).read_bytes()
     assert tables.main(["tradeoff", str(images), "-o", str(page)]) == 1

@@ -39,6 +39,16 @@ def test_shader_and_all_that_it_reads_are_written(
     assert json.loads(report.read_text(encoding="utf-8"))["error"]["mean"] == 0.0
 
 
+def test_a_bad_name_is_refused_before_anything_is_made(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "grating"
+    for name in ("a b", "while", "mix"):
+        assert main(["export-osl", str(source), "-o", str(out), "--name", name]) == 1
+        assert "name=" in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_an_addon_holds_the_folders_that_are_named(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
 ) -> None:

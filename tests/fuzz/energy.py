@@ -26,12 +26,15 @@ _SAMPLES = 1 << 13, 1 << 17
 _GRAZING, _EXCESS, _ERRORS = 85.0, 0.005, 5.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
-#: Variants by their share. RGB variants have colours outside the gamut, which are negative, or
-#: above 1 as the red of gold: their luminance is at most 1.
+#: Variants by their share. Spectral variants have scales of energy at 16 wavelengths or more, which
+#: take 10 to 100 times as long as one. RGB variants have colours outside the gamut, which are
+#: negative, or above 1 as the red of gold: their luminance is at most 1.
 _VARIANTS = {
-    "llvm_ad_mono": 0.65, "llvm_ad_spectral": 0.2, "llvm_ad_mono_polarized": 0.1,
-    "llvm_ad_rgb": 0.05,
+    "llvm_ad_mono": 0.82, "llvm_ad_spectral": 0.07, "llvm_ad_mono_polarized": 0.07,
+    "llvm_ad_rgb": 0.04,
 }  # fmt: skip
+#: Share of surfaces whose window is one patch, which take ten times as long.
+_PATCHES = 0.12
 _TEXELS = (4, 4, 1)
 #: Of linear sRGB's channels.
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -73,12 +76,12 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         chosen["shadowing"] = "vcavity"
     if layer == "stack":
         chosen |= {"layers": _stack(rng), "model": "kirchhoff"}
-    if rng.random() < 0.3:
+    if rng.random() < _PATCHES:
         chosen["coherence"] = "patch"
     for name, low, high in (("lateral_scale", 0.1, 2.0), ("height_scale", 1e-3, 1.5)):
         factor, drawn = log_uniform(rng, low, high), rng.random()
-        # scales of energy of a varying sheet take a minute
-        if drawn < 0.05 and "plugin" not in chosen:
+        # scales of energy of a varying sheet, or of all wavelengths, take a minute
+        if drawn < 0.05 and "plugin" not in chosen and mi.is_monochromatic:
             chosen[name] = _texture(rng.uniform(0.6, 1.0, _TEXELS) * factor)
         elif drawn < 0.35:
             chosen[name] = factor

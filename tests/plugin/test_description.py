@@ -63,6 +63,7 @@ CHANGES: Mapping[Feature, dict] = {
     Feature.CONDUCTOR: {"kind": Feature.CONDUCTOR, "index": lambda lam: 0.01 * lam / 5 + 6j},
     Feature.COAT: {"coat": 1.4},
     Feature.FILM: {"layer": Feature.FILM},
+    Feature.VARYING_FILM: {"film_varies": True},
     Feature.KIRCHHOFF: {"model": "kirchhoff"},
     Feature.OWN_MODEL: {"model": "level"},
     Feature.ENERGY_SCALE: {"energy_scale": half},
@@ -143,6 +144,14 @@ PARAMETERS = [
     ({"int_ior": 1.2, "ext_ior": 1.5}, Feature.RARER),
     ({"coat_ior": 1.3}, Feature.COAT),
     ({"film_ior": 1.3, "film_thickness": 100.0}, Feature.FILM),
+    (
+        {
+            "film_ior": 1.3,
+            "film_thickness": {"type": "checkerboard"},
+            "film_thickness_max": 200.0,
+        },
+        Feature.VARYING_FILM,
+    ),
     ({"model": "kirchhoff"}, Feature.KIRCHHOFF),
     ({"shadowing": "vcavity"}, Feature.SHADOWING),
     ({"coherence": "patch"}, Feature.PATCH),

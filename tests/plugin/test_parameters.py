@@ -310,17 +310,6 @@ def test_a_table_of_a_laser_s_wavelength_serves_mono_variants_alone(tmp_path, nm
         assert "360" in refusal(loads(filename=str(file)))
 
 
-def test_two_nested_bsdfs_are_one_too_many(some_variant):
-    text = refusal(lambda: load(a={"type": "diffuse"}, b={"type": "diffuse"}))
-    assert text.startswith("2 nested BSDFs (a, b); at most one can lie beneath")
-
-
-def test_nothing_lies_beneath_a_conductor(some_variant):
-    for material in ("none", "Al"):
-        text = refusal(lambda m=material: load(material=m, beneath={"type": "diffuse"}))
-        assert "nested BSDF" in text
-
-
 @pytest.mark.parametrize("earlier", ["heightfield", "table"])
 def test_an_earlier_name_is_the_current_one_with_a_line(some_variant, table_file, earlier):
     load = loads(**{earlier: str(table_file)})

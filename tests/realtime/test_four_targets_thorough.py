@@ -46,7 +46,7 @@ SUN, IRRADIANCE = (0.45, 0.0, 0.893), 3.0
 #: Pixels along a side of the squares whose means are compared, which have less noise.
 BLOCK = 2
 #: Samples of the path tracer and of Cycles, frames of GLSL and samples of the page.
-SAMPLES, CYCLES, FRAMES, PAGE = 512, 192, 128, 128
+SAMPLES, CYCLES, FRAMES, PAGE = 256, 192, 64, 64
 #: Blocks across an arch whose colours are averaged under the sky, which is smooth: its half.
 SMOOTH = 4
 
@@ -325,7 +325,7 @@ def test_cycles_shows_them_as_the_path_tracer_does(stage: Stage, tmp_path: Path)
 def test_what_no_target_shows_is_refused_with_the_reason(tmp_path: Path) -> None:
     """By features of the one list, in one sentence."""
     names = "film", "stack", "interface", "sheet", "solved sheet", "crossed", "speckle of places"
-    for name in (*names, "lower by a texture"):
+    for name in (*names, "lower by a texture", "film by a texture"):
         bsdf = mi.load_dict(SURFACES[name](tmp_path))
         for consumer in (GLSL, OSL):
             sentence = refusal(consumer, bsdf)

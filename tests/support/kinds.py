@@ -60,17 +60,17 @@ MORE: dict[str, Row] = {
 THROUGH = {f"through a {name}": parameters for name, parameters in SIDES.items()}
 
 
-def made(kind: str) -> Any:
+def made(kind: str, field: md.HeightField = PATCH) -> Any:
     """The BSDF of a kind that reflects or transmits, or a mix, in the variant that is set."""
     if kind == "blended patches":
-        one = md.bsdf_dict(PATCH, coherence_width=WIDTH, material="none", energy_conserving=False)
+        one = md.bsdf_dict(field, coherence_width=WIDTH, material="none", energy_conserving=False)
         return mi.load_dict({"type": "diffraction_mix", "one": one, "two": one, "weight_one": 0.3})
     if kind in THROUGH:
-        return both(wavelength=600.0, **THROUGH[kind])
+        return both(field, wavelength=600.0, **THROUGH[kind])
     parameters = dict((KINDS | MORE)[kind][0])
     if kind == "height scales":
         parameters["height_scale"] = parameters["height_scale"] | {"data": mi.TensorXf(SCALES)}
-    return load(wavelength=600.0, **parameters)
+    return load(field, wavelength=600.0, **parameters)
 
 
 def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:

@@ -122,6 +122,12 @@ SURFACES: dict[str, Callable[[Path], dict[str, Any]]] = {
     "solved over pigment": _solved(reflectance=0.4, nested=lambda: _diffuse(*_ORANGE)),
     "solved under a layer": _solved(superstrate=1.5),
     "film": _heights(material="Al", film_ior=1.5, film_thickness=300.0),
+    "film by a texture": _heights(
+        material="Al",
+        film_ior=1.5,
+        film_thickness_max=400.0,
+        film_thickness=lambda: _bitmap(np.linspace(0.2, 1.0, _SIDE)),
+    ),
     "stack": _layered,
     "interface": _heights(plugin="diffraction_dielectric"),
     "sheet": _heights(plugin="diffraction_dielectric", thin=True),

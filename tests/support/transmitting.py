@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import mitsuba_diffraction as md
 from tests.support.directions import Array, as_single, polar
 from tests.support.lanes import interaction
-from tests.support.layered import load
+from tests.support.layered import PATCH, load
 
 INDICES = {"int_ior": 1.5, "ext_ior": 1.0}
 SIDES: dict[str, dict[str, Any]] = {"dielectric": {}, "sheet": {"thin": True}}
 BELOW = np.array([1, 1, -1])
 
 
-def both(**parameters: Any) -> Any:
-    return load(plugin="diffraction_dielectric", **INDICES, **parameters)
+def both(field: md.HeightField = PATCH, **parameters: Any) -> Any:
+    return load(field, plugin="diffraction_dielectric", **INDICES, **parameters)
 
 
 class OneSide:

@@ -27,6 +27,13 @@ PLUGINS = {
     "diffraction": _FOLDER / "diffraction.py",
     "diffraction_dielectric": _FOLDER / "diffraction_dielectric.py",
     "diffraction_orders": _FOLDER.parent / "orders/bsdf/diffraction_orders.py",
+    "diffraction_mix": _FOLDER / "diffraction_mix.py",
+}
+
+_OTHERS = {
+    "diffraction_dielectric": "Other plugins: surfaces that transmit light",
+    "diffraction_orders": "gratings whose orders were solved",
+    "diffraction_mix": "several surfaces in one",
 }
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
@@ -87,10 +94,11 @@ def page() -> str:
         "# Parameters of `diffraction`",
         "Made by `make parameters` of the texts at the top of the plugins' modules. ∂: "
         "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths and "
-        "film_thickness in nm. In an image file the top row is the largest y. Surfaces that "
-        "transmit light have the plugin "
-        "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric), gratings whose orders "
-        "were solved the plugin [`diffraction_orders`](#parameters-of-diffraction_orders).",
+        "film_thickness in nm. In an image file the top row is the largest y. "
+        + ", ".join(
+            f"{what} [`{plugin}`](#parameters-of-{plugin})" for plugin, what in _OTHERS.items()
+        )
+        + ".",
         *_parts(reflecting),
         "[theory.md](theory.md) has the equations.",
     ]

@@ -19,26 +19,27 @@ from mitsuba_diffraction.plugin.presets import presets
 from .pages import option, program, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
+_MESH = Path("scenes", "meshes", "knot.ply")
 _COLUMNS, _SIZE, _LABEL = 5, (160, 147), 16
 _MOST = 160_000  # bytes of the picture
 
 
 def draw(folder: Path, samples: int) -> Path:
-    """Render a ball of each preset into a folder; return the picture of all."""
+    """Render a mesh of each preset in the studio of meshes; return the picture of all."""
     width, height = _SIZE
     names = list(presets())
     rows = -(-len(names) // _COLUMNS)
     sheet = Image.new("RGB", (_COLUMNS * width, rows * (height + _LABEL)), "white")
     pen = ImageDraw.Draw(sheet)
     for number, name in enumerate(names):
-        ball = folder / f"{name}.png"
-        command = ["render", "scenes/material_ball.xml", "--preset", name, "-s", str(samples),
+        one = folder / f"{name}.png"
+        command = ["render", str(_MESH), "--preset", name, "-s", str(samples),
                    "-D", f"resx={width}", "-D", f"resy={height}", "--clamp", "20", "--denoise",
-                   "-o", str(ball)]  # fmt: skip
+                   "-o", str(one)]  # fmt: skip
         if run_command(command):
-            raise DiffractionError(f"the ball of {name} failed; its message stands above")
+            raise DiffractionError(f"the picture of {name} failed; its message stands above")
         x, y = number % _COLUMNS * width, number // _COLUMNS * (height + _LABEL)
-        with Image.open(ball.with_stem(f"{name}_denoised")) as picture:
+        with Image.open(one.with_stem(f"{name}_denoised")) as picture:
             sheet.paste(picture.convert("RGB"), (x, y))
         pen.text((x + width / 2, y + height + 2), name, fill="black", anchor="ma")
     written = folder / "presets.png"
@@ -51,7 +52,7 @@ def draw(folder: Path, samples: int) -> Path:
     option("-s", "--samples", type=int, default=32, help="per pixel; default: 32"),
 )
 def main(args: argparse.Namespace) -> None:
-    """Render the balls and write the picture."""
+    """Render the pictures and write them as one."""
     with tempfile.TemporaryDirectory() as folder:
         picture = draw(Path(folder), args.samples)
         write_jpeg(picture, args.output / PICTURE, most=_MOST)

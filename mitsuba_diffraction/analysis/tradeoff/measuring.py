@@ -16,66 +16,47 @@ from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...plugin.memory import upload
 from ...progress import Progress, silent
-from ...tables.build.coefficients import half_scale
 from ...tables.colour.table import power_colour_difference
-from ...tables.table import DiffractionTable, q_limit_of
+from ...tables.table import DiffractionTable
 from ..timing import Queries, kernel_seconds, quiet_bsdf, ratio, rounds_of
 from .accuracy import Sample
 
 
 @dataclass(frozen=True)
 class TradeoffSetting:
-    """Table of the trade-off: its label, build arguments, and conversions afterwards."""
+    """Settings of a table besides the defaults, as options of the commands have them."""
 
     group: str  # name of the parameter that varies
-    name: str  # label of this value
-    # arguments of `DiffractionTable.build`, besides the patch and the coherence width
     arguments: dict[str, Any] = field(default_factory=dict)
-    # precision to which the coefficients are converted: "half" or "single"; None: as built
-    stored: str | None = None
-    # largest spatial frequency as a share of those that light reaches, or None for all
-    crop: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The options to type, as `--basis svd --terms 8`."""
+        return " ".join(f"--{n} {_text(v)}" for n, v in self.arguments.items()) or "the defaults"
 
     @property
     def coherence(self) -> str:
         """Coherence of the table."""
         return str(self.arguments.get("coherence", "ensemble"))
 
-    @property
-    def usable(self) -> bool:
-        """Whether users can build this table: no conversion, and a proper tolerance."""
-        return self.stored is None and self.arguments.get("tolerance", 1e-3) < _ANY
 
-
-#: Tolerance that every table meets, so that the other parameters alone determine the error.
-_ANY = 0.999
+def _text(value: Any) -> str:
+    return f"{value:.0e}" if isinstance(value, float) else str(value)
 
 
 def settings(quick: bool) -> Iterator[TradeoffSetting]:
     """Yield the settings to measure, the defaults first."""
-    yield TradeoffSetting("default", "the defaults")
+    yield TradeoffSetting("default")
     for tolerance in (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6):
-        yield TradeoffSetting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
+        yield TradeoffSetting("tolerance", {"tolerance": tolerance})
     for basis in ("chebyshev", "taylor"):
         for tolerance in (1e-3,) if quick else (1e-2, 1e-3, 1e-4):
-            arguments = {"basis": basis, "tolerance": tolerance}
-            yield TradeoffSetting("basis", f"{basis}, {tolerance:.0e}", arguments)
+            yield TradeoffSetting("basis", {"basis": basis, "tolerance": tolerance})
     for basis in ("svd", "chebyshev"):
         for terms in (4, 8) if quick else (4, 6, 8, 12):
-            arguments = {"basis": basis, "terms": terms}
-            yield TradeoffSetting(f"terms, {basis}", f"{terms} terms, {basis}", arguments)
-    for taps in (2, 3, 4) if quick else (2, 3, 4, 5):
-        arguments = {"terms": 12, "taps": taps, "tolerance": _ANY}
-        yield TradeoffSetting("taps", f"{taps} × {taps} taps", arguments)
-    for stored in ("half", "single"):
-        yield TradeoffSetting(
-            "precision", f"tolerance 1e-4 in {stored}", {"tolerance": 1e-4}, stored
-        )
-    for crop in (0.5,) if quick else (0.75, 0.5, 0.35):
-        yield TradeoffSetting("crop", f"up to {crop:g} of all frequencies", crop=crop)
+            yield TradeoffSetting(f"terms, {basis}", {"basis": basis, "terms": terms})
     for tolerance in (1e-3,) if quick else (1e-2, 1e-3):
-        arguments = {"coherence": "patch", "tolerance": tolerance}
-        yield TradeoffSetting("coherence", f"patch, {tolerance:.0e}", arguments)
+        yield TradeoffSetting("coherence", {"coherence": "patch", "tolerance": tolerance})
 
 
 #: Tolerance of the table with which colours are compared; its error is invisible.
@@ -142,7 +123,9 @@ def measure(
         progress(n, len(chosen), setting.name)
         start = time.perf_counter()
         try:
-            table = _table(field, setting, coherence_width)
+            table = DiffractionTable.build(
+                field, coherence_width=coherence_width, **setting.arguments
+            )
         except DiffractionError as error:
             if n == 0:
                 raise
@@ -174,22 +157,6 @@ def measure(
     return [_with_times(result, times, lanes) for result in results]
 
 
-def _table(
-    field: HeightField, setting: TradeoffSetting, coherence_width: float
-) -> DiffractionTable:
-    """Build the table of a setting, and convert its precision if the setting has one."""
-    arguments: dict[str, Any] = dict(setting.arguments)
-    if setting.crop is not None:
-        arguments["frequency_limit"] = setting.crop * q_limit_of((360.0, 830.0))
-    table = DiffractionTable.build(field, coherence_width=coherence_width, **arguments)
-    if setting.stored is None:
-        return table
-    kind: Any = np.float16 if setting.stored == "half" else np.float32
-    scale = half_scale(float(np.abs(table.coefficients).max()))
-    coefficients = (table.coefficients.astype(np.float32) * np.float32(scale)).astype(kind)
-    return replace(table, coefficients=coefficients, scale=table.scale * scale)
-
-
 def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     """Return the window sums (n,) by the plugin, in single precision."""
     k = 2e3 * np.pi / sample.wavelength
@@ -219,6 +186,6 @@ def rows(results: Sequence[MeasuredSetting]) -> Iterator[dict[str, Any]]:
     for result in results:
         setting = result.setting
         names = {"group": setting.group, "setting": setting.name}
-        arguments = {"arguments": setting.arguments, "usable": setting.usable}
+        arguments = {"arguments": setting.arguments}
         measured = {name: value for name, value in vars(result).items() if name != "setting"}
         yield names | arguments | measured

@@ -43,8 +43,7 @@ class Budget:
 def recommended(results: Sequence[MeasuredSetting], budget: Budget) -> MeasuredSetting:
     """Return the fastest setting within the tolerance, or without a tolerance the most exact one.
 
-    The smallest of equally fast settings is chosen. Only settings of coherence `ensemble` that
-    users can build are candidates.
+    The smallest of equally fast settings is chosen, among those of coherence `ensemble`.
 
     Raises a DiffractionError if no measured setting stays within the budget.
     """
@@ -52,7 +51,6 @@ def recommended(results: Sequence[MeasuredSetting], budget: Budget) -> MeasuredS
         result
         for result in results
         if not result.refused
-        and result.setting.usable
         and result.setting.group != "coherence"
         and math.isfinite(result.error)
     ]
@@ -115,12 +113,9 @@ def lines(
     yield f"sums over the spectrum, ΔE2000: {steps}"
     yield f"wavelengths of a ray, noise of its luminance: {counts}"
     limits = ", ".join(f"{name} {value:g}" for name, value in budget.items() if value)
-    arguments = best.setting.arguments or {"": "the defaults"}
-    recommendation = ", ".join(f"{k}={v}" if k else str(v) for k, v in arguments.items())
-    if best.setting.crop is not None:
-        recommendation += f", crop at {best.setting.crop:g} of all frequencies"
+    within = f" ({limits})" if limits else ""
     yield (
-        f"recommended{f' ({limits})' if limits else ''}: {recommendation}: error {best.error:.1e}, "
+        f"recommended{within}: {best.setting.name}: error {best.error:.1e}, "
         f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
     )
 

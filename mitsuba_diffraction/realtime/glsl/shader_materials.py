@@ -34,7 +34,7 @@ GLSL = Consumer(
     "the realtime renderer",
     frozenset(Feature) - {
         Feature.TRANSMISSION, Feature.FILM, Feature.STACK, Feature.PLACED,
-        Feature.VARYING_HEIGHT, Feature.CROSSED,
+        Feature.VARYING_HEIGHT, Feature.CROSSED, Feature.VARYING_FILM,
     },
     "leave it out, or render the scene with Mitsuba",
     {Feature.CROSSED: "render the scene with Mitsuba"},

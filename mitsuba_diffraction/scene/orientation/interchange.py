@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import DiffractionError, one_line, quoted
 from ...extras import optional
@@ -53,6 +54,7 @@ def interchange_mesh(file: Path) -> MeshArrays:
         _joined([part.normals for part in parts]),
         _joined([part.uv for part in parts]),
         np.concatenate(faces),
+        _joined([part.materials for part in parts]),
     )
 
 
@@ -80,7 +82,7 @@ def stated_up(file: Path) -> str | None:
     return "y" if suffix in GLTF else None
 
 
-def _joined(parts: list[Floats | None]) -> Floats | None:
+def _joined(parts: list[NDArray[Any] | None]) -> NDArray[Any] | None:
     """Return rows of all parts, or None if one has none."""
     present = [part for part in parts if part is not None]
     return np.concatenate(present) if len(present) == len(parts) else None
@@ -116,7 +118,7 @@ def _gltf_parts(trimesh: Any, file: Path) -> Iterator[MeshArrays]:
             np.array(mesh.vertex_normals, np.float64) if stored else None,
             None if uv is None else np.array(uv, np.float64) * [1.0, -1.0] + [0.0, 1.0],
             np.array(mesh.faces, np.int64),
-        )
+        )._replace(materials=np.full(len(mesh.faces), int(mesh.visual.material.name)))
 
 
 def _stage(file: Path) -> Any:

@@ -17,7 +17,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import MeshArrays, SmoothMesh, mesh_arrays
+from ..meshes import Ints, MeshArrays, SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
 from .mesh_indices import CODES, Element, any_line_begins, check_mesh, parsed_header, ply_header
 from .trimesh import TriangleMesh, vertex_normals
@@ -44,7 +44,7 @@ def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
 
     Raises a DiffractionError if the file cannot be read, or is not a mesh of these kinds.
     """
-    (positions, normals, uv, faces), _ = _arrays(Path(path))
+    positions, normals, uv, faces, _ = _arrays(Path(path))[0]
     if normals is None:
         normals = vertex_normals(positions, faces)
     return SmoothMesh(positions, normals, uv, faces)
@@ -53,6 +53,11 @@ def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
     """Whether the file of a mesh holds vertex normals; otherwise `load_mesh` makes smooth ones."""
     return _arrays(Path(path))[0].normals is not None
+
+
+def load_materials(path: str | os.PathLike[str]) -> Ints | None:
+    """Return the number of each triangle's material in a glTF file, (m,); None for other files."""
+    return _arrays(Path(path))[0].materials
 
 
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:

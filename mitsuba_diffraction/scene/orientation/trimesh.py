@@ -48,6 +48,13 @@ class TriangleMesh:
         if self.faces.size and not (0 <= self.faces.min() and self.faces.max() < n):
             raise DiffractionError(f"mesh: 'faces' names a vertex outside 0 to {n - 1}")
 
+    def part(self, chosen: NDArray[np.bool_]) -> TriangleMesh:
+        """Return the mesh of some triangles, (m,), with their vertices alone."""
+        kept, faces = np.unique(self.faces[chosen], return_inverse=True)
+        turns = None if self.orientation is None else self.orientation[kept]
+        positions, normals, uv = self.positions[kept], self.normals[kept], self.uv[kept]
+        return TriangleMesh(positions, normals, uv, faces.reshape(-1, 3), turns)
+
 
 def cell_corners(grid: Ints) -> tuple[Ints, ...]:
     """The four corners of every cell of a grid of vertex numbers, in the sense of rotation."""

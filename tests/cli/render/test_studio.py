@@ -55,6 +55,29 @@ def test_a_panorama_and_a_sun_light_the_scene_outdoors(parameters):
     assert values["sun_elevation"] == "12"  # -D goes before
 
 
+@pytest.mark.parametrize(
+    ("options", "others"),
+    [
+        (["--preset", "Body=cd"], "own"),
+        (["--assign", "Body=scale.npy"], "own"),
+        (["--preset", "cd", "--preset", "Body=dvd"], None),
+        (["--patch", "scale.npy", "--preset", "Body=dvd"], None),
+        (["--preset", "Body=cd", "-D", "others=surface"], "surface"),
+    ],
+)
+def test_without_a_surface_of_the_whole_other_materials_are_the_file_s(parameters, options, others):
+    args = build_parser().parse_args(["render", str(MESH), *options])
+    put_on_stage(args)
+    values = scene_parameters(args)
+    assert values.get("others") == others
+    assert "material:Body" in values
+
+
+def test_two_surfaces_of_the_whole_are_refused(parameters):
+    with pytest.raises(SystemExit):
+        parameters("--patch", "scale.npy", "--preset", "cd")
+
+
 def test_a_sky_over_a_label_comes_with_a_floor():
     label = STUDIO.with_name("label.xml")
     args = build_parser().parse_args(["render", str(label), "--sun", "120,40"])

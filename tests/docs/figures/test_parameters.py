@@ -87,7 +87,7 @@ def test_what_is_marked_differentiable_is(some_variant, patch):
     bsdf = mi.load_dict(
         md.bsdf_dict(patch, coherence_width=4, tolerance=0.1, energy_conserving=False) | named
     )
-    found = {key.split(".")[0] for key, _ in mi.traverse(bsdf)}
+    found = {key.split(".")[0] for key, _ in mi.traverse(bsdf) if key != "data"}
     marked = {name for name, entry in BY_NAME.items() if entry.differentiable}
     # of indices that are given as such the parameter is the ratio, under another name
     assert found - {"film_eta"} == marked - {"(nested)"}
@@ -108,4 +108,4 @@ def test_a_cell_has_at_most_25_words(plugin):
 def test_the_page_is_what_the_docstrings_say():
     text = (ROOT / "docs/parameters.md").read_text(encoding="utf-8")
     assert text == parameters.page(), "make parameters"
-    assert len(text.split()) <= 2200
+    assert len(re.findall(r"\S*\w\S*", text)) <= 2100  # words, without the marks of tables

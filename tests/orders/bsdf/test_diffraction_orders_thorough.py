@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -57,10 +56,8 @@ def test_every_variant_has_the_same_light(every_variant):
     assert np.isfinite(weight).all()
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_weights_are_the_albedo(some_variant, name):
-    table = TABLES[name]
-    bsdf = load(table)
+def test_weights_under_a_coat_are_the_albedo(some_variant):
+    bsdf = load(TABLES["under a coat"])
     for theta in (0.0, 45.0, 75.0):
         si = interaction(
             np.tile([np.sin(np.radians(theta)), 0.0, np.cos(np.radians(theta))], (4096, 1)),
@@ -95,30 +92,6 @@ def test_the_density_is_that_of_the_samples(some_variant, case):
     test = chi_square(bsdf, case, samples=1 << 19)
     # 1 % for both cases together; the numbers drawn are always the same
     assert test.run(0.01, 2, quiet=True), test.messages
-
-
-def test_derivatives_follow_the_orientation(some_variant):
-    wi, wo, _, wavelength = lit_pairs(16)
-    bsdf = load(TABLES["bare"], orientation=1.0, coherence_width=20.0)
-    parameters = mi.traverse(bsdf)
-    si = interaction(wi, wavelength)
-
-    def light():
-        return dr.sum(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))[0])
-
-    dr.enable_grad(parameters["orientation"])
-    parameters.update()
-    total = light()
-    dr.backward(total)
-    derivative = float(parameters["orientation"].grad[0])
-    step = 0.02
-    ends = []
-    for degrees in (1.0 - step, 1.0 + step):
-        parameters["orientation"] = mi.Float(degrees)
-        parameters.update()
-        ends.append(float(light()[0]))
-    # central differences in single precision
-    assert derivative == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=2e-2)
 
 
 def test_light_that_is_in_no_order_goes_on_beneath(some_variant):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -58,29 +57,6 @@ def test_the_density_is_that_of_the_samples_on_either_side(some_variant, side):
     test = chi_square(bsdf, Case(None, 30.0, DISPERSED), samples=1 << 19)
     # 1 % for both sides together; the numbers drawn are always the same
     assert test.run(0.01, 2, quiet=True), test.messages
-
-
-def test_derivatives_follow_the_orientation_of_light_that_goes_through(some_variant):
-    wi, wo, _, wavelength = lit_pairs(16)
-    wo[:, 2] *= -1.0
-    bsdf = load(SHEET, orientation=1.0, coherence_width=20.0)
-    parameters = mi.traverse(bsdf)
-    si = interaction(wi, wavelength)
-
-    def light():
-        return dr.sum(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))[0])
-
-    dr.enable_grad(parameters["orientation"])
-    parameters.update()
-    dr.backward(light())
-    derivative = float(parameters["orientation"].grad[0])
-    step, ends = 0.02, []
-    for degrees in (1.0 - step, 1.0 + step):
-        parameters["orientation"] = mi.Float(degrees)
-        parameters.update()
-        ends.append(float(light()[0]))
-    # central differences in single precision
-    assert derivative == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=2e-2)
 
 
 def flat_sheet(index: float) -> OrderTable:

@@ -7,11 +7,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
@@ -152,19 +150,6 @@ def test_coarser_settings_take_less_work_and_are_another_record(tables):
         use_energy_settings(before)
     assert scale is not None
     assert scale.values.shape == (2, 13, 16)
-
-
-@pytest.mark.parametrize("material", MATERIALS)
-def test_the_tabulated_gain_is_the_gain(tables, material):
-    model, index = MATERIALS[material]
-    gain = PathGain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
-    rng = np.random.default_rng(0)
-    cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
-    for cos_i in np.cos(np.radians([[0.0], [33.0], [71.0]])):
-        common = gain.path.common(cos_i, cos_o, np.cos(turn))
-        exact = gain.exact(cos_i, cos_o, np.cos(turn)) / common
-        # what an albedo sees of it: linear between 37 angles and 25 azimuths
-        assert np.abs(gain(cos_i, cos_o, turn) / common - exact).mean() < 4e-3 * exact.mean()
 
 
 def test_sums_below_zero_leave_the_scale_a_number():

@@ -1,7 +1,9 @@
 // Decode arrays and pictures from the page's text, which sections.py encodes.
 
 function bytesOf(id) {
-  const text = atob(document.getElementById(id).textContent.trim());
+  const written = document.getElementById(id).textContent.trim();
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(written);
+  const text = atob(written);
   const bytes = new Uint8Array(text.length);
   for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
   return bytes;

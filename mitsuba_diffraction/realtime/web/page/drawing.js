@@ -171,7 +171,7 @@ class Drawing {
     Object.assign(this, { gl, header, data, programs: {}, tables: {}, materials: {} });
   }
 
-  // Load all but tables, while the driver compiles; arguments: those of `compiled`.
+  // Load all but tables and meshes, while the driver compiles; arguments: those of `compiled`.
   async load(method, lit, material) {
     const { gl, header, data } = this, { light } = header;
     this.sources = JSON.parse(await data.text(header.programs));
@@ -180,16 +180,19 @@ class Drawing {
     this.add = new Program(gl, whole, ADD);
     this.shown = new Program(gl, whole, header.shown.fragment);
     this.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
-    this.surfaces = [];
-    for (const surface of header.surfaces)
-      this.surfaces.push({
-        ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
-      });
+    this.surfaces = await Promise.all(header.surfaces.map(async (surface) => ({
+      ...surface, mesh: new Mesh(gl, surface.mesh), part: await Part.load(gl, data, surface.parts),
+    })));
     this.daylight = await data.array(light.daylight);
     this.spectra = light.spectra === null ? null : await data.array(light.spectra);
     this.responses = texels(gl, gl.RGBA32F, this.daylight.length / 4, RESPONSES);
     this.empty = gl.createVertexArray();
     this.around = header.around && (await Surroundings.load(gl, header, data));
+  }
+
+  async loadMeshes() {
+    for (const { mesh } of [...this.surfaces, ...(this.around?.glowing ?? [])]) await mesh.load(this.data);
+    for (const map of Object.values(this.shadows)) map.key = undefined; // those of the stand-ins
   }
 
   // Programs of all surfaces, one for each of some definitions of the light; material: number of a
@@ -222,9 +225,8 @@ class Drawing {
 
   resize(width, height) {
     for (const target of [this.sample, this.held, ...(this.sums ?? [])]) target?.release();
-    Object.assign(this, { width, height });
-    [this.sample, this.held] = [0, 1].map(() => new Target(this.gl, width, height, { depth: true }));
-    this.sums = [0, 1].map(() => new Target(this.gl, width, height));
+    // made when they are drawn into: the first picture takes but one
+    Object.assign(this, { width, height, sample: undefined, held: undefined, sums: undefined });
   }
 
   // Upload the lights' spectra for the method `exact`.
@@ -286,6 +288,7 @@ class Drawing {
   // Draw one sample of every pixel in rows [bottom, top) of a picture, linear.
   drawRows(view, bottom, top) {
     const { gl } = this;
+    this.sample ??= new Target(gl, this.width, this.height, { depth: true });
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.sample.frame);
     gl.viewport(0, 0, view.width, view.height);
     gl.enable(gl.SCISSOR_TEST);
@@ -320,6 +323,7 @@ class Drawing {
       [this.sample, this.held] = [this.held, this.sample];
       return;
     }
+    this.sums ??= [0, 1].map(() => new Target(this.gl, this.width, this.height));
     this.sums.reverse();
     this.add.use();
     this.add.set({ first, covers: view.lookup ? 0 : 1 });

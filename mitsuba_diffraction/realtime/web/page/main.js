@@ -60,12 +60,15 @@ async function load(viewer) {
   const { drawing, drawn, material } = viewer, lit = { glance: viewer.lit.glance };
   await drawing.load(drawn, lit, material);
   await drawing.prepare(drawn, lit, busy, material);
+  viewer.fit();
+  viewer.rehearse();
+  await busy("Unpacking meshes");
+  await drawing.loadMeshes();
 }
 
 // Draw the first picture, and prepare all others.
 async function open(viewer) {
   viewer.lost = false;
-  viewer.fit();
   viewer.glance();
   element("message").hidden = element("busy").hidden = true;
   state("ready");

@@ -20,85 +20,115 @@ function directions(rows, width, column) {
   return found;
 }
 
-async function uploadMesh(gl, data, mesh) {
-  const corners = await data.array(mesh.corners);
-  const columns = await data.array(mesh.columns);
-  const tangents = mesh.tangents === null ? null : await data.array(mesh.tangents);
-  const count = corners.length, { width } = mesh;
-  const signed = new Int16Array(columns.buffer, 0, columns.length);
-  const array = gl.createVertexArray(), constants = [];
-  gl.bindVertexArray(array);
-  Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
-    const place = mesh.layout[name];
-    if (place && place.value) {
-      constants.push([location, [...place.value, 0, 0].slice(0, 4)]);
-      return;
-    }
-    const direction = name === "normal" || name === "tangent";
-    // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
-    const stride = direction ? 4 : size;
-    const values = direction ? new Int16Array(count * stride) : new Float32Array(count * stride);
-    if (direction) {
-      const flat = name === "tangent" && tangents;
-      const found = flat ? directions(tangents, 2, 0) : directions(signed, width, place.column);
-      for (let i = 0, to = 0; i < count; ++i) {
-        const from = 4 * (flat ? Math.floor(i / 3) : corners[i]);
-        for (let c = 0; c < 4; ++c) values[to++] = found[from + c];
-      }
-    } else {
-      const { low, step, column } = place;
-      for (let i = 0, to = 0; i < count; ++i) {
-        const from = corners[i] * width + column;
-        for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
-      }
-    }
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(location);
-    gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
-  });
-  // one buffer for all levels: a vertex array has one index buffer
-  const parts = [], lists = [];
-  for (const few of FEWER) {
-    const list = count > 3 * few ? coarser(columns, width, mesh.layout.position, corners, few, lists.at(-1)) : null;
-    parts.push(list && { first: lists.reduce((sum, { length }) => sum + length, 0), length: list.length });
-    if (list) lists.push(list);
+// Triangles of a surface. Each level of detail is uploaded when it is drawn first: 0 is all, larger
+// numbers are fewer. Before `load` one triangle stands for all, in the same formats.
+class Mesh {
+  constructor(gl, described) {
+    Object.assign(this, { gl, described });
+    const { width, layout } = described, columns = new Uint16Array(3 * width);
+    for (let n = 0; n < 3; ++n) columns[n * width + (layout.position.column ?? 0) + n] = 65535;
+    this.fill(new Uint32Array([0, 1, 2]), columns, new Int16Array(2));
   }
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lists.flat()), gl.STATIC_DRAW);
-  gl.bindVertexArray(null);
-  return {
-    // detail: 0 draws all triangles, larger numbers fewer
-    draw(detail) {
-      const few = detail ? parts[detail - 1] : null;
-      for (const [location, value] of constants) gl.vertexAttrib4fv(location, value);
-      gl.bindVertexArray(array);
-      if (few) gl.drawElements(gl.TRIANGLES, few.length, gl.UNSIGNED_INT, 4 * few.first);
-      else gl.drawArrays(gl.TRIANGLES, 0, count);
-      gl.bindVertexArray(null);
-    },
-  };
+
+  fill(corners, columns, tangents) {
+    const signed = new Int16Array(columns.buffer, 0, columns.length);
+    Object.assign(this, { corners, columns, signed, tangents, decoded: {}, constants: [], lists: [null], levels: [] });
+  }
+
+  async load(data) {
+    const { corners, columns, tangents } = this.described;
+    this.fill(...(await Promise.all([corners, columns, tangents].map((section) => section === null ? null : data.array(section)))));
+  }
+
+  // Upload triangles by the numbers of their corners, null for all, with vertices of their own.
+  uploaded(chosen) {
+    const { gl, corners, columns, tangents, decoded } = this, { width, layout } = this.described;
+    const array = gl.createVertexArray(), { length } = chosen ?? corners;
+    gl.bindVertexArray(array);
+    Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
+      const place = layout[name];
+      if (place && place.value) {
+        this.constants[location] = [...place.value, 0, 0].slice(0, 4);
+        return;
+      }
+      const direction = name === "normal" || name === "tangent";
+      // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
+      const stride = direction ? 4 : size;
+      const values = direction ? new Int16Array(length * stride) : new Float32Array(length * stride);
+      if (direction) {
+        const flat = name === "tangent" && this.described.tangents !== null;
+        const found = (decoded[name] ??= flat ? directions(tangents, 2, 0) : directions(this.signed, width, place.column));
+        for (let i = 0, to = 0; i < length; ++i) {
+          const corner = chosen ? chosen[i] : i, from = 4 * (flat ? (corner / 3) | 0 : corners[corner]);
+          values[to++] = found[from];
+          values[to++] = found[from + 1];
+          values[to++] = found[from + 2];
+          ++to;
+        }
+      } else {
+        const { low, step, column } = place;
+        for (let i = 0, to = 0; i < length; ++i) {
+          const from = corners[chosen ? chosen[i] : i] * width + column;
+          for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
+        }
+      }
+      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
+    });
+    gl.bindVertexArray(null);
+    return { array, length };
+  }
+
+  listed(level) {
+    const { lists, columns, corners, described } = this;
+    if (lists[level] === undefined) {
+      const finer = this.listed(level - 1), few = FEWER[level - 1];
+      const fewer = corners.length > 3 * few;
+      lists[level] = fewer ? coarser(columns, described.width, described.layout.position, corners, few, finer) : finer;
+    }
+    return lists[level];
+  }
+
+  made(level) {
+    const same = level && this.listed(level) === this.listed(level - 1);
+    return (this.levels[level] ??= same ? this.made(level - 1) : this.uploaded(this.listed(level)));
+  }
+
+  draw(level) {
+    const { gl } = this, { array, length } = this.made(level);
+    this.constants.forEach((value, location) => gl.vertexAttrib4fv(location, value));
+    gl.bindVertexArray(array);
+    gl.drawArrays(gl.TRIANGLES, 0, length);
+    gl.bindVertexArray(null);
+  }
 }
 
 const FEWER = [20000, 5000]; // triangles while something moves, for slow software rasterisers
 const CELLS = 100; // cells along the longest side, at most, below 128
 
 // Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993); finer: numbers of
-// the corners of triangles to begin with, by default all.
+// the corners of triangles to begin with, null for all. Returns numbers of corners.
 function coarser(columns, width, { column, step }, corners, most, finer, cells = CELLS) {
-  const places = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
+  const [x, y, z] = step.map((x) => (cells * x) / (65536 * Math.max(...step)));
   const cell = new Int32Array(columns.length / width); // of each distinct vertex
-  for (let n = 0; n < cell.length; ++n)
-    for (let c = 0; c < 3; ++c) cell[n] = (cell[n] << 7) | (columns[n * width + column + c] * places[c]);
+  for (let n = 0, at = column; n < cell.length; ++n, at += width)
+    cell[n] = (((columns[at] * x) | 0) << 14) | (((columns[at + 1] * y) | 0) << 7) | (columns[at + 2] * z);
   const first = new Int32Array(1 << 21).fill(-1); // corner that stands for all in a cell
+  const length = (finer ?? corners).length, found = new Int32Array(length);
   const standing = (i) => {
     const corner = finer ? finer[i] : i, n = cell[corners[corner]];
     return first[n] < 0 ? (first[n] = corner) : first[n];
   };
-  const found = [], count = (finer ?? corners).length;
-  for (let i = 0; i < count; i += 3) {
+  let count = 0;
+  for (let i = 0; i < length; i += 3) {
     const a = standing(i), b = standing(i + 1), c = standing(i + 2);
-    if (a !== b && b !== c && c !== a) found.push(a, b, c);
+    if (a === b || b === c || c === a) continue;
+    found[count++] = a;
+    found[count++] = b;
+    found[count++] = c;
   }
-  return found.length > 3 * most ? coarser(columns, width, { column, step }, corners, most, found, 0.7 * cells) : found;
+  const kept = found.subarray(0, count);
+  return count > 3 * most ? coarser(columns, width, { column, step }, corners, most, kept, 0.7 * cells) : kept;
 }

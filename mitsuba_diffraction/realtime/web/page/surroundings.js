@@ -11,7 +11,7 @@ class Surroundings {
     around.gl = gl;
     around.part = await Part.load(gl, data, parts);
     around.lobes = await Promise.all(lobes.map((one) => Part.load(gl, data, one)));
-    around.glowing = await Promise.all(emitting.map(async ({ mesh, radiance }) => ({ mesh: await uploadMesh(gl, data, mesh), radiance })));
+    around.glowing = emitting.map(({ mesh, radiance }) => ({ mesh: new Mesh(gl, mesh), radiance }));
     around.glow = new Program(gl, header.vertex, glow);
     around.background = background && new Program(gl, header.shown.vertex, background);
     return around;

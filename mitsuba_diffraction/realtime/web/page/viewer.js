@@ -176,6 +176,15 @@ class Viewer {
       });
   }
 
+  // Draw stand-ins for the meshes: the driver prepares its programs while these are decoded.
+  rehearse() {
+    this.begin(true);
+    this.drawing.drawRows(this.sample, 0, this.sample.height);
+    this.drawing.gl.flush();
+    this.sample = undefined;
+    this.dirty = true;
+  }
+
   // Draw one picture while something moves, small enough to be fast.
   glance() {
     const start = performance.now();

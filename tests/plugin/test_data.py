@@ -1,0 +1,114 @@
+"""Heights given as `data` may change: the BSDF is then as if loaded with them."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.support.directions import Array, rough_patch
+from tests.support.kinds import KINDS, THROUGH, lit, made
+from tests.support.lanes import interaction, spectra, vectors
+from tests.support.layered import PATCH, load
+from tests.support.variants import runs
+
+OTHER = rough_patch((40, 44), (0.09, 0.09), 0.2, 0.6, seed=3)
+#: As Mitsuba's arrays hold them.
+SINGLE = md.HeightField(OTHER.heights.astype(np.float32), OTHER.pixel_size)
+
+
+def values(bsdf: Any, kind: str) -> Array:
+    """f cosθo, densities and draws of 60 pairs of directions."""
+    wi, wo, lam = lit(kind, 60)
+    si, context = interaction(wi, lam), mi.BSDFContext()
+    value, density = bsdf.eval_pdf(context, si, vectors(wo))
+    drawn, _ = bsdf.sample(context, si, mi.Float(0.6), mi.Point2f(0.3, 0.7))
+    dr.eval(value, density, drawn)
+    return np.vstack([spectra(value).T, np.array(density)[None], np.array(drawn.wo)])
+
+
+def set_heights(bsdf: Any, heights: Array) -> None:
+    parameters = mi.traverse(bsdf)
+    for name in [name for name, _ in parameters if name.endswith("data") and "scale" not in name]:
+        parameters[name] = mi.TensorXf(heights)
+    parameters.update()
+
+
+@pytest.mark.parametrize("kind", [*KINDS, *THROUGH, "blended patches"])
+def test_other_heights_are_as_if_loaded(some_variant, kind):
+    bsdf, expected = made(kind), values(made(kind, SINGLE), kind)
+    before = values(bsdf, kind)
+    assert np.abs(before - expected).max() > 0.01 * np.abs(expected).max()
+    set_heights(bsdf, OTHER.heights)
+    assert values(bsdf, kind) == pytest.approx(expected, rel=1e-5, abs=1e-6)
+    set_heights(bsdf, PATCH.heights)
+    assert np.array_equal(values(bsdf, kind), before)
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_spectral"])
+def test_albedo_and_pictures_follow_heights(variant):
+    if not runs(variant):
+        pytest.skip(f"{variant} is not here")
+    mi.set_variant(variant)
+
+    def picture(bsdf: Any) -> Array:
+        plate = {"type": "rectangle", "bsdf": bsdf}
+        scene = {"type": "scene", "plate": plate, "light": {"type": "constant"}}
+        film = {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}}
+        to = mi.ScalarTransform4f().look_at([0, 1, 2], [0, 0, 0], [0, 1, 0])
+        scene["camera"] = {"type": "perspective", "to_world": to, "fov": 10, "film": film}
+        scene["integrator"] = {"type": "direct"}
+        return np.array(mi.render(mi.load_dict(scene), spp=16, seed=1))
+
+    conserving = {"material": "Al", "energy_conserving": True, "tolerance": 1e-3}
+    bsdf = load(**conserving)
+    picture(bsdf)
+    set_heights(bsdf, OTHER.heights)
+    assert picture(bsdf) == pytest.approx(picture(load(SINGLE, **conserving)), rel=1e-3)
+
+
+def test_what_no_table_can_be_made_of_is_refused_and_leaves_all_as_it_was(some_variant):
+    bsdf = load()
+    before = values(bsdf, "dielectric")
+    broken = OTHER.heights.copy()
+    broken[3, 4] = np.nan
+    for heights, message in (
+        (broken, "finite"),
+        (OTHER.heights[:20], "20 × 44 heights must be of 40 × 44"),
+        (1e3 * OTHER.heights, "."),
+    ):
+        with pytest.raises(md.DiffractionError, match=message) as caught:
+            set_heights(bsdf, heights)
+        assert "\n" not in str(caught.value)
+        assert np.array_equal(values(bsdf, "dielectric"), before)
+        assert np.array(mi.traverse(bsdf)["data"]) == pytest.approx(PATCH.heights, abs=1e-6)
+
+
+def test_derivatives_by_heights_are_refused(some_variant):
+    bsdf = load()
+    parameters = mi.traverse(bsdf)
+    dr.enable_grad(parameters["data"])
+    parameters.set_dirty("data")
+    with pytest.raises(md.DiffractionError, match=r"md\.design"):
+        parameters.update()
+
+
+def test_a_dictionary_can_be_copied(some_variant):
+    for data in (PATCH, load().table, md.OrderTable.mirror(period=1.6, reflectance=0.9)):
+        given = md.bsdf_dict(data)
+        again = copy.deepcopy(given)
+        assert again["data"] is not given["data"]
+        assert str(mi.load_dict(again)) == str(mi.load_dict(given))
+
+
+def test_files_and_tables_have_no_heights_to_change(some_variant, tmp_path):
+    np.save(tmp_path / "scan.npy", PATCH.heights)
+    of_file = mi.load_dict(md.bsdf_dict(tmp_path / "scan.npy", pixel_size=0.09))
+    of_table = mi.load_dict(md.bsdf_dict(of_file.table))
+    for bsdf in (of_file, of_table):
+        assert "data" not in dict(mi.traverse(bsdf))
