@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup extras demo test test-all fuzz package bench bench-gpu figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
+.PHONY: setup extras demo test test-all fuzz package bench bench-gpu figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -115,10 +115,6 @@ blender-figures: setup blender  ## compare Cycles with Mitsuba: docs/blender.md
 site: setup  ## build the pages with an API reference: out/site/index.html
 	@PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(PYTHON3) -W ignore -m mkdocs build --strict --quiet
 	@echo "Open out/site/index.html"
-
-report: setup  ## collect the figures that README claims, with their commands: out/report.html
-	@mkdir -p out
-	@$(PYTHON3) -m docs.make.report -o out/report.html
 
 release: setup  ## check and build a release into out/release; TESTS=1 tests the wheel, too
 	@.ci/release

@@ -33,6 +33,8 @@ _VARIANTS = {
     "llvm_ad_mono": 0.82, "llvm_ad_spectral": 0.07, "llvm_ad_mono_polarized": 0.07,
     "llvm_ad_rgb": 0.04,
 }  # fmt: skip
+#: Materials by their share. Light that goes through has scales on both sides, along four paths.
+_KINDS = {"mirror": 0.2, "metal": 0.3, "dielectric": 0.26, "interface": 0.12, "sheet": 0.12}
 #: Share of surfaces whose window is one patch, which take ten times as long.
 _PATCHES = 0.12
 _TEXELS = (4, 4, 1)
@@ -42,7 +44,7 @@ _LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any]:
     """A material with layers, a sheet or an interface; scales and speckle of any of them."""
-    kind = str(rng.choice(["mirror", "metal", "dielectric", "interface", "sheet"]))
+    kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
     index = 1.0 + log_uniform(rng, 0.01, 1.5)
     through = {"plugin": "diffraction_dielectric", "int_ior": index, "ext_ior": 1.0}
     chosen: dict[str, Any] = {
@@ -80,8 +82,8 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         chosen["coherence"] = "patch"
     for name, low, high in (("lateral_scale", 0.1, 2.0), ("height_scale", 1e-3, 1.5)):
         factor, drawn = log_uniform(rng, low, high), rng.random()
-        # scales of energy of a varying sheet, or of all wavelengths, take a minute
-        if drawn < 0.05 and "plugin" not in chosen and mi.is_monochromatic:
+        # scales of energy of a varying sheet or patch, or of all wavelengths, take a minute
+        if drawn < 0.05 and mi.is_monochromatic and not {"plugin", "coherence"} & set(chosen):
             chosen[name] = _texture(rng.uniform(0.6, 1.0, _TEXELS) * factor)
         elif drawn < 0.35:
             chosen[name] = factor

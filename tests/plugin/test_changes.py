@@ -19,7 +19,7 @@ def test_what_may_change_is_listed(some_variant):
         "conductor": set(mi.traverse(load(material="Al")).keys()),
         "coated": set(mi.traverse(load(int_ior=1.5, pigment={"type": "diffuse"})).keys()),
     }
-    always = {"height_scale", "orientation"}
+    always = {"data", "height_scale", "orientation"}
     assert names["perfect"] == always
     assert names["dielectric"] == always | {"eta"}
     assert always < names["conductor"]
