@@ -90,8 +90,8 @@ film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
     differentiable `film_eta`. Excludes a coat.
 film_thickness : float or texture ∂ [none]
-    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture's name, raw texture or mesh
-    attribute of one channel, 0 to 1.
+    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture, raw texture or mesh attribute,
+    0 to 1.
 film_thickness_min, film_thickness_max : float [0, none]
     Thicknesses, nm, where a texture of film_thickness is 0 and 1.
 film_k : float ∂ [0]

@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from ..errors import check_choice, warn
 from ..files import GLTF, readable_file
-from ..gltf import Material, materials_of
+from ..gltf import GltfMaterial, materials_of
 from ..plugin.pigment import base_colour
 from .surfaces import copied, targets_of
 
@@ -60,7 +60,7 @@ def split_meshes(state: Any, wanted: Collection[str], fitted: str) -> list[str]:
     return known
 
 
-def _part(state: Any, number: int, name: str, part: list[Material], own: bool) -> Any:
+def _part(state: Any, number: int, name: str, part: list[GltfMaterial], own: bool) -> Any:
     """Return the properties of a shape of some materials of another shape's file.
 
     own : whether it has the file's material in place of the surface of the whole.

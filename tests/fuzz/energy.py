@@ -85,7 +85,8 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         # scales of energy of a varying sheet or patch, or of all wavelengths, take a minute
         if drawn < 0.05 and mi.is_monochromatic and not {"plugin", "coherence"} & set(chosen):
             chosen[name] = _texture(rng.uniform(0.6, 1.0, _TEXELS) * factor)
-        elif drawn < 0.35:
+        # scales of energy of stretched heights that let light through take 10 s
+        elif drawn < (0.12 if name == "lateral_scale" and "plugin" in chosen else 0.35):
             chosen[name] = factor
     return chosen
 
