@@ -158,3 +158,10 @@ def test_a_header_that_is_no_object_is_refused(tmp_path, monkeypatch):
     GRATING.save(file)
     with pytest.raises(DiffractionError, match="header does not fit"):
         OrderTable.load(file)
+
+
+def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
+    GRATING.save(tmp_path / "grating.nc")
+    monkeypatch.setattr("mitsuba_diffraction.orders.file.FORMAT_VERSION", 99)
+    with pytest.raises(DiffractionError, match="this program reads 99"):
+        OrderTable.load(tmp_path / "grating.nc")
